@@ -1,0 +1,61 @@
+# bodyschema_library(<folder> SOURCES ... [LINKS folder...] [PUBLIC lib...] [PRIVATE lib...])
+#   One library per folder of src/, named bodyschema_<folder>, alias bodyschema::<folder>.
+#   LINKS names other folders; linking a storey that is not below is a configure error, so the
+#   dependency rule of docs/architecture.md cannot be broken by accident. Without SOURCES the
+#   library is header-only.
+function(bodyschema_library folder)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PUBLIC;PRIVATE" ${ARGN})
+  set(target bodyschema_${folder})
+  if(ARG_SOURCES)
+    add_library(${target} STATIC ${ARG_SOURCES})
+    set(scope PUBLIC)
+    bodyschema_warnings(${target})
+    target_link_libraries(${target} PRIVATE ${ARG_PRIVATE})
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(bodyschema::${folder} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${folder})
+  target_compile_features(${target} ${scope} cxx_std_20)
+  target_include_directories(${target} ${scope}
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  list(FIND BODYSCHEMA_STOREYS ${folder} own_index)
+  foreach(other IN LISTS ARG_LINKS)
+    list(FIND BODYSCHEMA_STOREYS ${other} other_index)
+    if(other_index LESS 0 OR other_index GREATER_EQUAL own_index)
+      message(FATAL_ERROR "src/${folder} may not link ${other}: it is not a storey below (BODYSCHEMA_STOREYS)")
+    endif()
+    target_link_libraries(${target} ${scope} bodyschema::${other})
+  endforeach()
+  target_link_libraries(${target} ${scope} ${ARG_PUBLIC})
+  set_property(GLOBAL APPEND PROPERTY BODYSCHEMA_LIBRARIES ${target})
+endfunction()
+
+function(bodyschema_warnings target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+                         $<$<BOOL:${BODYSCHEMA_WERROR}>:-Werror>)
+endfunction()
+
+# bodyschema_test(<folder> SOURCES ... [LINKS lib...] [LABELS ...] [TIMEOUT seconds])
+#   One GoogleTest program per folder of test/, named test_<folder>.
+function(bodyschema_test folder)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  find_package(GTest REQUIRED)
+  set(target test_${folder})
+  add_executable(${target} ${ARG_SOURCES})
+  bodyschema_warnings(${target})
+  target_link_libraries(${target} PRIVATE ${ARG_LINKS} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/test)
+  target_compile_definitions(${target} PRIVATE
+    BODYSCHEMA_SOURCE_DIR="${PROJECT_SOURCE_DIR}" BODYSCHEMA_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  if(NOT ARG_LABELS)
+    set(ARG_LABELS unit)
+  endif()
+  include(GoogleTest)
+  gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60
+    PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+endfunction()

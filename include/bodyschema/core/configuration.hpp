@@ -1,0 +1,81 @@
+#pragma once
+
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace bodyschema {
+
+/// A strict view of one YAML document: a mapping whose every key must be known to some reader.
+///
+/// A document may begin with `include: [file, ...]` (paths relative to the including file); later
+/// files and the including file itself override earlier ones, mapping by mapping. `${NAME}` and
+/// `${NAME:-default}` in a string are replaced by environment variables. `overrides` are
+/// `dotted.key=value` pairs, as given by `--set` on the command line.
+///
+/// Every getter marks its key as known and remembers the value in force, for `--print-config`.
+/// After all readers are done, `reject_unknown_keys()` throws for any key nobody asked for and
+/// names the nearest valid one. A value of the wrong type or outside its range throws
+/// ConfigurationError naming file, key, value and what was expected.
+///
+/// Copies share one document. Not thread-safe; configurations are read at start-up.
+class Configuration {
+ public:
+  /// Throws ConfigurationError when the file is missing, is not YAML, or includes itself.
+  static Configuration load(const std::filesystem::path& file,
+                            const std::vector<std::string>& overrides = {});
+  /// For tests: a document given as text; relative paths resolve against `directory`.
+  static Configuration parse(std::string_view yaml, const std::filesystem::path& directory = ".");
+
+  /// The mapping under `key`; an absent key is an empty mapping (all defaults).
+  [[nodiscard]] Configuration section(const std::string& key) const;
+  [[nodiscard]] bool has(const std::string& key) const;
+  /// Keys of this mapping in document order; marks them all as known (for maps keyed by joint).
+  [[nodiscard]] std::vector<std::string> keys() const;
+
+  /// Required values.
+  [[nodiscard]] double number(const std::string& key, double min = -kInf, double max = kInf) const;
+  [[nodiscard]] std::int64_t integer(const std::string& key, std::int64_t min, std::int64_t max) const;
+  [[nodiscard]] bool boolean(const std::string& key) const;
+  [[nodiscard]] std::string text(const std::string& key) const;
+  /// One of `choices`; the error lists them.
+  [[nodiscard]] std::string choice(const std::string& key, const std::vector<std::string>& choices) const;
+  [[nodiscard]] std::vector<double> numbers(const std::string& key) const;
+  [[nodiscard]] std::vector<std::string> texts(const std::string& key) const;
+  /// A path; relative ones resolve against the file that holds the key.
+  [[nodiscard]] std::filesystem::path path(const std::string& key) const;
+  [[nodiscard]] std::vector<std::filesystem::path> paths(const std::string& key) const;
+
+  /// The same with a value for an absent key.
+  [[nodiscard]] double number_or(const std::string& key, double fallback, double min = -kInf, double max = kInf) const;
+  [[nodiscard]] std::int64_t integer_or(const std::string& key, std::int64_t fallback, std::int64_t min, std::int64_t max) const;
+  [[nodiscard]] bool boolean_or(const std::string& key, bool fallback) const;
+  [[nodiscard]] std::string text_or(const std::string& key, const std::string& fallback) const;
+  [[nodiscard]] std::string choice_or(const std::string& key, const std::string& fallback, const std::vector<std::string>& choices) const;
+  [[nodiscard]] std::vector<double> numbers_or(const std::string& key, const std::vector<double>& fallback) const;
+  [[nodiscard]] std::vector<std::string> texts_or(const std::string& key, const std::vector<std::string>& fallback) const;
+
+  /// Throws for the first key of the whole document that no getter asked for, e.g.
+  /// "config/a.yaml:12: unknown key 'filter.particle'; did you mean 'filter.particles'?".
+  void reject_unknown_keys() const;
+  /// The whole document with includes, overrides and defaults in force, as YAML.
+  [[nodiscard]] std::string print() const;
+  /// A short hexadecimal digest of print(), published so that a result names its configuration.
+  [[nodiscard]] std::string hash() const;
+  /// An error about `key` of this section in this class's wording, for checks made by readers.
+  [[noreturn]] void fail(const std::string& key, const std::string& expected) const;
+
+ private:
+  static constexpr double kInf = std::numeric_limits<double>::infinity();
+  struct Document;
+  Configuration(std::shared_ptr<Document> document, std::string prefix);
+  std::shared_ptr<Document> document_;
+  std::string prefix_;
+};
+
+}  // namespace bodyschema

@@ -1,0 +1,11 @@
+#pragma once
+
+#include <string>
+
+namespace bodyschema {
+
+/// Sets up spdlog's default logger for a program: standard error, "HH:MM:SS level message".
+/// `level` is trace, debug, info, warn, error or off; throws ConfigurationError otherwise.
+void set_up_logging(const std::string& level);
+
+}  // namespace bodyschema

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bodyschema/geometry/binary_mask.hpp"
+#include "bodyschema/geometry/pinhole.hpp"
+#include "bodyschema/geometry/triangle_mesh.hpp"
+
+namespace bodyschema {
+
+/// Which triangles make up the silhouette of an open part. Closed parts look the same with both.
+enum class FaceCulling {
+  kNone,  ///< every triangle, from either side
+  kBack,  ///< only triangles that face the camera (what most game engines draw)
+};
+
+/// What is drawn: rigid parts, each moved by its own pose; the silhouette is their union.
+struct SilhouetteModel {
+  std::vector<TriangleMesh> parts;  ///< metres, part frame
+  FaceCulling culling = FaceCulling::kNone;
+};
+
+/// What one camera saw. `valid` is empty (all pixels count) or marks the pixels that count at all;
+/// pixels outside it enter neither union nor intersection.
+struct ObservedSilhouette {
+  BinaryMask mask;
+  BinaryMask valid;
+};
+
+/// Pixel counts of one predicted silhouette against one observed one.
+struct SilhouetteCounts {
+  std::uint32_t intersection = 0;
+  std::uint32_t predicted = 0;
+  std::uint32_t observed = 0;
+  /// |A u B| = |A| + |B| - |A n B|.
+  [[nodiscard]] std::uint32_t union_count() const { return predicted + observed - intersection; }
+  friend bool operator==(const SilhouetteCounts&, const SilhouetteCounts&) = default;
+};
+
+/// Scores many predicted silhouettes against the observed ones: the project's hot loop.
+///
+/// One scorer serves one model, one set of cameras and one thread at a time. Results do not depend
+/// on thread counts. `score` neither throws nor allocates once the batch size has been seen.
+class SilhouetteScorer {
+ public:
+  virtual ~SilhouetteScorer() = default;
+
+  /// One per camera, sizes as the intrinsics; copied. A size that does not fit throws
+  /// std::invalid_argument.
+  virtual void set_observation(std::span<const ObservedSilhouette> observed) = 0;
+
+  /// @param X_CB  pose of each part in each camera, row-major [particle][camera][part]
+  /// @param counts  out, row-major [particle][camera]; its size gives the number of particles
+  /// A camera may be left out with `camera_mask` (bit c set: camera c is scored; counts of others
+  /// are zero), for mono operation and dead cameras.
+  virtual void score(std::span<const Eigen::Isometry3f> X_CB, std::span<SilhouetteCounts> counts,
+                     std::uint32_t camera_mask = ~0u) = 0;
+
+  /// The predicted silhouette of one particle in one camera, for overlays and tests.
+  /// @param X_CB  pose of each part in that camera
+  virtual BinaryMask render(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera) = 0;
+
+  /// "atlas on llvmpipe (EGL surfaceless, OpenGL 4.5)" or "contour (AVX2, 2 threads)".
+  [[nodiscard]] virtual std::string description() const = 0;
+};
+
+/// `engine` is "atlas", "contour" or "auto". Auto takes contour when the GL renderer is software
+/// or there is no GL at all, and atlas on a GPU.
+struct SilhouetteOptions {
+  std::string engine = "auto";
+  std::string gl_platform = "auto";  ///< "auto", "egl_device", "egl_surfaceless", "osmesa"
+  int threads = 0;                   ///< contour: worker threads, 0 = one per core
+};
+
+/// Throws std::invalid_argument for an unusable model or option, gl::ContextError when the atlas is
+/// asked for and no context can be had. `reason` (optional) receives why this engine was taken.
+std::unique_ptr<SilhouetteScorer> make_silhouette_scorer(const SilhouetteModel& model,
+                                                         std::span<const PinholeIntrinsics> cameras,
+                                                         const SilhouetteOptions& options = {},
+                                                         std::string* reason = nullptr);
+
+}  // namespace bodyschema
