@@ -1,0 +1,143 @@
+#include "bodyschema/core/configuration.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+template <class Action>
+std::string error_of(Action action) {
+  try {
+    action();
+  } catch (const ConfigurationError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+class ConfigurationFiles : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    directory_ = std::filesystem::temp_directory_path() /
+                 ("bodyschema_configuration_" + std::to_string(getpid()));
+    std::filesystem::create_directories(directory_);
+  }
+  void TearDown() override { std::filesystem::remove_all(directory_); }
+  std::filesystem::path write(const std::string& name, const std::string& text) {
+    std::ofstream(directory_ / name) << text;
+    return directory_ / name;
+  }
+  std::filesystem::path directory_;
+};
+
+TEST(Configuration, ReadsTypesAndDefaults) {
+  const auto c = Configuration::parse(
+      "filter: {particles: 200, spread_deg: 3.5, on: yes}\nnames: [a, b]\nk: [1, 2.5]\n");
+  EXPECT_EQ(c.section("filter").integer("particles", 1, 1000), 200);
+  EXPECT_DOUBLE_EQ(c.section("filter").number("spread_deg"), 3.5);
+  EXPECT_TRUE(c.section("filter").boolean("on"));
+  EXPECT_EQ(c.texts("names"), (std::vector<std::string>{"a", "b"}));
+  EXPECT_EQ(c.numbers("k"), (std::vector<double>{1.0, 2.5}));
+  EXPECT_DOUBLE_EQ(c.section("absent").number_or("x", 0.25), 0.25);
+  EXPECT_EQ(c.choice_or("engine", "auto", {"auto", "atlas"}), "auto");
+  c.reject_unknown_keys();
+  EXPECT_THAT(c.print(), AllOf(HasSubstr("x: 0.25"), HasSubstr("particles: 200")));
+}
+
+TEST(Configuration, UnknownKeyNamesTheNearestValidOne) {
+  const auto c = Configuration::parse("filter:\n  particels: 200\n");
+  (void)c.section("filter").integer_or("particles", 100, 1, 1000);
+  (void)c.section("filter").number_or("alpha", 500);
+  EXPECT_THAT(error_of([&] { c.reject_unknown_keys(); }),
+              AllOf(HasSubstr("configuration.yaml:2"), HasSubstr("'filter.particels'"),
+                    HasSubstr("did you mean 'filter.particles'?")));
+}
+
+TEST(Configuration, UnknownSectionIsNamedItself) {
+  const auto c = Configuration::parse("filtr:\n  particles: 200\n");
+  (void)c.section("filter").integer_or("particles", 100, 1, 1000);
+  EXPECT_THAT(error_of([&] { c.reject_unknown_keys(); }),
+              AllOf(HasSubstr("'filtr'"), HasSubstr("did you mean 'filter'?")));
+}
+
+TEST(Configuration, WrongTypeAndRangeSayWhatWasExpected) {
+  const auto c = Configuration::parse("a: {n: abc, r: 7, e: maybe, l: 3, s: [x], inf: .inf}\n");
+  const auto a = c.section("a");
+  EXPECT_THAT(error_of([&] { (void)a.integer("n", 1, 10); }),
+              AllOf(HasSubstr("'a.n' is 'abc'"), HasSubstr("a whole number from 1 to 10")));
+  EXPECT_THAT(error_of([&] { (void)a.number("r", 0, 5); }),
+              AllOf(HasSubstr("'7'"), HasSubstr("a number from 0 to 5")));
+  EXPECT_THAT(error_of([&] { (void)a.choice("e", {"atlas", "contour", "auto"}); }),
+              HasSubstr("expected atlas, contour or auto"));
+  EXPECT_THAT(error_of([&] { (void)a.numbers("l"); }), HasSubstr("a list of numbers"));
+  EXPECT_THAT(error_of([&] { (void)a.number("s"); }), HasSubstr("is a list"));
+  EXPECT_THAT(error_of([&] { (void)a.number("inf"); }), HasSubstr("expected a number"));
+  EXPECT_THAT(error_of([&] { (void)a.number("gone"); }), HasSubstr("'a.gone' is missing"));
+}
+
+TEST(Configuration, DuplicateKeysAndBrokenYamlAreErrorsWithLines) {
+  EXPECT_THAT(error_of([] { Configuration::parse("a: 1\nb: 2\na: 3\n"); }),
+              AllOf(HasSubstr(":3"), HasSubstr("given twice")));
+  EXPECT_THAT(error_of([] { Configuration::parse("a: [1, 2\n"); }), HasSubstr("not valid YAML"));
+  EXPECT_THAT(error_of([] { Configuration::parse("- a\n"); }), HasSubstr("expected a mapping"));
+}
+
+TEST(Configuration, AliasBombIsRefused) {
+  std::string text = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+  for (int i = 1; i < 8; ++i) {
+    const std::string previous = "*a" + std::to_string(i - 1);
+    text += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [";
+    for (int k = 0; k < 10; ++k) text += (k ? ", " : "") + previous;
+    text += "]\n";
+  }
+  EXPECT_THAT(error_of([&] { Configuration::parse(text); }), HasSubstr("too many"));
+}
+
+TEST_F(ConfigurationFiles, IncludesOverridesAndPathsResolve) {
+  std::filesystem::create_directories(directory_ / "sub");
+  write("sub/robot.yaml", "robot: {urdf: a.urdf, scale: 1}\n");
+  const auto file = write("top.yaml", "include: [sub/robot.yaml]\nrobot: {scale: 2}\n");
+  const auto c = Configuration::load(file, {"robot.scale=3", "new.key=[1, 2]"});
+  EXPECT_DOUBLE_EQ(c.section("robot").number("scale"), 3.0);
+  EXPECT_EQ(c.section("robot").path("urdf"), directory_ / "sub" / "a.urdf");
+  EXPECT_EQ(c.section("new").numbers("key").size(), 2u);
+  EXPECT_EQ(Configuration::load(file).section("robot").number("scale"), 2.0);
+}
+
+TEST_F(ConfigurationFiles, IncludeCycleAndMissingFileAreErrors) {
+  const auto file = write("a.yaml", "include: b.yaml\n");
+  write("b.yaml", "include: a.yaml\n");
+  EXPECT_THAT(error_of([&] { Configuration::load(file); }), HasSubstr("includes itself"));
+  EXPECT_THAT(error_of([&] { Configuration::load(directory_ / "none.yaml"); }),
+              AllOf(HasSubstr("none.yaml"), HasSubstr("no such configuration file")));
+  EXPECT_THAT(error_of([&] { Configuration::load(write("c.yaml", "x: 1\n"), {"novalue"}); }), HasSubstr("key.key=value"));
+}
+
+TEST(Configuration, EnvironmentIsSubstituted) {
+  setenv("BODYSCHEMA_TEST_DIRECTORY", "/data", 1);
+  const auto c = Configuration::parse(
+      "a: ${BODYSCHEMA_TEST_DIRECTORY}/x\nb: ${BODYSCHEMA_TEST_NONE:-y}/z\nc: ${BODYSCHEMA_TEST_NONE}\n");
+  EXPECT_EQ(c.text("a"), "/data/x");
+  EXPECT_EQ(c.text("b"), "y/z");
+  EXPECT_THAT(error_of([&] { (void)c.text("c"); }), HasSubstr("BODYSCHEMA_TEST_NONE is not set"));
+}
+
+TEST(Configuration, HashFollowsContent) {
+  const auto a = Configuration::parse("x: 1\n");
+  const auto b = Configuration::parse("x: 2\n");
+  EXPECT_NE(a.hash(), b.hash());
+  EXPECT_EQ(a.hash(), Configuration::parse("x:   1 # comment\n").hash());
+}
+
+}  // namespace
+}  // namespace bodyschema
