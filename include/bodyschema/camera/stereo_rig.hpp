@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bodyschema/core/configuration.hpp"
+#include "bodyschema/geometry/binary_mask.hpp"
 #include "bodyschema/geometry/image.hpp"
 #include "bodyschema/geometry/pinhole.hpp"
 
@@ -28,12 +29,15 @@ struct StereoRig {
   [[nodiscard]] std::vector<PinholeIntrinsics> intrinsics() const;
 };
 
-/// Straightens pictures of a distorted camera to its own pinhole intrinsics; a copy when there is
-/// no distortion. Maps are computed once.
+/// Straightens pictures of a distorted camera to its own pinhole intrinsics (bilinear; black where
+/// the camera did not look); a copy when there is no distortion. Maps are computed once.
 class Undistorter {
  public:
   explicit Undistorter(const CameraModel& camera);
+  /// Throws DataError when the picture's size is not the camera's.
   [[nodiscard]] Image apply(const Image& image) const;
+  /// The pixels of a straightened picture that the camera did see.
+  [[nodiscard]] BinaryMask valid() const;
 
  private:
   CameraModel camera_;

@@ -12,7 +12,8 @@
 namespace bodyschema {
 
 /// Poses of a chosen set of links in the root frame, by KDL. Only the joints between those links
-/// and the root are evaluated. One per thread; allocates nothing after construction.
+/// and the root are evaluated. One per thread; allocates nothing after construction. The joint axes
+/// are for Jacobians: a link point p moves by direction x (p - point) per radian.
 class ForwardKinematics {
  public:
   /// Throws ConfigurationError naming an unknown link and the nearest one.
@@ -25,7 +26,8 @@ class ForwardKinematics {
   void compute(const Eigen::Ref<const Eigen::VectorXd>& q, std::span<Pose> X_WB);
 
   /// The axis of a joint at the last `compute`: unit direction and a point on it in the root frame,
-  /// metres. For a driver with mimic joints this is the driver's own axis.
+  /// metres. For a driver with mimic joints this is the driver's own axis. Zero direction for a
+  /// joint that moves none of the links.
   struct Axis {
     Eigen::Vector3d direction_W;
     Eigen::Vector3d point_W;

@@ -7,8 +7,10 @@
 
 namespace bodyschema {
 
-/// Static torque that gravity exerts on each joint, by KDL's recursive Newton-Euler on the tree.
-/// One per thread.
+/// Static torque that gravity exerts on each joint: the axis times the moment of the weight of
+/// everything that hangs on it, summed over the tree from the leaves (KDL segments; the static part
+/// of recursive Newton-Euler). A driver also feels its mimic joints, each times its multiplier.
+/// One per thread; allocates nothing after construction.
 class GravityTorques {
  public:
   explicit GravityTorques(std::shared_ptr<const RobotModel> model);
@@ -18,8 +20,9 @@ class GravityTorques {
   /// @param q  joint vector, radians
   /// @param gravity_W  acceleration of gravity in the root frame, m/s^2 (0 0 -9.81 for an upright robot)
   /// @return torque of gravity on each joint about its axis, Nm, RobotModel order. Positive torque
-  ///         pushes the joint towards larger angles (minus the holding torque of the motor).
-  Eigen::VectorXd compute(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Vector3d& gravity_W);
+  ///         pushes the joint towards larger angles (minus the holding torque of the motor); N for
+  ///         prismatic joints. Valid until the next call.
+  const Eigen::VectorXd& compute(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Vector3d& gravity_W);
 
  private:
   struct Impl;

@@ -8,16 +8,11 @@
 #include <vector>
 
 #include "bodyschema/geometry/binary_mask.hpp"
+#include "bodyschema/geometry/face_culling.hpp"
 #include "bodyschema/geometry/pinhole.hpp"
 #include "bodyschema/geometry/triangle_mesh.hpp"
 
 namespace bodyschema {
-
-/// Which triangles make up the silhouette of an open part. Closed parts look the same with both.
-enum class FaceCulling {
-  kNone,  ///< every triangle, from either side
-  kBack,  ///< only triangles that face the camera (what most game engines draw)
-};
 
 /// What is drawn: rigid parts, each moved by its own pose; the silhouette is their union.
 struct SilhouetteModel {

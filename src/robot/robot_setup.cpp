@@ -1,0 +1,79 @@
+#include "bodyschema/robot/robot_setup.hpp"
+
+#include <algorithm>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/core/nearest_name.hpp"
+#include "bodyschema/geometry/pose.hpp"
+
+namespace bodyschema {
+namespace {
+
+void require(bool known, const std::string& key, const std::string& name,
+             const std::string& robot, const std::vector<std::string>& candidates) {
+  if (known) return;
+  throw ConfigurationError("robot." + key + ": '" + name + "' is not in robot '" + robot +
+                           "'; did you mean '" + nearest_name(name, candidates) + "'?");
+}
+
+}  // namespace
+
+RobotSetup RobotSetup::from(const Configuration& robot) {
+  RobotSetup setup;
+  setup.model.urdf = robot.path("urdf");
+  if (robot.has("mesh_search_roots")) setup.model.mesh_search_roots = robot.paths("mesh_search_roots");
+  setup.model.rendered_links = robot.texts("rendered_links");
+  setup.culling = robot.choice_or("face_culling", "none", {"none", "back"}) == "back"
+                      ? FaceCulling::kBack
+                      : FaceCulling::kNone;
+  setup.hand_link = robot.text("hand_link");
+  setup.fingertip_links = robot.texts_or("fingertip_links", {});
+  setup.estimated_joints = robot.texts("estimated_joints");
+  setup.head_joints = robot.texts_or("head_joints", {});
+  const Configuration fixed = robot.section("fixed_joints_deg");
+  for (const std::string& joint : fixed.keys()) {
+    setup.fixed_joints_rad[joint] = radians(fixed.number(joint, -3600.0, 3600.0));
+  }
+  const std::vector<double> gravity = robot.numbers_or("gravity_m_s2", {0.0, 0.0, -9.81});
+  if (gravity.size() != 3) robot.fail("gravity_m_s2", "three numbers [x, y, z]");
+  setup.gravity_W = {gravity[0], gravity[1], gravity[2]};
+
+  if (setup.model.rendered_links.empty()) robot.fail("rendered_links", "at least one link");
+  if (setup.estimated_joints.empty()) robot.fail("estimated_joints", "at least one joint");
+  auto sorted = setup.estimated_joints;
+  std::sort(sorted.begin(), sorted.end());
+  if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) {
+    robot.fail("estimated_joints", "each joint once");
+  }
+  return setup;
+}
+
+std::shared_ptr<const RobotModel> RobotSetup::load() const {
+  auto robot = RobotModel::load(model);
+  std::vector<std::string> joint_names;
+  for (const auto& joint : robot->joints()) joint_names.push_back(joint.name);
+  const auto need_link = [&](const char* key, const std::string& name) {
+    require(robot->has_link(name), key, name, robot->name(), robot->link_names());
+  };
+  const auto need_joint = [&](const char* key, const std::string& name) {
+    require(robot->find_joint(name).has_value(), key, name, robot->name(), joint_names);
+  };
+  need_link("hand_link", hand_link);
+  for (const auto& name : fingertip_links) need_link("fingertip_links", name);
+  for (const auto& name : estimated_joints) need_joint("estimated_joints", name);
+  for (const auto& name : head_joints) need_joint("head_joints", name);
+  for (const auto& [name, value] : fixed_joints_rad) need_joint("fixed_joints_deg", name);
+  return robot;
+}
+
+Eigen::VectorXd RobotSetup::default_joints(const RobotModel& robot) const {
+  Eigen::VectorXd q(robot.joint_count());
+  for (Eigen::Index j = 0; j < q.size(); ++j) {
+    const JointInfo& joint = robot.joints()[static_cast<std::size_t>(j)];
+    q[j] = std::clamp(0.0, joint.lower_rad, joint.upper_rad);
+  }
+  for (const auto& [name, value] : fixed_joints_rad) q[robot.joint_index(name)] = value;
+  return q;
+}
+
+}  // namespace bodyschema

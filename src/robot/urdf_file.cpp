@@ -1,0 +1,212 @@
+#include "urdf_file.hpp"
+
+#include <console_bridge/console.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <cmath>
+#include <fstream>
+#include <mutex>
+#include <sstream>
+#include <string_view>
+
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kMaxUrdfBytes = 16u << 20;
+constexpr int kMaxXmlDepth = 100;
+
+/// Collects what urdfdom would print.
+class MessageCollector : public console_bridge::OutputHandler {
+ public:
+  MessageCollector() : lock_(mutex()) { console_bridge::useOutputHandler(this); }
+  ~MessageCollector() override { console_bridge::restorePreviousOutputHandler(); }
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level == console_bridge::CONSOLE_BRIDGE_LOG_ERROR) errors_.push_back(text);
+  }
+  /// The first error is the specific one; later ones only say which element it spoilt.
+  [[nodiscard]] std::string summary() const {
+    if (errors_.empty()) return "it is not a URDF";
+    std::string line = errors_.front();
+    if (errors_.size() > 1) line += "; " + errors_[1];
+    for (char& c : line) {
+      if (c == '\n' || c == '\r') c = ' ';
+    }
+    return line;
+  }
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex m;
+    return m;
+  }
+  std::unique_lock<std::mutex> lock_;
+  std::vector<std::string> errors_;
+};
+
+/// How deep elements nest, found without recursion: the XML parser below recurses once per level,
+/// so a hostile file must be turned away before it is parsed.
+int xml_depth(std::string_view text) {
+  int depth = 0;
+  int deepest = 0;
+  std::size_t i = 0;
+  const auto skip_past = [&](std::string_view end) {
+    const auto at = text.find(end, i);
+    i = at == std::string_view::npos ? text.size() : at + end.size();
+  };
+  while ((i = text.find('<', i)) != std::string_view::npos) {
+    const auto rest = text.substr(i);
+    if (rest.starts_with("<!--")) {
+      skip_past("-->");
+    } else if (rest.starts_with("<![CDATA[")) {
+      skip_past("]]>");
+    } else if (rest.starts_with("<?") || rest.starts_with("<!")) {
+      skip_past(">");
+    } else if (rest.starts_with("</")) {
+      --depth;
+      skip_past(">");
+    } else {
+      char quote = 0;
+      for (++i; i < text.size() && (quote != 0 || text[i] != '>'); ++i) {
+        if (quote != 0) {
+          if (text[i] == quote) quote = 0;
+        } else if (text[i] == '"' || text[i] == '\'') {
+          quote = text[i];
+        }
+      }
+      if (i < text.size() && text[i - 1] != '/') deepest = std::max(deepest, ++depth);
+    }
+  }
+  return deepest;
+}
+
+std::string read_text(const fs::path& file) {
+  std::error_code error;
+  if (!fs::exists(file, error)) throw FileError(file.string() + ": URDF not found");
+  if (!fs::is_regular_file(file, error)) {
+    throw FileError(file.string() + ": expected a URDF file, this is not a regular file");
+  }
+  const auto size = fs::file_size(file, error);
+  if (error) throw FileError(file.string() + ": cannot be read: " + error.message());
+  if (size > kMaxUrdfBytes) {
+    throw FileError(file.string() + ": URDF of " + std::to_string(size) + " bytes, at most " +
+                    std::to_string(kMaxUrdfBytes) + " expected");
+  }
+  std::ifstream stream(file, std::ios::binary);
+  std::string text(size, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(size));
+  if (!stream) throw FileError(file.string() + ": cannot be read");
+  return text;
+}
+
+bool finite(const urdf::Vector3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+bool finite(const urdf::Pose& pose) {
+  const auto& r = pose.rotation;
+  return finite(pose.position) && std::isfinite(r.x) && std::isfinite(r.y) &&
+         std::isfinite(r.z) && std::isfinite(r.w);
+}
+
+void check_joint(const fs::path& file, const urdf::Joint& joint) {
+  const auto fail = [&](const std::string& what) {
+    throw FileError(file.string() + ": joint '" + joint.name + "': " + what);
+  };
+  if (!finite(joint.parent_to_joint_origin_transform)) fail("origin is not a finite number");
+  const bool movable = joint.type == urdf::Joint::REVOLUTE ||
+                       joint.type == urdf::Joint::CONTINUOUS ||
+                       joint.type == urdf::Joint::PRISMATIC;
+  if (movable) {
+    if (!finite(joint.axis)) fail("axis is not a finite number");
+    const double norm = std::hypot(joint.axis.x, joint.axis.y, joint.axis.z);
+    if (norm < 1e-6) fail("axis is zero, expected a direction");
+  }
+  if (joint.limits && !(joint.limits->lower <= joint.limits->upper)) {
+    std::ostringstream text;
+    text << "limits [" << joint.limits->lower << ", " << joint.limits->upper
+         << "], expected lower <= upper";
+    fail(text.str());
+  }
+  if (joint.mimic && !(std::isfinite(joint.mimic->multiplier) &&
+                       std::isfinite(joint.mimic->offset))) {
+    fail("mimic multiplier or offset is not a finite number");
+  }
+}
+
+void check_link(const fs::path& file, const urdf::Link& link) {
+  if (!link.inertial) return;
+  const auto& in = *link.inertial;
+  if (!finite(in.origin) || !(in.mass >= 0.0) || !std::isfinite(in.mass) ||
+      !std::isfinite(in.ixx + in.ixy + in.ixz + in.iyy + in.iyz + in.izz)) {
+    throw FileError(file.string() + ": link '" + link.name +
+                    "': inertial values must be finite and the mass not negative");
+  }
+}
+
+/// A cycle of links keeps itself alive through urdfdom's shared pointers.
+void break_links(urdf::ModelInterface& model) {
+  for (auto& [name, link] : model.links_) {
+    link->child_links.clear();
+    link->child_joints.clear();
+  }
+}
+
+}  // namespace
+
+UrdfTree read_urdf(const fs::path& file) {
+  const std::string text = read_text(file);
+  if (const int depth = xml_depth(text); depth > kMaxXmlDepth) {
+    throw FileError(file.string() + ": elements nest " + std::to_string(depth) +
+                    " deep, at most " + std::to_string(kMaxXmlDepth) + " expected");
+  }
+
+  urdf::ModelInterfaceSharedPtr model;
+  {
+    MessageCollector messages;
+    std::string reason;
+    try {
+      model = urdf::parseURDF(text);
+      if (!model) reason = messages.summary();
+    } catch (const std::exception& error) {
+      reason = error.what();
+    }
+    if (!model) throw FileError(file.string() + ": not a usable URDF: " + reason);
+  }
+
+  // urdfdom accepts a link with two parents and cycles that hang off the root.
+  std::map<std::string, std::string> parent_joint;  // by child link
+  for (const auto& [name, joint] : model->joints_) {
+    const auto [at, fresh] = parent_joint.emplace(joint->child_link_name, name);
+    if (!fresh) {
+      break_links(*model);
+      throw FileError(file.string() + ": link '" + joint->child_link_name +
+                      "' is the child of joints '" + at->second + "' and '" + name +
+                      "'; a URDF must be a tree without cycles");
+    }
+  }
+  UrdfTree tree;
+  tree.links.push_back(model->root_link_.get());
+  for (std::size_t i = 0; i < tree.links.size(); ++i) {
+    for (const auto& child : tree.links[i]->child_links) tree.links.push_back(child.get());
+  }
+  if (tree.links.size() != model->links_.size()) {
+    std::map<std::string, bool> reached;
+    for (const auto* link : tree.links) reached[link->name] = true;
+    for (const auto& [name, link] : model->links_) {
+      if (reached.count(name) != 0) continue;
+      break_links(*model);
+      throw FileError(file.string() + ": link '" + name + "' is not reached from the root '" +
+                      model->root_link_->name + "'; its joints form a cycle");
+    }
+  }
+
+  for (const auto& [name, joint] : model->joints_) check_joint(file, *joint);
+  for (const auto& [name, link] : model->links_) check_link(file, *link);
+  tree.model = model;
+  return tree;
+}
+
+}  // namespace bodyschema
