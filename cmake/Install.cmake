@@ -16,6 +16,7 @@ set(BODYSCHEMA_INSTALL_SHAREDIR ${CMAKE_INSTALL_DATADIR}/bodyschema)
 #   them would only fail at the user's.
 function(bodyschema_package_of item variable)
   set(lines "")
+  string(REGEX REPLACE "::.*" "" package ${item})  # of our own finders, Find<package>.cmake
   if(item MATCHES "^Eigen3::")
     set(lines "find_dependency(Eigen3 NO_MODULE)")
   elseif(item MATCHES "^Threads::")
@@ -37,7 +38,6 @@ function(bodyschema_package_of item variable)
   elseif(item MATCHES "^(lcm|lcm-static|lcm::lcm|lcm::lcm-static)$")
     set(lines "find_dependency(lcm)")
   elseif(item MATCHES "^OpenGL::(EGL|OpenGL|GL)$")
-    string(REPLACE "GL" "" component "${CMAKE_MATCH_1}")
     set(lines "find_dependency(OpenGL COMPONENTS EGL OpenGL)")
   elseif(item MATCHES "^(JPEG|ZLIB|PNG)::")
     set(lines "find_dependency(${CMAKE_MATCH_1})")
@@ -52,10 +52,9 @@ function(bodyschema_package_of item variable)
       message(FATAL_ERROR "cmake/Install.cmake: cannot tell the pkg-config module of ${item}")
     endif()
     set(lines "find_dependency(PkgConfig)\npkg_check_modules(${prefix} REQUIRED IMPORTED_TARGET ${modules})")
-  elseif(EXISTS ${PROJECT_SOURCE_DIR}/cmake/Find${item}.cmake)
-    set(lines "find_dependency(${item})")
-  elseif(item MATCHES "^([^:]+)::" AND EXISTS ${PROJECT_SOURCE_DIR}/cmake/Find${CMAKE_MATCH_1}.cmake)
-    set(lines "find_dependency(${CMAKE_MATCH_1})")
+  elseif(EXISTS ${PROJECT_SOURCE_DIR}/cmake/Find${package}.cmake)
+    set_property(GLOBAL APPEND PROPERTY BODYSCHEMA_FINDERS ${PROJECT_SOURCE_DIR}/cmake/Find${package}.cmake)
+    set(lines "find_dependency(${package})")
   elseif(item MATCHES "^(dl|m|rt|pthread|stdc\\+\\+fs|-.*)$")
     # Part of the system.
   else()
@@ -67,10 +66,24 @@ endfunction()
 
 # ---- libraries, headers and their exported targets -------------------------------------------
 get_property(libraries GLOBAL PROPERTY BODYSCHEMA_LIBRARIES)
+# Ground floor first, and before the storeys what is none (the generated LCM types).
 set(installed_folders "")
 foreach(library IN LISTS libraries)
   get_target_property(folder ${library} EXPORT_NAME)
-  list(APPEND installed_folders ${folder})
+  if(NOT folder)
+    string(REGEX REPLACE "^bodyschema_" "" folder ${library})
+    set_target_properties(${library} PROPERTIES EXPORT_NAME ${folder})
+  endif()
+  if(folder IN_LIST BODYSCHEMA_STOREYS)
+    list(APPEND installed_folders ${folder})
+  else()
+    list(PREPEND installed_folders ${folder})
+  endif()
+  set(library_of_${folder} ${library})
+endforeach()
+
+foreach(folder IN LISTS installed_folders)
+  set(library ${library_of_${folder}})
   install(TARGETS ${library} EXPORT bodyschema-${folder}
           ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
           LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
@@ -117,9 +130,10 @@ configure_package_config_file(cmake/bodyschemaConfig.cmake.in
   PATH_VARS BODYSCHEMA_INSTALL_SHAREDIR)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/package/bodyschemaConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
-file(GLOB find_modules CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/cmake/Find*.cmake)
+get_property(finders GLOBAL PROPERTY BODYSCHEMA_FINDERS)
+list(REMOVE_DUPLICATES finders)
 install(FILES ${PROJECT_BINARY_DIR}/package/bodyschemaConfig.cmake
-              ${PROJECT_BINARY_DIR}/package/bodyschemaConfigVersion.cmake ${find_modules}
+              ${PROJECT_BINARY_DIR}/package/bodyschemaConfigVersion.cmake ${finders}
         DESTINATION ${BODYSCHEMA_INSTALL_CMAKEDIR})
 
 # ---- programs, configurations, robots ----------------------------------------------------------
@@ -139,9 +153,13 @@ foreach(folder IN ITEMS config meshes)
             PATTERN "service" EXCLUDE)
   endif()
 endforeach()
-if(EXISTS ${PROJECT_SOURCE_DIR}/LICENSE)
-  install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
-endif()
+install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+# ---- the service ---------------------------------------------------------------------------------
+install(FILES config/service/bodyschemad.service DESTINATION lib/systemd/system)
+install(FILES config/service/60-bodyschema.conf DESTINATION lib/sysctl.d)
+
+include(Package)
 
 if(BODYSCHEMA_BUILD_TESTS)
   include(${PROJECT_SOURCE_DIR}/test/install/tests.cmake)
