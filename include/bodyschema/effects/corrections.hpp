@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace bodyschema {
+
+/// What a camera is, minus what the configuration says.
+struct CameraCorrection {
+  double shift_x_m = 0.0;    ///< camera moved along its own x axis, metres
+  double focal_scale = 0.0;  ///< fx and fy are multiplied by 1 + this
+  double cx_px = 0.0;        ///< principal point, px
+  double cy_px = 0.0;        ///< principal point, px
+  double k1 = 0.0;           ///< radial distortion, added to the camera's own
+};
+
+/// A small constant transform at a joint, between its parent link and its rotation.
+struct JointAdjustment {
+  double along_m = 0.0;     ///< the joint (and all beyond) moved along its own axis, metres
+  double tilt_1_rad = 0.0;  ///< tilt of the joint's axis in its parent link, about `tilt_axis(0)`
+  double tilt_2_rad = 0.0;  ///< ... about `tilt_axis(1)` of CorrectedKinematics
+  [[nodiscard]] bool is_zero() const { return along_m == 0 && tilt_1_rad == 0 && tilt_2_rad == 0; }
+};
+
+/// Everything by which effects change the prediction of one camera's picture at one instant. All
+/// zero means: as the URDF and the configuration say. Effects add to it; the sum is applied.
+///
+/// Sign everywhere: true minus assumed, so `q_true = q_encoder + dq` (a joint offset of +3 deg,
+/// encoder = true + offset, is dq = -3 deg).
+struct Corrections {
+  Eigen::VectorXd dq;                        ///< radians, RobotModel order
+  std::vector<JointAdjustment> adjustments;  ///< RobotModel order
+  CameraCorrection camera;
+  double mesh_scale = 0.0;   ///< rendered parts are scaled by 1 + this about their own frames
+  double dilation_px = 0.0;  ///< the observed outline lies this far outside the predicted one
+
+  explicit Corrections(Eigen::Index joint_count = 0)
+      : dq(Eigen::VectorXd::Zero(joint_count)),
+        adjustments(static_cast<std::size_t>(joint_count)) {}
+  /// Back to zero; allocates nothing.
+  void clear() {
+    dq.setZero();
+    for (auto& a : adjustments) a = {};
+    camera = {};
+    mesh_scale = dilation_px = 0.0;
+  }
+};
+
+}  // namespace bodyschema

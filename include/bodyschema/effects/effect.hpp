@@ -1,0 +1,86 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bodyschema/effects/corrections.hpp"
+#include "bodyschema/effects/instant.hpp"
+#include "bodyschema/observation/observation.hpp"
+#include "bodyschema/robot/robot_setup.hpp"
+
+namespace bodyschema {
+
+/// One number of an effect. Inside the program it is SI and radians; `unit` is what people read
+/// and write, and `si_per_unit` converts.
+struct EffectParameter {
+  std::string name;          ///< "compliance"
+  std::string unit;          ///< "deg/Nm"
+  double si_per_unit = 1.0;  ///< value_si = value_in_unit * si_per_unit
+  double value = 0.0;        ///< SI
+  bool fitted = true;    ///< false: a setting (a time, a reference), not estimated by least squares
+  double typical = 0.0;  ///< SI; a plausible size, the step of secants and the scale of columns
+  [[nodiscard]] double in_unit() const { return value / si_per_unit; }
+};
+
+/// What an effect acts on: a joint for most; `source` is the second joint of a coupling or the
+/// camera of a principal point. Both empty for the whole robot.
+struct EffectTarget {
+  std::string joint;
+  std::string source;
+  friend bool operator==(const EffectTarget&, const EffectTarget&) = default;
+};
+
+/// Which joints play which part on this robot, by position in RobotModel order.
+struct JointRoles {
+  std::vector<std::string> names;     ///< every joint of the model
+  std::vector<Eigen::Index> arm;      ///< shoulder to wrist, the joints whose offsets are estimated
+  std::vector<Eigen::Index> head;     ///< neck pitch, roll, yaw, eyes tilt, left pan, right pan
+  std::vector<Eigen::Index> fingers;  ///< joints that curl a finger when they grow
+  /// The roles that a configuration gives: arm and head as named there; fingers are the joints that
+  /// move a rendered link but not the hand's frame, without those that spread or oppose.
+  /// Throws ConfigurationError naming the nearest joint.
+  static JointRoles of(std::shared_ptr<const RobotModel> model, const RobotSetup& setup);
+  /// Throws ConfigurationError naming the nearest joint.
+  [[nodiscard]] Eigen::Index index(const std::string& name) const;
+};
+
+/// One way in which a real robot departs from its URDF and configuration: a cause.
+///
+/// An effect with all fitted parameters zero changes nothing. `observe` sees every encoder sample
+/// in order of time (effects with memory, such as backlash, live on it); `apply` adds the effect
+/// on one exposure and changes no state. Neither throws nor allocates.
+/// Not thread-safe; clone one per thread.
+class Effect {
+ public:
+  Effect(std::string name, EffectTarget target, std::vector<EffectParameter> parameters)
+      : name_(std::move(name)), target_(std::move(target)), parameters_(std::move(parameters)) {}
+  virtual ~Effect() = default;
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const EffectTarget& target() const { return target_; }
+  [[nodiscard]] std::span<const EffectParameter> parameters() const { return parameters_; }
+  [[nodiscard]] std::span<EffectParameter> parameters() { return parameters_; }
+  /// "backlash of r_elbow", "joint_coupling of r_elbow with r_shoulder_yaw", "latency".
+  [[nodiscard]] std::string description() const;
+
+  virtual void observe(const JointSample&) {}
+  virtual void forget() {}  ///< back to the state before the first sample
+  virtual void apply(const Instant& at, Corrections& add_to) const = 0;
+  [[nodiscard]] virtual std::unique_ptr<Effect> clone() const = 0;
+  /// Whether `observe` matters, so that others need not replay the stream.
+  [[nodiscard]] virtual bool has_memory() const { return false; }
+
+ protected:
+  Effect(const Effect&) = default;
+  [[nodiscard]] double value(std::size_t i) const { return parameters_[i].value; }
+
+ private:
+  std::string name_;
+  EffectTarget target_;
+  std::vector<EffectParameter> parameters_;
+};
+
+}  // namespace bodyschema

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/effects/catalogue.hpp"
+#include "bodyschema/effects/effect.hpp"
+
+namespace bodyschema {
+
+/// A list of effects with their parameters: what is known to be wrong with the model of a robot.
+/// The diagnosis writes one (`extended_model.yaml`); the daemon, replay and export load it, so that
+/// the filter runs on the extended model.
+///
+/// Call `observe` with every encoder sample in order of time, then `corrections` for each exposure.
+/// Neither throws nor allocates. Not thread-safe; copy one per thread.
+class ErrorModel {
+ public:
+  explicit ErrorModel(JointRoles roles);
+  ErrorModel(const ErrorModel& other);
+  ErrorModel& operator=(const ErrorModel& other);
+  ErrorModel(ErrorModel&&) noexcept = default;
+  ErrorModel& operator=(ErrorModel&&) noexcept = default;
+
+  /// Throws ConfigurationError naming file, entry and the nearest known effect, joint or parameter.
+  static ErrorModel load(const std::filesystem::path& file, const JointRoles& roles);
+  static ErrorModel parse(const std::string& yaml, const JointRoles& roles,
+                          const std::string& origin = "extended model");
+  /// Throws FileError when the file cannot be written.
+  void save(const std::filesystem::path& file) const;
+  [[nodiscard]] std::string to_yaml() const;
+
+  [[nodiscard]] const JointRoles& roles() const { return roles_; }
+  [[nodiscard]] std::size_t size() const { return effects_.size(); }
+  [[nodiscard]] const Effect& operator[](std::size_t i) const { return *effects_[i]; }
+  [[nodiscard]] Effect& operator[](std::size_t i) { return *effects_[i]; }
+  /// The effect of that name and target, or null.
+  [[nodiscard]] Effect* find(const std::string& name, const EffectTarget& target);
+  /// Adds the effect (parameters zero) unless it is there already; throws as make_effect.
+  Effect& add(const std::string& name, const EffectTarget& target);
+  void add(std::unique_ptr<Effect> effect);
+  void remove(const std::string& name, const EffectTarget& target);
+
+  /// Offsets held by the joint_offset effects (encoder = true + offset), radians, RobotModel order.
+  [[nodiscard]] Eigen::VectorXd offsets() const;
+
+  void forget();
+  void observe(const JointSample& sample);
+  /// The sum of all effects on one exposure. `include_offsets` false leaves the joint_offset
+  /// effects out, for an estimator whose particles carry the offsets themselves.
+  void corrections(const Instant& at, Corrections& out, bool include_offsets = true) const;
+
+  /// The rig with what does not depend on time put right: intrinsics, distortion.
+  [[nodiscard]] StereoRig corrected(const StereoRig& rig) const;
+
+ private:
+  JointRoles roles_;
+  std::vector<std::unique_ptr<Effect>> effects_;
+};
+
+}  // namespace bodyschema

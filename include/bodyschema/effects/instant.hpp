@@ -1,0 +1,46 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+
+#include "bodyschema/core/time.hpp"
+#include "bodyschema/observation/observation.hpp"
+#include "bodyschema/robot/forward_kinematics.hpp"
+#include "bodyschema/robot/gravity_torques.hpp"
+
+namespace bodyschema {
+
+/// What effects may look at: one camera's exposure.
+struct Instant {
+  Microseconds utime = 0;
+  std::size_t camera = 0;   ///< 0 left, 1 right
+  Eigen::VectorXd encoder;  ///< as read, radians, RobotModel order
+  Eigen::VectorXd q;        ///< encoder minus the offsets believed at present, radians
+  Eigen::VectorXd qdot;     ///< rad/s
+  /// Torque of gravity on each joint at `q`, Nm. Empty when the URDF has no masses.
+  Eigen::VectorXd gravity_torque;
+  /// Torque on each joint of one kilogram at the hand's frame, Nm/kg. Empty without a hand link.
+  Eigen::VectorXd payload_torque;
+};
+
+/// Fills in the torques of an Instant. One per thread.
+class InstantBuilder {
+ public:
+  /// @param hand_link  frame at which a load is held; empty: none
+  /// @param gravity_W  m/s^2, root frame
+  InstantBuilder(std::shared_ptr<const RobotModel> model, const std::string& hand_link,
+                 const Eigen::Vector3d& gravity_W);
+
+  /// @param offsets  believed joint offsets (encoder = true + offset), radians, RobotModel order
+  void build(const JointSample& sample, std::size_t camera,
+             const Eigen::Ref<const Eigen::VectorXd>& offsets, Instant& out);
+
+ private:
+  std::shared_ptr<const RobotModel> model_;
+  Eigen::Vector3d gravity_W_;
+  GravityTorques torques_;
+  std::unique_ptr<ForwardKinematics> hand_;
+};
+
+}  // namespace bodyschema

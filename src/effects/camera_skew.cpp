@@ -1,0 +1,27 @@
+#include "factories.hpp"
+
+namespace bodyschema::effects {
+namespace {
+
+/// The right picture is taken later than the left one although their stamps agree.
+class CameraSkew final : public Clonable<CameraSkew> {
+ public:
+  explicit CameraSkew(const EffectTarget& target)
+      : Clonable(
+            "camera_skew", target,
+            {EffectParameter{.name = "skew", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {
+  }
+  void apply(const Instant& at, Corrections& add_to) const override {
+    if (at.camera == 1) add_to.dq.noalias() += value(0) * at.qdot;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Effect> make_camera_skew(const EffectTarget& target, const JointRoles&) {
+  return std::make_unique<CameraSkew>(target);
+}
+
+Targets camera_skew_targets(const JointRoles& roles) { return whole_robot(roles); }
+
+}  // namespace bodyschema::effects

@@ -1,0 +1,91 @@
+#include "bodyschema/effects/corrected_kinematics.hpp"
+
+#include <algorithm>
+
+namespace bodyschema {
+namespace {
+
+Eigen::Vector3d perpendicular(const Eigen::Vector3d& axis) {
+  Eigen::Index smallest = 0;
+  axis.cwiseAbs().minCoeff(&smallest);
+  return axis.cross(Eigen::Vector3d::Unit(smallest)).normalized();
+}
+
+}  // namespace
+
+CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model,
+                                         std::vector<std::string> links,
+                                         std::vector<std::string> camera_links)
+    : model_(std::move(model)), link_count_(links.size()), camera_count_(camera_links.size()) {
+  auto all = std::move(links);
+  all.insert(all.end(), camera_links.begin(), camera_links.end());
+  const auto joints = model_->joints();
+  joints_.resize(joints.size());
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const auto at =
+        std::find(all.begin() + static_cast<std::ptrdiff_t>(link_count_ + camera_count_), all.end(),
+                  joints[j].parent_link);
+    joints_[j].parent = static_cast<std::size_t>(at - all.begin());
+    if (at == all.end()) all.push_back(joints[j].parent_link);
+  }
+  fk_ = std::make_unique<ForwardKinematics>(model_, all);
+  X_W_.resize(all.size(), Pose::Identity());
+  q_.setZero(model_->joint_count());
+  fk_->compute(q_, X_W_);
+  moves_.resize(joints.size() * all.size());
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const auto axis = fk_->joint_axis(static_cast<Eigen::Index>(j));
+    const Eigen::Vector3d axis_P = X_W_[joints_[j].parent].linear().transpose() * axis.direction_W;
+    joints_[j].tilt_P[0] = perpendicular(axis_P);
+    joints_[j].tilt_P[1] = axis_P.cross(joints_[j].tilt_P[0]).normalized();
+    for (std::size_t l = 0; l < all.size(); ++l) {
+      moves_[j * all.size() + l] = fk_->moves(static_cast<Eigen::Index>(j), l);
+    }
+  }
+}
+
+void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q,
+                                  const Corrections& corrections, std::size_t camera,
+                                  std::span<Pose> X_CB) {
+  q_ = q + corrections.dq;
+  fk_->compute(q_, X_W_);
+  X_WC_ = X_W_[link_count_ + camera];
+  std::copy_n(X_W_.begin(), link_count_, X_CB.begin());
+  // Tip first: each C uses plain frames, so the product builds up from the right.
+  for (auto j = joints_.size(); j-- > 0;) {
+    const auto& adjustment = corrections.adjustments[j];
+    if (adjustment.is_zero()) continue;
+    const auto joint = static_cast<Eigen::Index>(j);
+    const auto axis = fk_->joint_axis(joint);
+    const Eigen::Vector3d tilt =
+        adjustment.tilt_1_rad * tilt_axis(joint, 0) + adjustment.tilt_2_rad * tilt_axis(joint, 1);
+    Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+    if (const double angle = tilt.norm(); angle > 0.0) {
+      const Eigen::Matrix3d R_tilt = Eigen::AngleAxisd(angle, tilt / angle).toRotationMatrix();
+      const Eigen::Matrix3d R_joint =
+          Eigen::AngleAxisd(q_[joint], axis.direction_W).toRotationMatrix();
+      R = R_tilt * R_joint * R_tilt.transpose() * R_joint.transpose();
+    }
+    Pose C = Pose::Identity();
+    C.linear() = R;
+    C.translation() = axis.point_W - R * axis.point_W + adjustment.along_m * axis.direction_W;
+    for (std::size_t l = 0; l < link_count_; ++l) {
+      if (moves(joint, l)) X_CB[l] = C * X_CB[l];
+    }
+    if (moves(joint, link_count_ + camera)) X_WC_ = C * X_WC_;
+  }
+  X_WC_.translate(Eigen::Vector3d(corrections.camera.shift_x_m, 0.0, 0.0));
+  const Pose X_CW = X_WC_.inverse(Eigen::Isometry);
+  for (auto& X : X_CB.first(link_count_)) X = X_CW * X;
+}
+
+Eigen::Vector3d CorrectedKinematics::tilt_axis(Eigen::Index joint, int which) const {
+  const auto& frames = joints_[static_cast<std::size_t>(joint)];
+  return X_W_[frames.parent].linear() * frames.tilt_P[static_cast<std::size_t>(which)];
+}
+
+bool CorrectedKinematics::moves(Eigen::Index joint, std::size_t link) const {
+  return moves_[static_cast<std::size_t>(joint) * X_W_.size() + link];
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,242 @@
+#include "bodyschema/effects/error_model.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/core/nearest_name.hpp"
+
+namespace bodyschema {
+namespace {
+
+constexpr int kVersion = 1;
+
+/// "width_deg", "compliance_deg_per_Nm", "gain_percent", "k1".
+std::string key_of(const EffectParameter& p) {
+  if (p.unit == "1") return p.name;
+  std::string suffix = p.unit == "%" ? "percent" : p.unit;
+  if (const auto slash = suffix.find('/'); slash != std::string::npos) {
+    suffix.replace(slash, 1, "_per_");
+  }
+  return p.name + "_" + suffix;
+}
+
+[[noreturn]] void fail(const std::string& origin, const YAML::Mark& mark, const std::string& what) {
+  throw ConfigurationError(origin + ":" + std::to_string(mark.line + 1) + ": " + what);
+}
+
+std::string scalar(const YAML::Node& entry, const char* key) {
+  const auto node = entry[key];
+  return node && node.IsScalar() ? node.Scalar() : std::string();
+}
+
+void read_parameters(const YAML::Node& entry, const std::string& origin, Effect& effect) {
+  const auto node = entry["parameters"];
+  if (!node || !node.IsMap()) {
+    fail(origin, entry.Mark(), effect.description() + ": expected a mapping 'parameters'");
+  }
+  std::vector<std::string> keys;
+  for (const auto& p : effect.parameters()) keys.push_back(key_of(p));
+  for (const auto& item : node) {
+    const auto key = item.first.Scalar();
+    const auto at = std::find(keys.begin(), keys.end(), key);
+    if (at == keys.end()) {
+      fail(origin, item.first.Mark(),
+           effect.description() + ": unknown parameter '" + key + "'; did you mean '" +
+               nearest_name(key, keys) + "'?");
+    }
+    auto& p = effect.parameters()[static_cast<std::size_t>(at - keys.begin())];
+    double value = 0.0;
+    if (!YAML::convert<double>::decode(item.second, value) || !std::isfinite(value)) {
+      fail(origin, item.second.Mark(),
+           effect.description() + ": '" + key + "' is '" +
+               (item.second.IsScalar() ? item.second.Scalar() : "...") +
+               "', expected a finite number");
+    }
+    p.value = value * p.si_per_unit;
+  }
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    if (!node[keys[i]]) {
+      fail(origin, node.Mark(), effect.description() + ": expected parameter '" + keys[i] + "'");
+    }
+  }
+}
+
+}  // namespace
+
+ErrorModel::ErrorModel(JointRoles roles) : roles_(std::move(roles)) {}
+
+ErrorModel::ErrorModel(const ErrorModel& other) : roles_(other.roles_) {
+  for (const auto& effect : other.effects_) effects_.push_back(effect->clone());
+}
+
+ErrorModel& ErrorModel::operator=(const ErrorModel& other) {
+  if (this != &other) *this = ErrorModel(other);
+  return *this;
+}
+
+ErrorModel ErrorModel::load(const std::filesystem::path& file, const JointRoles& roles) {
+  std::ifstream in(file);
+  if (!in) throw ConfigurationError(file.string() + ": cannot be read, expected an extended model");
+  std::stringstream text;
+  text << in.rdbuf();
+  return parse(text.str(), roles, file.string());
+}
+
+ErrorModel ErrorModel::parse(const std::string& yaml, const JointRoles& roles,
+                             const std::string& origin) {
+  YAML::Node root;
+  try {
+    root = YAML::Load(yaml);
+  } catch (const YAML::Exception& e) {
+    throw ConfigurationError(origin + ": not YAML: " + e.what());
+  }
+  if (!root.IsMap()) throw ConfigurationError(origin + ": expected a mapping with key 'version'");
+  int version = 0;
+  if (!root["version"] || !YAML::convert<int>::decode(root["version"], version) ||
+      version != kVersion) {
+    throw ConfigurationError(origin + ": version is '" + scalar(root, "version") + "', expected " +
+                             std::to_string(kVersion));
+  }
+  for (const auto& item : root) {
+    const auto key = item.first.Scalar();
+    if (key != "version" && key != "effects") {
+      fail(origin, item.first.Mark(),
+           "unknown key '" + key + "'; did you mean '" + nearest_name(key, {"version", "effects"}) +
+               "'?");
+    }
+  }
+  ErrorModel model(roles);
+  const auto list = root["effects"];
+  if (!list) return model;
+  if (!list.IsSequence()) fail(origin, list.Mark(), "'effects': expected a list");
+  for (const auto& entry : list) {
+    if (!entry.IsMap()) fail(origin, entry.Mark(), "'effects': expected entries with a 'name'");
+    for (const auto& item : entry) {
+      const auto key = item.first.Scalar();
+      const std::vector<std::string> known = {"name", "joint", "source", "parameters"};
+      if (std::find(known.begin(), known.end(), key) == known.end()) {
+        fail(origin, item.first.Mark(),
+             "unknown key '" + key + "'; did you mean '" + nearest_name(key, known) + "'?");
+      }
+    }
+    const EffectTarget target{scalar(entry, "joint"), scalar(entry, "source")};
+    std::unique_ptr<Effect> effect;
+    try {
+      effect = make_effect(scalar(entry, "name"), target, roles);
+    } catch (const ConfigurationError& e) {
+      fail(origin, entry.Mark(), e.what());
+    }
+    if (model.find(effect->name(), target) != nullptr) {
+      fail(origin, entry.Mark(), effect->description() + ": listed twice");
+    }
+    read_parameters(entry, origin, *effect);
+    model.add(std::move(effect));
+  }
+  return model;
+}
+
+std::string ErrorModel::to_yaml() const {
+  YAML::Emitter out;
+  out.SetDoublePrecision(16);
+  out << YAML::Comment(
+             "What this robot is, beyond its URDF and configuration. Written by bodyschema "
+             "diagnose.")
+      << YAML::BeginMap << YAML::Key << "version" << YAML::Value << kVersion << YAML::Key
+      << "effects" << YAML::Value << YAML::BeginSeq;
+  for (const auto& effect : effects_) {
+    out << YAML::BeginMap << YAML::Key << "name" << YAML::Value << effect->name();
+    if (!effect->target().joint.empty()) {
+      out << YAML::Key << "joint" << YAML::Value << effect->target().joint;
+    }
+    if (!effect->target().source.empty()) {
+      out << YAML::Key << "source" << YAML::Value << effect->target().source;
+    }
+    out << YAML::Key << "parameters" << YAML::Value << YAML::BeginMap;
+    for (const auto& p : std::as_const(*effect).parameters()) {
+      out << YAML::Key << key_of(p) << YAML::Value << p.in_unit();
+    }
+    out << YAML::EndMap << YAML::EndMap;
+  }
+  out << YAML::EndSeq << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+void ErrorModel::save(const std::filesystem::path& file) const {
+  std::ofstream out(file);
+  out << to_yaml();
+  out.close();
+  if (!out) throw FileError(file.string() + ": cannot be written");
+}
+
+Effect* ErrorModel::find(const std::string& name, const EffectTarget& target) {
+  for (auto& effect : effects_) {
+    if (effect->name() == name && effect->target() == target) return effect.get();
+  }
+  return nullptr;
+}
+
+Effect& ErrorModel::add(const std::string& name, const EffectTarget& target) {
+  if (auto* present = find(name, target)) return *present;
+  effects_.push_back(make_effect(name, target, roles_));
+  return *effects_.back();
+}
+
+void ErrorModel::add(std::unique_ptr<Effect> effect) { effects_.push_back(std::move(effect)); }
+
+void ErrorModel::remove(const std::string& name, const EffectTarget& target) {
+  std::erase_if(effects_,
+                [&](const auto& e) { return e->name() == name && e->target() == target; });
+}
+
+Eigen::VectorXd ErrorModel::offsets() const {
+  Eigen::VectorXd offsets = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(roles_.names.size()));
+  for (const auto& effect : effects_) {
+    if (effect->name() == "joint_offset") {
+      offsets[roles_.index(effect->target().joint)] += effect->parameters()[0].value;
+    }
+  }
+  return offsets;
+}
+
+void ErrorModel::forget() {
+  for (auto& effect : effects_) effect->forget();
+}
+
+void ErrorModel::observe(const JointSample& sample) {
+  for (auto& effect : effects_) effect->observe(sample);
+}
+
+void ErrorModel::corrections(const Instant& at, Corrections& out, bool include_offsets) const {
+  out.clear();
+  for (const auto& effect : effects_) {
+    if (include_offsets || effect->name() != "joint_offset") effect->apply(at, out);
+  }
+}
+
+StereoRig ErrorModel::corrected(const StereoRig& rig) const {
+  const auto joints = static_cast<Eigen::Index>(roles_.names.size());
+  StereoRig result = rig;
+  Instant at;
+  at.encoder.setZero(joints);
+  at.q.setZero(joints);
+  at.qdot.setZero(joints);
+  Corrections corrections(joints);
+  for (std::size_t c = 0; c < result.cameras.size(); ++c) {
+    at.camera = c;
+    this->corrections(at, corrections);
+    auto& camera = result.cameras[c];
+    camera.intrinsics.fx *= 1.0 + corrections.camera.focal_scale;
+    camera.intrinsics.fy *= 1.0 + corrections.camera.focal_scale;
+    camera.intrinsics.cx += corrections.camera.cx_px;
+    camera.intrinsics.cy += corrections.camera.cy_px;
+    camera.distortion[0] += corrections.camera.k1;
+  }
+  return result;
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,28 @@
+#include "factories.hpp"
+
+namespace bodyschema::effects {
+namespace {
+
+/// The image shows the past: at its stamp the arm was where the encoders were `delay` earlier.
+/// dq = -delay * velocity, for head and arm alike; over 20-100 ms the change of velocity is small
+/// against the smallest delay that matters.
+class Latency final : public Clonable<Latency> {
+ public:
+  explicit Latency(const EffectTarget& target)
+      : Clonable("latency", target,
+                 {EffectParameter{
+                     .name = "delay", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {}
+  void apply(const Instant& at, Corrections& add_to) const override {
+    add_to.dq.noalias() -= value(0) * at.qdot;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Effect> make_latency(const EffectTarget& target, const JointRoles&) {
+  return std::make_unique<Latency>(target);
+}
+
+Targets latency_targets(const JointRoles& roles) { return whole_robot(roles); }
+
+}  // namespace bodyschema::effects

@@ -1,0 +1,106 @@
+#include "bodyschema/effects/corrected_kinematics.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <filesystem>
+
+#include "bodyschema/geometry/pose.hpp"
+
+namespace bodyschema {
+namespace {
+
+/// A planar arm of two links with a camera at its base; the second joint's frame lies 0.3 m along x.
+std::shared_ptr<const RobotModel> robot() {
+  const auto file = std::filesystem::temp_directory_path() /
+                    ("bodyschema_corrected_kinematics_" + std::to_string(::getpid()) + ".urdf");
+  std::ofstream(file)
+      << R"(<robot name="two"><link name="root"/><link name="one"/><link name="two"/>
+    <link name="eye"/><link name="tip"/>
+    <joint name="a" type="revolute"><parent link="root"/><child link="one"/><axis xyz="0 0 1"/>
+      <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+    <joint name="b" type="revolute"><parent link="one"/><child link="two"/><axis xyz="0 1 0"/>
+      <origin xyz="0.3 0 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+    <joint name="t" type="fixed"><parent link="two"/><child link="tip"/><origin xyz="0.2 0 0"/></joint>
+    <joint name="e" type="fixed"><parent link="root"/><child link="eye"/><origin xyz="0 0 -1"/></joint>
+    </robot>)";
+  RobotModelOptions options;
+  options.urdf = file;
+  auto model = RobotModel::load(options);
+  std::filesystem::remove(file);
+  return model;
+}
+
+class CorrectedKinematicsTest : public testing::Test {
+ protected:
+  std::shared_ptr<const RobotModel> model = robot();
+  CorrectedKinematics kinematics{model, {"one", "tip"}, {"eye"}};
+  Corrections corrections{2};
+  Eigen::VectorXd q = Eigen::Vector2d(0.4, -0.3);
+  std::vector<Pose> X = std::vector<Pose>(2);
+  Eigen::Vector3d tip(const Corrections& c) {
+    kinematics.compute(q, c, 0, X);
+    return X[1].translation();
+  }
+};
+
+TEST_F(CorrectedKinematicsTest, PlainWithoutCorrections) {
+  const double c = std::cos(0.4), s = std::sin(0.4);
+  const double reach = 0.3 + 0.2 * std::cos(-0.3);
+  const Eigen::Vector3d expected(c * reach, s * reach, 1.0 - 0.2 * std::sin(-0.3));
+  EXPECT_LT((tip(corrections) - expected).norm(), 1e-12);
+}
+
+TEST_F(CorrectedKinematicsTest, JointCorrectionIsAdded) {
+  corrections.dq = Eigen::Vector2d(0.05, -0.02);
+  const auto corrected = tip(corrections);
+  q += corrections.dq;
+  EXPECT_LT((corrected - tip(Corrections(2))).norm(), 1e-12);
+}
+
+TEST_F(CorrectedKinematicsTest, LengthMovesAlongTheJointsAxisAndOnlyWhatLiesBeyond) {
+  const auto plain = tip(corrections);
+  const auto first = X[0];
+  corrections.adjustments[1].along_m = 0.01;
+  const Eigen::Vector3d axis(-std::sin(0.4), std::cos(0.4), 0.0);
+  EXPECT_LT((tip(corrections) - plain - 0.01 * axis).norm(), 1e-12);
+  EXPECT_LT((X[0].matrix() - first.matrix()).norm(), 1e-12);
+}
+
+TEST_F(CorrectedKinematicsTest, TiltTurnsTheAxisAndKeepsTheZeroPose) {
+  corrections.adjustments[0].tilt_1_rad = 0.02;
+  corrections.adjustments[0].tilt_2_rad = -0.01;
+  q.setZero();
+  const auto plain = tip(Corrections(2));
+  EXPECT_LT((tip(corrections) - plain).norm(), 1e-12);
+  // Turning by q about the tilted axis, written out.
+  const Eigen::Vector3d tilt =
+      0.02 * kinematics.tilt_axis(0, 0) - 0.01 * kinematics.tilt_axis(0, 1);
+  EXPECT_NEAR(tilt.z(), 0.0, 1e-12);
+  q << 0.7, 0.2;
+  const auto axis = Eigen::AngleAxisd(tilt.norm(), tilt.normalized()) * Eigen::Vector3d::UnitZ();
+  const double b = 0.2;
+  const Eigen::Vector3d p_one(0.3 + 0.2 * std::cos(b), 0.0, -0.2 * std::sin(b));
+  const Eigen::Vector3d expected =
+      Eigen::AngleAxisd(0.7, axis) * p_one + Eigen::Vector3d(0.0, 0.0, 1.0);
+  EXPECT_LT((tip(corrections) - expected).norm(), 1e-12);
+}
+
+TEST_F(CorrectedKinematicsTest, AdjustmentsOfTwoJointsCompose) {
+  // Lengthening joint a's link along z and b's along its own axis: both are seen at the tip.
+  const auto plain = tip(corrections);
+  corrections.adjustments[0].along_m = 0.02;
+  corrections.adjustments[1].along_m = 0.01;
+  const Eigen::Vector3d axis(-std::sin(0.4), std::cos(0.4), 0.0);
+  EXPECT_LT((tip(corrections) - plain - 0.01 * axis - Eigen::Vector3d(0, 0, 0.02)).norm(), 1e-12);
+}
+
+TEST_F(CorrectedKinematicsTest, CameraShiftMovesTheWorldTheOtherWay) {
+  const auto plain = tip(corrections);
+  corrections.camera.shift_x_m = 0.001;
+  EXPECT_LT((tip(corrections) - plain + Eigen::Vector3d(0.001, 0, 0)).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace bodyschema

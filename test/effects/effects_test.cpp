@@ -1,0 +1,224 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/effects/catalogue.hpp"
+#include "bodyschema/geometry/pose.hpp"
+#include "effects/roles.hpp"
+
+namespace bodyschema {
+namespace {
+
+using test::instant;
+using test::roles;
+
+constexpr Eigen::Index kElbow = 9;
+
+/// The corrections of one effect whose first fitted parameter is `value` in its own unit.
+Corrections corrections(Effect& effect, double value, const Instant& at) {
+  effect.parameters()[0].value = value * effect.parameters()[0].si_per_unit;
+  Corrections c(at.q.size());
+  effect.apply(at, c);
+  return c;
+}
+
+double dq_deg(const Corrections& c, Eigen::Index joint) { return degrees(c.dq[joint]); }
+
+TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
+  const auto r = roles();
+  EXPECT_EQ(effect_names().size(), 22u);
+  auto at = instant(r);
+  at.q.setConstant(0.7);
+  at.encoder.setConstant(0.8);
+  at.qdot.setConstant(1.0);
+  at.gravity_torque.setConstant(2.0);
+  at.payload_torque.setConstant(3.0);
+  at.utime = 5'000'000;
+  at.camera = 1;
+  for (const auto& name : effect_names()) {
+    const auto targets = effect_targets(name, r);
+    ASSERT_FALSE(targets.empty()) << name;
+    for (const auto& target : targets) {
+      auto effect = make_effect(name, target, r);
+      effect->observe({0, Eigen::VectorXd::Zero(at.q.size()), Eigen::VectorXd::Zero(at.q.size())});
+      Corrections c(at.q.size());
+      effect->apply(at, c);
+      EXPECT_EQ(c.dq.norm(), 0.0) << effect->description();
+      EXPECT_EQ(c.mesh_scale, 0.0);
+      EXPECT_EQ(c.dilation_px, 0.0);
+      EXPECT_EQ(c.camera.focal_scale, 0.0);
+      for (const auto& a : c.adjustments) EXPECT_TRUE(a.is_zero());
+      EXPECT_GT(effect->parameters()[0].typical, 0.0) << effect->description();
+    }
+  }
+}
+
+TEST(Catalogue, NamesTheNearestEffectAndJoint) {
+  const auto r = roles();
+  EXPECT_THAT(
+      [&] {
+        make_effect("complience", {"elbow", ""}, r);
+      },
+      testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr("'compliance'")));
+  EXPECT_THAT(
+      [&] {
+        make_effect("backlash", {"elbw", ""}, r);
+      },
+      testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr("'elbow'")));
+  EXPECT_THROW(make_effect("latency", {"elbow", ""}, r), ConfigurationError);
+  EXPECT_THROW(make_effect("slip", {"", ""}, r), ConfigurationError);
+  EXPECT_THROW(make_effect("principal_point", {"", "middle"}, r), ConfigurationError);
+}
+
+TEST(JointOffset, EncoderIsTruePlusOffset) {
+  const auto r = roles();
+  auto effect = make_effect("joint_offset", {"elbow", ""}, r);
+  EXPECT_NEAR(dq_deg(corrections(*effect, 3.0, instant(r)), kElbow), -3.0, 1e-12);
+}
+
+TEST(Compliance, JointSagsWithGravity) {
+  const auto r = roles();
+  auto effect = make_effect("compliance", {"elbow", ""}, r);
+  auto at = instant(r);
+  at.gravity_torque[kElbow] = -2.0;
+  EXPECT_NEAR(dq_deg(corrections(*effect, 0.3, at), kElbow), -0.6, 1e-12);
+  at.gravity_torque.resize(0);  // a URDF without masses
+  EXPECT_EQ(corrections(*effect, 0.3, at).dq.norm(), 0.0);
+}
+
+TEST(Payload, BendsEveryArmJointByItsLever) {
+  const auto r = roles();
+  auto effect = make_effect("payload", {}, r);
+  auto at = instant(r);
+  at.payload_torque[kElbow] = -2.0;
+  at.payload_torque[6] = 4.0;
+  at.payload_torque[0] = 9.0;  // the neck carries nothing
+  const auto c = corrections(*effect, 0.5, at);
+  EXPECT_NEAR(dq_deg(c, kElbow), -0.3, 1e-12);
+  EXPECT_NEAR(dq_deg(c, 6), 0.6, 1e-12);
+  EXPECT_EQ(c.dq[0], 0.0);
+}
+
+TEST(Backlash, LinkFollowsHalfAWidthBehind) {
+  const auto r = roles();
+  auto effect = make_effect("backlash", {"elbow", ""}, r);
+  effect->parameters()[0].value = radians(1.0);
+  auto at = instant(r);
+  JointSample sample{0, at.q, at.qdot};
+  const auto lag = [&](double encoder_deg) {
+    sample.q[kElbow] = at.encoder[kElbow] = radians(encoder_deg);
+    effect->observe(sample);
+    Corrections c(at.q.size());
+    effect->apply(at, c);
+    return dq_deg(c, kElbow);
+  };
+  lag(0.0);
+  EXPECT_NEAR(lag(10.0), -0.5, 1e-9);  // upwards: behind
+  EXPECT_NEAR(lag(9.7), -0.2, 1e-9);   // turned, slack not taken up: the link stands at 9.5
+  EXPECT_NEAR(lag(9.0), 0.5, 1e-9);    // taken up
+  EXPECT_NEAR(lag(-5.0), 0.5, 1e-9);
+  EXPECT_NEAR(lag(10.0), -0.5, 1e-9);
+  effect->forget();
+  EXPECT_NEAR(lag(10.0), 0.0, 1e-9);  // a first sample says nothing about direction
+}
+
+TEST(EncoderGain, GrowsWithTheAngle) {
+  const auto r = roles();
+  auto effect = make_effect("encoder_gain", {"elbow", ""}, r);
+  auto at = instant(r);
+  at.q[kElbow] = radians(50.0);
+  EXPECT_NEAR(dq_deg(corrections(*effect, 2.0, at), kElbow), 1.0, 1e-12);
+}
+
+TEST(Eccentricity, IsASineAndACosine) {
+  const auto r = roles();
+  auto effect = make_effect("eccentricity", {"elbow", ""}, r);
+  effect->parameters()[1].value = radians(0.4);
+  auto at = instant(r);
+  at.q[kElbow] = radians(30.0);
+  EXPECT_NEAR(dq_deg(corrections(*effect, 0.6, at), kElbow), 0.3 + 0.4 * std::sqrt(3.0) / 2, 1e-12);
+}
+
+TEST(JointCoupling, FollowsTheSource) {
+  const auto r = roles();
+  auto effect = make_effect("joint_coupling", {"elbow", "s_yaw"}, r);
+  auto at = instant(r);
+  at.q[8] = radians(20.0);
+  EXPECT_NEAR(dq_deg(corrections(*effect, 5.0, at), kElbow), 1.0, 1e-12);
+  EXPECT_THROW(make_effect("joint_coupling", {"elbow", "elbow"}, r), ConfigurationError);
+}
+
+TEST(Latency, PictureShowsThePast) {
+  const auto r = roles();
+  auto effect = make_effect("latency", {}, r);
+  auto at = instant(r);
+  at.qdot[kElbow] = radians(30.0);
+  at.qdot[2] = radians(-10.0);
+  const auto c = corrections(*effect, 50.0, at);
+  EXPECT_NEAR(dq_deg(c, kElbow), -1.5, 1e-12);
+  EXPECT_NEAR(dq_deg(c, 2), 0.5, 1e-12);
+}
+
+TEST(CameraSkew, OnlyTheRightPictureIsLater) {
+  const auto r = roles();
+  auto effect = make_effect("camera_skew", {}, r);
+  auto at = instant(r);
+  at.qdot[kElbow] = radians(30.0);
+  EXPECT_EQ(corrections(*effect, 20.0, at).dq.norm(), 0.0);
+  at.camera = 1;
+  EXPECT_NEAR(dq_deg(corrections(*effect, 20.0, at), kElbow), 0.6, 1e-12);
+}
+
+TEST(Geometry, LengthTiltAndHeadGoWhereTheyBelong) {
+  const auto r = roles();
+  const auto at = instant(r);
+  EXPECT_NEAR(
+      corrections(*make_effect("link_length", {"s_yaw", ""}, r), 2.0, at).adjustments[8].along_m,
+      0.002, 1e-15);
+  EXPECT_NEAR(corrections(*make_effect("axis_tilt", {"elbow", ""}, r), 2.0, at)
+                  .adjustments[kElbow]
+                  .tilt_1_rad,
+              radians(2.0), 1e-15);
+  EXPECT_NEAR(dq_deg(corrections(*make_effect("head_offset", {"neck_yaw", ""}, r), 1.0, at), 2),
+              1.0, 1e-12);
+  const auto vergence = corrections(*make_effect("vergence", {}, r), 1.0, at);
+  EXPECT_NEAR(dq_deg(vergence, 4) - dq_deg(vergence, 5), 1.0, 1e-12);
+  const auto fingers = corrections(*make_effect("finger_posture", {}, r), 5.0, at);
+  EXPECT_NEAR(dq_deg(fingers, 13), 5.0, 1e-12);
+  EXPECT_NEAR(dq_deg(fingers, 14), 5.0, 1e-12);
+}
+
+TEST(Cameras, CorrectionsReachTheRightEye) {
+  const auto r = roles();
+  auto at = instant(r);
+  EXPECT_EQ(corrections(*make_effect("baseline", {}, r), 1.0, at).camera.shift_x_m, 0.0);
+  auto difference = make_effect("principal_point", {"", "difference"}, r);
+  EXPECT_NEAR(corrections(*difference, 2.0, at).camera.cx_px, 1.0, 1e-15);
+  at.camera = 1;
+  EXPECT_NEAR(corrections(*difference, 2.0, at).camera.cx_px, -1.0, 1e-15);
+  EXPECT_NEAR(corrections(*make_effect("baseline", {}, r), 1.0, at).camera.shift_x_m, 1e-3, 1e-15);
+  EXPECT_NEAR(corrections(*make_effect("focal_length", {}, r), 1.0, at).camera.focal_scale, 0.01,
+              1e-15);
+  EXPECT_NEAR(corrections(*make_effect("distortion", {}, r), 0.05, at).camera.k1, 0.05, 1e-15);
+  EXPECT_NEAR(corrections(*make_effect("silhouette_bias", {}, r), 0.7, at).dilation_px, 0.7, 1e-15);
+  EXPECT_NEAR(corrections(*make_effect("mesh_scale", {}, r), 2.0, at).mesh_scale, 0.02, 1e-15);
+}
+
+TEST(InTime, DriftGrowsAndSlipJumps) {
+  const auto r = roles();
+  auto at = instant(r);
+  auto drift = make_effect("drift", {"elbow", ""}, r);
+  drift->parameters()[1].value = 100.0;
+  at.utime = microseconds(130.0);
+  EXPECT_NEAR(dq_deg(corrections(*drift, 1.0, at), kElbow), 0.5, 1e-12);
+  auto slip = make_effect("slip", {"elbow", ""}, r);
+  slip->parameters()[1].value = 130.5;
+  EXPECT_EQ(corrections(*slip, 2.0, at).dq.norm(), 0.0);
+  at.utime = microseconds(130.6);
+  EXPECT_NEAR(dq_deg(corrections(*slip, 2.0, at), kElbow), 2.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace bodyschema

@@ -1,0 +1,106 @@
+#include "bodyschema/effects/error_model.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/geometry/pose.hpp"
+#include "effects/roles.hpp"
+
+namespace bodyschema {
+namespace {
+
+using test::instant;
+using test::roles;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+ErrorModel full_model() {
+  ErrorModel model(roles());
+  int n = 0;
+  for (const auto& name : effect_names()) {
+    auto& effect = model.add(name, effect_targets(name, model.roles()).back());
+    for (auto& p : effect.parameters()) p.value = p.si_per_unit * (0.1 + 0.37 * ++n);
+  }
+  return model;
+}
+
+TEST(ErrorModel, ReadsBackWhatItWrote) {
+  const auto model = full_model();
+  const auto again = ErrorModel::parse(model.to_yaml(), roles());
+  ASSERT_EQ(again.size(), model.size());
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    EXPECT_EQ(again[i].description(), model[i].description());
+    for (std::size_t p = 0; p < model[i].parameters().size(); ++p) {
+      EXPECT_NEAR(again[i].parameters()[p].value, model[i].parameters()[p].value, 1e-13);
+    }
+  }
+}
+
+TEST(ErrorModel, CopiesAreIndependent) {
+  auto model = full_model();
+  auto copy = model;
+  copy[0].parameters()[0].value = 42.0;
+  EXPECT_NE(model[0].parameters()[0].value, 42.0);
+  copy.remove("backlash", copy.find("backlash", {"w_yaw", ""})->target());
+  EXPECT_EQ(copy.size() + 1, model.size());
+}
+
+TEST(ErrorModel, SumsEffectsAndLeavesOffsetsOutOnRequest) {
+  ErrorModel model(roles());
+  model.add("joint_offset", {"elbow", ""}).parameters()[0].value = radians(3.0);
+  model.add("encoder_gain", {"elbow", ""}).parameters()[0].value = 0.02;
+  auto at = instant(model.roles());
+  at.q[9] = radians(50.0);
+  Corrections c(at.q.size());
+  model.corrections(at, c);
+  EXPECT_NEAR(degrees(c.dq[9]), -2.0, 1e-12);
+  model.corrections(at, c, false);
+  EXPECT_NEAR(degrees(c.dq[9]), 1.0, 1e-12);
+  EXPECT_NEAR(degrees(model.offsets()[9]), 3.0, 1e-12);
+}
+
+TEST(ErrorModel, CorrectsIntrinsics) {
+  ErrorModel model(roles());
+  model.add("focal_length", {}).parameters()[0].value = 0.01;
+  model.add("principal_point", {"", "right"}).parameters()[1].value = 2.0;
+  model.add("distortion", {}).parameters()[0].value = 0.04;
+  StereoRig rig;
+  rig.cameras.resize(2);
+  for (auto& camera : rig.cameras) camera.intrinsics = {320, 240, 257.0, 258.0, 159.5, 119.5};
+  const auto corrected = model.corrected(rig);
+  EXPECT_NEAR(corrected.cameras[0].intrinsics.fx, 259.57, 1e-9);
+  EXPECT_NEAR(corrected.cameras[0].intrinsics.cy, 119.5, 1e-9);
+  EXPECT_NEAR(corrected.cameras[1].intrinsics.cy, 121.5, 1e-9);
+  EXPECT_NEAR(corrected.cameras[1].distortion[0], 0.04, 1e-12);
+}
+
+TEST(ErrorModel, SaysWhatIsWrongWithAFile) {
+  const auto r = roles();
+  const auto parse = [&](const std::string& text) {
+    return [&r, text] { ErrorModel::parse(text, r, "x.yaml"); };
+  };
+  EXPECT_THAT(parse("effects: []"), ThrowsMessage<ConfigurationError>(HasSubstr("version")));
+  EXPECT_THAT(parse("version: 2"), ThrowsMessage<ConfigurationError>(HasSubstr("'2', expected 1")));
+  EXPECT_THAT(parse("version: 1\nefects: []"),
+              ThrowsMessage<ConfigurationError>(
+                  HasSubstr("x.yaml:2: unknown key 'efects'; did you mean 'effects'")));
+  EXPECT_THAT(parse("[1, 2"), ThrowsMessage<ConfigurationError>(HasSubstr("not YAML")));
+  const std::string head = "version: 1\neffects:\n- {name: backlash, joint: ";
+  EXPECT_THAT(parse(head + "elbw, parameters: {width_deg: 1}}"),
+              ThrowsMessage<ConfigurationError>(HasSubstr("did you mean 'elbow'")));
+  EXPECT_THAT(parse(head + "elbow, parameters: {width: 1}}"),
+              ThrowsMessage<ConfigurationError>(HasSubstr("did you mean 'width_deg'")));
+  EXPECT_THAT(parse(head + "elbow, parameters: {}}"),
+              ThrowsMessage<ConfigurationError>(HasSubstr("expected parameter 'width_deg'")));
+  EXPECT_THAT(parse(head + "elbow, parameters: {width_deg: .nan}}"),
+              ThrowsMessage<ConfigurationError>(HasSubstr("finite")));
+  EXPECT_THAT(parse(head + "elbow}"), ThrowsMessage<ConfigurationError>(HasSubstr("parameters")));
+  EXPECT_THAT(parse(head + "elbow, parameters: {width_deg: 1}}\n- {name: backlash, joint: elbow, "
+                           "parameters: {width_deg: 1}}"),
+              ThrowsMessage<ConfigurationError>(HasSubstr("twice")));
+  EXPECT_THROW(ErrorModel::load("/nonexistent/x.yaml", r), ConfigurationError);
+}
+
+}  // namespace
+}  // namespace bodyschema

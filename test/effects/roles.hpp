@@ -1,0 +1,30 @@
+#pragma once
+
+#include "bodyschema/effects/effect.hpp"
+
+namespace bodyschema::test {
+
+/// A made-up robot: six head joints, seven arm joints, two fingers.
+inline JointRoles roles() {
+  JointRoles r;
+  r.names = {"neck_pitch", "neck_roll", "neck_yaw", "eyes_tilt", "l_eye_pan",
+             "r_eye_pan",  "s_pitch",   "s_roll",   "s_yaw",     "elbow",
+             "prosup",     "w_pitch",   "w_yaw",    "index",     "thumb"};
+  r.head = {0, 1, 2, 3, 4, 5};
+  r.arm = {6, 7, 8, 9, 10, 11, 12};
+  r.fingers = {13, 14};
+  return r;
+}
+
+inline Instant instant(const JointRoles& r) {
+  const auto n = static_cast<Eigen::Index>(r.names.size());
+  Instant at;
+  at.encoder.setZero(n);
+  at.q.setZero(n);
+  at.qdot.setZero(n);
+  at.gravity_torque.setZero(n);
+  at.payload_torque.setZero(n);
+  return at;
+}
+
+}  // namespace bodyschema::test
