@@ -1,0 +1,56 @@
+#include "bodyschema/pipeline/replay.hpp"
+
+#include <cstdio>
+#include <memory>
+
+#include "../common_options.hpp"
+#include "bodyschema/pipeline/pipeline.hpp"
+#include "commands.hpp"
+
+namespace bodyschema::apps {
+
+void add_replay(CLI::App& app) {
+  struct Arguments {
+    CommonOptions common;
+    std::string log;
+    std::string out;
+    std::string truth;
+    int overlays = 3;
+    bool masks = false;
+    bool learn_first = false;
+  };
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("replay", "Run a recorded log through the estimator");
+  command->footer(
+      "Example:\n  bodyschema replay reach.log --config config/icub_right/estimator.yaml --out out/reach");
+  command->add_option("log", a->log, "LCM log")->required();
+  command->add_option("-o,--out", a->out, "Folder for estimates.jsonl, summary.json and pictures")
+      ->required();
+  command->add_option("--truth", a->truth, "Ground truth (JSON): adds errors to the results");
+  command->add_option("--overlays", a->overlays, "Overlay pictures spread over the log")
+      ->check(CLI::Range(0, 100000));
+  command->add_flag("--masks", a->masks, "Write the observed masks too");
+  command->add_flag("--learn-background-first", a->learn_first,
+                    "Learn the background from the whole log before the first estimate");
+  a->common.add_to(*command);
+  command->callback([a] {
+    const Configuration configuration = a->common.load();
+    if (a->common.print_config) {
+      const Pipeline pipeline(configuration);  // asks for every key, so that defaults are shown
+      configuration.reject_unknown_keys();
+      std::fputs(configuration.print().c_str(), stdout);
+      return;
+    }
+    ReplayOptions options;
+    options.log = a->log;
+    options.out = a->out;
+    if (!a->truth.empty()) options.truth = a->truth;
+    options.overlays = a->overlays;
+    options.masks = a->masks;
+    options.learn_background_first = a->learn_first;
+    std::fputs(replay(configuration, options).c_str(), stdout);
+    std::printf("\nresults in %s\n", a->out.c_str());
+  });
+}
+
+}  // namespace bodyschema::apps

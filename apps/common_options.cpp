@@ -1,0 +1,42 @@
+#include "common_options.hpp"
+
+#include <cstdio>
+#include <exception>
+
+#include "bodyschema/core/installation.hpp"
+#include "bodyschema/core/logging.hpp"
+
+namespace bodyschema::apps {
+
+void CommonOptions::add_to(CLI::App& app) {
+  app.add_option("-c,--config", config, "Configuration file, e.g. config/icub_right/estimator.yaml")
+      ->required();
+  app.add_option("--set", overrides, "Override one key: --set filter.particles=500 (repeatable)");
+  app.add_option("--engine", engine, "Silhouette engine: auto, atlas or contour")
+      ->check(CLI::IsMember({"auto", "atlas", "contour"}));
+  app.add_option("--mode", mode, "Estimator: best, or paper (the published filter, literally)")
+      ->check(CLI::IsMember({"best", "paper"}));
+  app.add_option("--log-level", log_level, "trace, debug, info, warn, error or off")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
+  app.add_flag("--print-config", print_config, "Print the configuration in force and stop");
+}
+
+Configuration CommonOptions::load() const {
+  set_up_logging(log_level);
+  std::vector<std::string> all = overrides;
+  if (!engine.empty()) all.push_back("silhouette.engine=" + engine);
+  if (!mode.empty()) all.push_back("estimator.mode=" + mode);
+  return Configuration::load(find_data_file(config), all);
+}
+
+int run_and_report(const char* program, const std::function<void()>& action) {
+  try {
+    action();
+    return 0;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "%s: error: %s\n", program, e.what());
+    return 1;
+  }
+}
+
+}  // namespace bodyschema::apps

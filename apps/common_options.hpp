@@ -1,0 +1,29 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "bodyschema/core/configuration.hpp"
+
+namespace bodyschema::apps {
+
+/// Options every program that reads a configuration shares.
+struct CommonOptions {
+  std::string config;
+  std::vector<std::string> overrides;
+  std::string engine;
+  std::string mode;
+  std::string log_level = "info";
+  bool print_config = false;
+
+  void add_to(CLI::App& app);
+  /// The configuration with the command line's choices on top.
+  [[nodiscard]] Configuration load() const;
+};
+
+/// Runs `action`, turning every exception into one line on standard error. The value is the
+/// program's exit status: 0, or 1 after an error.
+int run_and_report(const char* program, const std::function<void()>& action);
+
+}  // namespace bodyschema::apps

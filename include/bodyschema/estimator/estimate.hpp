@@ -1,0 +1,61 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bodyschema/core/time.hpp"
+#include "bodyschema/geometry/pose.hpp"
+
+namespace bodyschema {
+
+/// What the estimator is doing; `to_string` gives the name used in messages and files.
+enum class EstimatorState {
+  kLearningBackground,  ///< no masks yet: the background is being learned
+  kHandNotInView,  ///< the observed silhouette is empty: no update, the last offsets are kept
+  kConverging,     ///< updating, not yet to be relied on
+  kConverged,      ///< prediction fits the pictures and the published uncertainty is small
+  kDiverged,       ///< the best prediction no longer fits the pictures; searching again
+};
+const char* to_string(EstimatorState state);
+
+/// The combination of joint offsets that the pictures say least about: unit vector over the
+/// estimated joints and its standard deviation.
+struct WeakestDirection {
+  Eigen::VectorXd direction;
+  double sd_rad = 0.0;
+  /// "0.71 r_wrist_prosup - 0.70 r_wrist_pitch: sd 0.4 deg"
+  std::string text;
+};
+
+/// Time spent in each stage of one step, ms of wall clock.
+struct StageTimes {
+  double kinematics_ms = 0.0;
+  double scoring_ms = 0.0;
+  double filter_ms = 0.0;
+  double refinement_ms = 0.0;
+  double total_ms = 0.0;
+};
+
+/// Result of one step. Offsets follow the paper's sign: encoder = true + offset.
+struct Estimate {
+  Microseconds utime = 0;
+  EstimatorState state = EstimatorState::kHandNotInView;
+  std::vector<std::string> joint_names;  ///< the estimated joints
+  Eigen::VectorXd offset_rad;            ///< one per name
+  Eigen::MatrixXd covariance_rad2;
+  std::vector<std::string> nuisance_names;  ///< head offsets, camera and size parameters, if any
+  Eigen::VectorXd nuisance;                 ///< rad, px or relative, see Parameter
+  double effective_sample_size = 0.0;       ///< particles
+  double best_likelihood = 0.0;             ///< 1 - Hammoude distance of the estimate, both images
+  double contour_rms_px = 0.0;              ///< outline residual, 0 when not computed
+  WeakestDirection weakest;
+  double hand_sd_m = 0.0;                   ///< one sigma of the hand base in the eye frame
+  std::vector<Pose> X_CP;                   ///< hand base in each camera of the rig, corrected
+  std::vector<Pose> X_CP_nominal;           ///< the same with the encoders as they are
+  StageTimes times;
+};
+
+}  // namespace bodyschema

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <memory>
+
+#include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/estimator/estimate.hpp"
+#include "bodyschema/estimator/estimator_options.hpp"
+#include "bodyschema/observation/observation.hpp"
+#include "bodyschema/robot/robot_model.hpp"
+#include "bodyschema/robot/robot_setup.hpp"
+
+namespace bodyschema {
+
+/// One observation in, one estimate out: the same object behind the daemon, the replay of a log
+/// and the evaluation.
+///
+/// Both modes predict, score all particles' silhouettes and estimate. `paper` ends there, literal
+/// to the paper. `best` moves the most likely particles onto the observed outline by Gauss-Newton,
+/// and fuses what each frame says about the offsets.
+///
+/// Deterministic: the same observations, options and seed give the same estimates, bit for bit,
+/// for any number of threads. One thread at a time. `step` does not throw.
+class Estimator {
+ public:
+  /// Throws ConfigurationError when set-up and robot do not fit, gl::ContextError when the engine
+  /// cannot be had.
+  Estimator(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+            const EstimatorOptions& options);
+  ~Estimator();
+  Estimator(Estimator&&) noexcept;
+
+  /// Masks must have been filled in; a camera that is absent is not used.
+  Estimate step(const Observation& observation);
+  /// Starts over, as if no picture had been seen.
+  void reset();
+
+  /// Outline of the robot predicted with a set of corrections, for overlays.
+  /// @param corrected  with the current estimate, otherwise with the encoders as they are
+  [[nodiscard]] BinaryMask predicted_silhouette(const Observation& observation,
+                                                std::size_t camera, bool corrected);
+  /// Where the corrected model puts hand and fingertips at encoder readings `q`.
+  [[nodiscard]] Pose hand_pose(const Eigen::VectorXd& q, std::size_t camera, bool corrected);
+  [[nodiscard]] std::vector<Eigen::Vector3d> fingertips(const Eigen::VectorXd& q,
+                                                        std::size_t camera, bool corrected);
+  [[nodiscard]] std::string engine_description() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace bodyschema

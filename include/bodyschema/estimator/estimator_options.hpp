@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "bodyschema/core/configuration.hpp"
+#include "bodyschema/estimator/contour_alignment.hpp"
+#include "bodyschema/filter/particle_filter.hpp"
+#include "bodyschema/silhouette/silhouette_scorer.hpp"
+
+namespace bodyschema {
+
+enum class EstimatorMode {
+  kPaper,  ///< the paper's filter, literally
+  kBest,   ///< sharper likelihood, outline refinement, fusion over frames
+};
+
+/// Standard deviations of what `best` believes before the first picture, beside the joint offsets.
+/// Zero leaves a parameter out.
+struct NuisancePriors {
+  double head_rad = 0.0;
+  double finger_curl_rad = 0.0;
+  double vergence_rad = 0.0;
+  double focal_scale = 0.0;
+  double principal_difference_px = 0.0;
+  double mesh_scale = 0.0;
+  double dilation_px = 0.0;
+};
+
+struct EstimatorOptions {
+  EstimatorMode mode = EstimatorMode::kBest;
+  ParticleFilterOptions filter;
+  SilhouetteOptions silhouette;
+  ContourAlignmentOptions contour;
+  NuisancePriors priors;
+  double temperature = 0.02;         ///< best: weight = exp(-(d - d_min) / temperature)
+  double residual_sd_px = 0.5;       ///< best: sd of one outline residual, correlation included
+  double memory_frames = 300.0;      ///< best: frames after which a picture counts 1/e
+  double lock_distance = 0.15;       ///< best: Hammoude distance below which frames are fused
+  double lock_rms_px = 1.5;          ///< best: outline residual below which frames are fused
+  double converged_hand_sd_m = 7e-4; ///< best: state `converged` below this
+  std::size_t min_mask_px = 150;     ///< fewer observed pixels in all: hand not in view
+
+  /// Reads the sections `estimator`, `filter` and `silhouette`. Throws ConfigurationError.
+  static EstimatorOptions from(const Configuration& configuration);
+};
+
+}  // namespace bodyschema

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bodyschema/geometry/binary_mask.hpp"
+#include "bodyschema/geometry/image.hpp"
+
+namespace bodyschema {
+
+/// One camera's picture with two predicted outlines: the encoders as they are (red) and with the
+/// estimated offsets taken off (green).
+struct OverlayView {
+  const Image* image = nullptr;
+  BinaryMask nominal;
+  BinaryMask corrected;
+};
+
+/// Left and right side by side, enlarged, with a legend. RGB.
+Image draw_overlay(const std::vector<OverlayView>& views, const std::string& caption,
+                   int enlargement = 2);
+/// Throws FileError when the picture cannot be written.
+void write_png(const std::filesystem::path& file, const Image& image);
+
+}  // namespace bodyschema

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bodyschema/bus/bus_options.hpp"
+#include "bodyschema/bus/observation_stream.hpp"
+#include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/core/configuration.hpp"
+#include "bodyschema/estimator/estimator.hpp"
+#include "bodyschema/robot/robot_model.hpp"
+#include "bodyschema/robot/robot_setup.hpp"
+#include "bodyschema/vision/segmenter.hpp"
+
+namespace bodyschema {
+
+/// From configuration to estimates: robot, cameras, segmentation and estimator wired together.
+/// The daemon, replay and evaluation run this same object, so that a recorded log gives what the
+/// live robot gave. One thread.
+class Pipeline {
+ public:
+  /// Reads the whole configuration, robot and meshes, opens the silhouette engine. Throws Error.
+  explicit Pipeline(const Configuration& configuration);
+
+  /// A fresh decoder and synchroniser for this robot and rig.
+  [[nodiscard]] ObservationStream make_stream() const;
+
+  /// Fills in the observation's masks and takes one step of the estimator.
+  Estimate process(Observation& observation);
+  /// Starts over; a learned background is kept.
+  void reset() { estimator_.reset(); }
+
+  /// Offline learning of the background, for methods that learn: every picture of a log, then
+  /// `finish_learning`.
+  void learn_from(const Observation& observation);
+  void finish_learning();
+
+  [[nodiscard]] const RobotModel& robot() const { return *robot_; }
+  [[nodiscard]] std::shared_ptr<const RobotModel> shared_robot() const { return robot_; }
+  [[nodiscard]] const RobotSetup& setup() const { return setup_; }
+  [[nodiscard]] const StereoRig& rig() const { return rig_; }
+  [[nodiscard]] const BusOptions& bus() const { return bus_; }
+  [[nodiscard]] const EstimatorOptions& options() const { return options_; }
+  [[nodiscard]] Estimator& estimator() { return estimator_; }
+  /// Time spent on masks in the last `process`, ms.
+  [[nodiscard]] double segmentation_ms() const { return segmentation_ms_; }
+  [[nodiscard]] const std::string& configuration_hash() const { return configuration_hash_; }
+
+ private:
+  struct Eye {
+    Segmenter segmenter;
+    std::optional<Undistorter> undistorter;
+  };
+  void straighten(CameraObservation& seen, std::size_t camera);
+
+  RobotSetup setup_;
+  StereoRig rig_;
+  VisionSetup vision_;
+  BusOptions bus_;
+  EstimatorOptions options_;
+  std::shared_ptr<const RobotModel> robot_;
+  std::vector<Eye> eyes_;
+  Estimator estimator_;
+  std::string configuration_hash_;
+  bool tracking_ = false;  ///< the estimate is good enough to predict where the robot is
+  double segmentation_ms_ = 0.0;
+};
+
+}  // namespace bodyschema

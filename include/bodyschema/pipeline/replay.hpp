@@ -1,0 +1,27 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "bodyschema/core/configuration.hpp"
+
+namespace bodyschema {
+
+struct ReplayOptions {
+  std::filesystem::path log;
+  std::filesystem::path out;                    ///< folder, created
+  std::optional<std::filesystem::path> truth;   ///< adds errors; never seen by the estimator
+  int overlays = 3;                             ///< overlay pictures spread over the log
+  bool masks = false;                           ///< write the masks beside them
+  /// Learn the background from all pictures of the log before the first estimate. The daemon
+  /// cannot look ahead, so estimates then differ from its own.
+  bool learn_background_first = false;
+};
+
+/// Runs a recorded log through the same code as the daemon, as fast as it can, and writes
+/// `estimates.jsonl` (one object per frame), `summary.json` and overlay pictures into `out`.
+/// Returns a table for people. Throws Error.
+std::string replay(const Configuration& configuration, const ReplayOptions& options);
+
+}  // namespace bodyschema

@@ -1,0 +1,518 @@
+#include "bodyschema/estimator/estimator.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/estimator/body_pose_model.hpp"
+#include "bodyschema/estimator/offset_fusion.hpp"
+#include "bodyschema/filter/hammoude.hpp"
+#include "bodyschema/filter/particle_filter.hpp"
+
+namespace bodyschema {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double elapsed_ms(Clock::time_point since) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - since).count();
+}
+
+std::vector<Parameter> make_parameters(const RobotModel& robot, const RobotSetup& setup,
+                                       const StereoRig& rig, const EstimatorOptions& options) {
+  std::vector<Parameter> parameters;
+  for (const auto& name : setup.estimated_joints) {
+    parameters.push_back({name, ParameterKind::kJointOffset, robot.joint_index(name),
+                          options.filter.initial_sd_rad});
+  }
+  if (options.mode == EstimatorMode::kPaper) return parameters;
+  const NuisancePriors& priors = options.priors;
+  if (priors.head_rad > 0.0) {
+    for (const auto& name : setup.head_joints) {
+      parameters.push_back(
+          {name, ParameterKind::kJointOffset, robot.joint_index(name), priors.head_rad});
+    }
+  }
+  const auto add = [&](const char* name, ParameterKind kind, double sd) {
+    if (sd > 0.0) parameters.push_back({name, kind, -1, sd});
+  };
+  add("finger_curl", ParameterKind::kFingerCurl, priors.finger_curl_rad);
+  if (rig.cameras.size() > 1) {
+    add("vergence", ParameterKind::kVergence, priors.vergence_rad);
+    add("principal_difference", ParameterKind::kPrincipalDifference,
+        priors.principal_difference_px);
+  }
+  add("focal_scale", ParameterKind::kFocalScale, priors.focal_scale);
+  add("mesh_scale", ParameterKind::kMeshScale, priors.mesh_scale);
+  add("dilation", ParameterKind::kDilation, priors.dilation_px);
+  return parameters;
+}
+
+SilhouetteModel make_silhouette_model(const RobotModel& robot, const RobotSetup& setup) {
+  SilhouetteModel model;
+  model.culling = setup.culling;
+  for (const auto& part : robot.meshes()) model.parts.push_back(part.mesh);
+  return model;
+}
+
+Eigen::VectorXd prior_sds(const std::vector<Parameter>& parameters) {
+  Eigen::VectorXd sd(static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    sd(static_cast<Eigen::Index>(k)) = parameters[k].prior_sd;
+  }
+  return sd;
+}
+
+/// A change of the state that evidence predicts to lower the cost by this much, px^2.
+double predicted_cost(const ContourEvidence& evidence, const Eigen::VectorXd& step) {
+  return evidence.cost - 2.0 * evidence.b.dot(step) + step.dot(evidence.A * step);
+}
+
+}  // namespace
+
+const char* to_string(EstimatorState state) {
+  switch (state) {
+    case EstimatorState::kLearningBackground: return "learning_background";
+    case EstimatorState::kHandNotInView: return "hand_not_in_view";
+    case EstimatorState::kConverging: return "converging";
+    case EstimatorState::kConverged: return "converged";
+    case EstimatorState::kDiverged: return "diverged";
+  }
+  return "unknown";
+}
+
+struct Estimator::Impl {
+  Impl(std::shared_ptr<const RobotModel> robot_model, const RobotSetup& robot_setup,
+       const StereoRig& stereo_rig, const EstimatorOptions& estimator_options)
+      : options(estimator_options), setup(robot_setup), rig(stereo_rig),
+        parameters(make_parameters(*robot_model, setup, rig, options)),
+        silhouettes(make_silhouette_model(*robot_model, setup)),
+        intrinsics(rig.intrinsics()),
+        body(robot_model, setup, rig, parameters),
+        alignment(body, silhouettes, intrinsics, options.contour),
+        filter(static_cast<Eigen::Index>(setup.estimated_joints.size()), options.filter),
+        fusion(prior_sds(parameters)),
+        first_look(prior_sds(parameters)) {
+    scorer = make_silhouette_scorer(silhouettes, intrinsics, options.silhouette, &engine_reason);
+    joints = static_cast<Eigen::Index>(setup.estimated_joints.size());
+    state = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
+    const std::size_t batch = options.filter.particles;
+    X_CB.resize(batch * rig.cameras.size() * body.part_count());
+    counts.resize(batch * rig.cameras.size());
+    distance.resize(static_cast<Eigen::Index>(batch));
+    weights.resize(static_cast<Eigen::Index>(batch));
+    observed.resize(rig.cameras.size());
+  }
+
+  // --- one step -------------------------------------------------------------------------------
+
+  Estimate step(const Observation& observation) {
+    const auto start = Clock::now();
+    times = {};
+    Estimate estimate;
+    estimate.utime = observation.utime;
+    estimate.joint_names = setup.estimated_joints;
+
+    const bool in_view = prepare(observation);
+    if (!in_view) {
+      current = EstimatorState::kHandNotInView;
+      best_likelihood = 0.0;
+    } else {
+      score_particles(observation);
+      if (options.mode == EstimatorMode::kPaper) {
+        paper_step();
+      } else {
+        best_step(observation);
+      }
+    }
+    report(observation, estimate);
+    estimate.times = times;
+    estimate.times.total_ms = elapsed_ms(start);
+    return estimate;
+  }
+
+  /// Hands the observed masks to the scorer. False when there is too little to see.
+  bool prepare(const Observation& observation) {
+    camera_mask = 0;
+    std::size_t seen_px = 0;
+    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+      const bool present = c < observation.cameras.size() && observation.cameras[c] &&
+                           !observation.cameras[c]->mask.empty();
+      if (present) {
+        observed[c].mask = observation.cameras[c]->mask;
+        observed[c].valid = observation.cameras[c]->valid;
+        seen_px += observed[c].mask.count();
+        camera_mask |= 1u << c;
+      } else {
+        observed[c].mask = BinaryMask(intrinsics[c].width, intrinsics[c].height);
+        observed[c].valid = BinaryMask();
+      }
+    }
+    if (camera_mask == 0 || seen_px < options.min_mask_px) return false;
+    scorer->set_observation(observed);
+    return true;
+  }
+
+  /// Part transforms of one hypothesis in all cameras, at `slot` of the batch.
+  void place(const Observation& observation, const Eigen::VectorXd& x, std::size_t slot) {
+    const std::size_t parts = body.part_count();
+    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+      if ((camera_mask & (1u << c)) == 0) continue;
+      body.compute(observation.cameras[c]->joints.q, x, c,
+                   {X_CB.data() + (slot * rig.cameras.size() + c) * parts, parts});
+    }
+  }
+
+  /// Hammoude distance of slots 0..n-1, equation (3) over both images.
+  void score_slots(std::size_t n) {
+    const std::size_t cameras = rig.cameras.size();
+    const auto start = Clock::now();
+    scorer->score({X_CB.data(), n * cameras * body.part_count()}, {counts.data(), n * cameras},
+                  camera_mask);
+    times.scoring_ms += elapsed_ms(start);
+    for (std::size_t i = 0; i < n; ++i) {
+      std::uint64_t in_union = 0;
+      std::uint64_t in_both = 0;
+      for (std::size_t c = 0; c < cameras; ++c) {
+        in_union += counts[i * cameras + c].union_count();
+        in_both += counts[i * cameras + c].intersection;
+      }
+      distance(static_cast<Eigen::Index>(i)) = hammoude_distance(in_union, in_both);
+    }
+  }
+
+  void score_particles(const Observation& observation) {
+    const auto start = Clock::now();
+    Eigen::VectorXd x = state;
+    for (std::size_t i = 0; i < options.filter.particles; ++i) {
+      x.head(joints) = filter.states().col(static_cast<Eigen::Index>(i));
+      place(observation, x, i);
+    }
+    times.kinematics_ms += elapsed_ms(start);
+    score_slots(options.filter.particles);
+  }
+
+  void paper_step() {
+    const auto start = Clock::now();
+    weights = 1.0 - distance.array();  // equation (4)
+    if (weights.maxCoeff() <= 0.0) weights.setConstant(1.0);
+    filter.update(weights);
+    state.head(joints) = filter.estimate();
+    best_likelihood = weights(filter.estimate_index());
+    effective_size = filter.effective_sample_size();
+    cloud_covariance = filter.covariance();
+    filter.resample_and_spread();
+    current = EstimatorState::kConverging;
+    if (filter.spread_rad() <= options.filter.spread_min_rad) current = EstimatorState::kConverged;
+    times.filter_ms += elapsed_ms(start);
+  }
+
+  // --- mode best ------------------------------------------------------------------------------
+
+  struct Candidate {
+    Eigen::VectorXd x;
+    ContourEvidence evidence;
+    double distance = 1.0;
+  };
+
+  /// Gauss-Newton onto the observed outline, looking less and less far. `memory` is what earlier
+  /// frames said (or only the prior).
+  void refine(const Observation& observation, const OffsetFusion& memory,
+              std::span<const double> search_px, Candidate& candidate) {
+    const double variance = options.residual_sd_px * options.residual_sd_px;
+    for (const double reach_px : search_px) {
+      alignment.linearise(observation, candidate.x, reach_px, candidate.evidence);
+      Eigen::VectorXd step =
+          memory.solve_with(candidate.evidence, candidate.x, variance) - candidate.x;
+      const double largest = step.head(joints).cwiseAbs().maxCoeff();
+      if (largest > kMaxStep_rad) step *= kMaxStep_rad / largest;
+      candidate.x += step;
+    }
+    alignment.linearise(observation, candidate.x, search_px.back(), candidate.evidence);
+  }
+
+  void best_step(const Observation& observation) {
+    auto start = Clock::now();
+    const double least = distance.minCoeff();
+    weights = (-(distance.array() - least) / options.temperature).exp();
+    filter.update(weights);
+    effective_size = filter.effective_sample_size();
+    times.filter_ms += elapsed_ms(start);
+
+    start = Clock::now();
+    const double variance = options.residual_sd_px * options.residual_sd_px;
+    Candidate best;
+    bool accepted = false;
+    if (fusion.frames() > 0.5) {
+      best.x = fusion.mean();
+      static constexpr double kNear_px[] = {8.0, 4.0};
+      refine(observation, fusion, kNear_px, best);
+      const Eigen::VectorXd alone =
+          first_look.solve_with(best.evidence, best.x, variance) - best.x;
+      const double gain =
+          (best.evidence.cost - predicted_cost(best.evidence, alone)) / variance;
+      surprise = gain;
+      accepted = fits(best.evidence);
+      if (accepted && gain > kSurprise) accepted = false;
+    }
+    if (accepted) {
+      surprised_frames = 0;
+      fusion.fade(std::exp(-1.0 / options.memory_frames));
+      fusion.add(best.evidence, best.x, variance);
+    } else {
+      // Nothing known yet, or what is known no longer fits: look again from the best particles.
+      Candidate found = search(observation);
+      const bool good = fits(found.evidence) && found.distance < options.lock_distance;
+      if (fusion.frames() > 0.5) {
+        ++surprised_frames;
+        if (good || surprised_frames > 5) {
+          fusion.forget_all();
+          if (!good) filter.reset(state.head(joints));
+        }
+      }
+      best = std::move(found);
+      if (good) {
+        fusion.forget_all();
+        fusion.add(best.evidence, best.x, variance);
+      }
+    }
+    state = fusion.frames() > 0.5 ? fusion.mean() : best.x;
+    contour_rms_px = best.evidence.rms_px();
+    place(observation, state, 0);
+    const Eigen::Index first = 0;
+    score_slots(1);
+    best_likelihood = 1.0 - distance(first);
+    times.refinement_ms += elapsed_ms(start);
+
+    start = Clock::now();
+    const bool locked = fusion.frames() > 0.5;
+    current = locked ? EstimatorState::kConverging
+                     : (surprised_frames > 0 ? EstimatorState::kDiverged
+                                             : EstimatorState::kConverging);
+    spread(locked);
+    times.filter_ms += elapsed_ms(start);
+  }
+
+  [[nodiscard]] bool fits(const ContourEvidence& evidence) const {
+    return evidence.sampled > 20 && evidence.matched_share() > 0.6 &&
+           evidence.rms_px() < options.lock_rms_px;
+  }
+
+  /// The best of several hypotheses after refinement without memory.
+  Candidate search(const Observation& observation) {
+    static constexpr double kWide_px[] = {30.0, 20.0, 14.0, 10.0, 7.0, 5.0, 4.0};
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(weights.size()));
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<Eigen::Index>(i);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](Eigen::Index a, Eigen::Index b) { return distance(a) < distance(b); });
+    std::vector<Candidate> candidates(std::min<std::size_t>(3, order.size()));
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      candidates[i].x = state;
+      candidates[i].x.head(joints) = filter.states().col(order[i]);
+      refine(observation, first_look, kWide_px, candidates[i]);
+      place(observation, candidates[i].x, i);
+    }
+    score_slots(candidates.size());
+    std::size_t winner = 0;
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      candidates[i].distance = distance(static_cast<Eigen::Index>(i));
+      if (candidates[i].distance < candidates[winner].distance) winner = i;
+    }
+    return std::move(candidates[winner]);
+  }
+
+  /// Next frame's particles: resampled survivors, and half of them around the estimate.
+  void spread(bool locked) {
+    filter.resample_and_spread();
+    if (!locked && filter.spread_rad() < kSearchSpread_rad) filter.set_spread(kSearchSpread_rad);
+    const Eigen::Index n = filter.states().cols();
+    Eigen::VectorXd sd(joints);
+    if (locked) {
+      sd = fusion.covariance().diagonal().head(joints).cwiseSqrt();
+      sd = sd.cwiseMax(options.filter.spread_min_rad);
+    } else {
+      sd.setConstant(filter.spread_rad());
+    }
+    std::normal_distribution<double> normal(0.0, 1.0);
+    Eigen::VectorXd x(joints);
+    for (Eigen::Index i = 0; i < n / 2; ++i) {
+      for (Eigen::Index k = 0; k < joints; ++k) {
+        x(k) = state(k) + sd(k) * normal(filter.random());
+      }
+      filter.set_state(i, x);
+    }
+  }
+
+  // --- results --------------------------------------------------------------------------------
+
+  void report(const Observation& observation, Estimate& estimate) {
+    estimate.offset_rad = state.head(joints);
+    estimate.effective_sample_size = effective_size;
+    estimate.best_likelihood = best_likelihood;
+    estimate.contour_rms_px = contour_rms_px;
+    if (options.mode == EstimatorMode::kPaper) {
+      estimate.covariance_rad2 = cloud_covariance.size() > 0 ? cloud_covariance : filter.covariance();
+    } else {
+      const Eigen::MatrixXd covariance = fusion.covariance();
+      estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
+      for (std::size_t k = static_cast<std::size_t>(joints); k < parameters.size(); ++k) {
+        estimate.nuisance_names.push_back(parameters[k].name);
+      }
+      estimate.nuisance = state.tail(state.size() - joints);
+    }
+    Microseconds utime = observation.utime;
+    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+      const CameraObservation* seen = nullptr;
+      if (c < observation.cameras.size() && observation.cameras[c]) {
+        seen = &*observation.cameras[c];
+      } else {
+        for (const auto& other : observation.cameras) {
+          if (other) seen = &*other;
+        }
+      }
+      if (seen == nullptr) continue;
+      (void)utime;
+      estimate.X_CP.push_back(body.hand_pose(seen->joints.q, state, c));
+      zero = Eigen::VectorXd::Zero(state.size());
+      estimate.X_CP_nominal.push_back(body.hand_pose(seen->joints.q, zero, c));
+      if (c == 0 || estimate.hand_sd_m == 0.0) {
+        estimate.hand_sd_m = hand_sd(seen->joints.q, c, estimate.covariance_rad2);
+      }
+    }
+    estimate.weakest = weakest(estimate.covariance_rad2);
+    if (options.mode == EstimatorMode::kBest && current == EstimatorState::kConverging &&
+        fusion.frames() > 4.5 && estimate.hand_sd_m < options.converged_hand_sd_m) {
+      current = EstimatorState::kConverged;
+    }
+    estimate.state = current;
+  }
+
+  double hand_sd(const Eigen::VectorXd& q, std::size_t camera, const Eigen::MatrixXd& covariance) {
+    constexpr double kStep = 1e-4;
+    Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, joints);
+    Eigen::VectorXd x = state;
+    for (Eigen::Index k = 0; k < joints; ++k) {
+      x(k) = state(k) + kStep;
+      const Eigen::Vector3d plus = body.hand_pose(q, x, camera).translation();
+      x(k) = state(k) - kStep;
+      J.col(k) = (plus - body.hand_pose(q, x, camera).translation()) / (2.0 * kStep);
+      x(k) = state(k);
+    }
+    return std::sqrt(std::max(0.0, (J * covariance * J.transpose()).trace()));
+  }
+
+  WeakestDirection weakest(const Eigen::MatrixXd& covariance) const {
+    WeakestDirection result;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
+    result.direction = solver.eigenvectors().col(covariance.cols() - 1);
+    Eigen::Index largest = 0;
+    result.direction.cwiseAbs().maxCoeff(&largest);
+    if (result.direction(largest) < 0) result.direction = -result.direction;
+    result.sd_rad = std::sqrt(std::max(0.0, solver.eigenvalues()(covariance.cols() - 1)));
+    for (Eigen::Index k = 0; k < joints; ++k) {
+      if (std::abs(result.direction(k)) < 0.3) continue;
+      char term[96];
+      std::snprintf(term, sizeof term, "%s%.2f %s",
+                    result.text.empty() ? (result.direction(k) < 0 ? "-" : "")
+                                        : (result.direction(k) < 0 ? " - " : " + "),
+                    std::abs(result.direction(k)),
+                    setup.estimated_joints[static_cast<std::size_t>(k)].c_str());
+      result.text += term;
+    }
+    char sd_text[40];
+    std::snprintf(sd_text, sizeof sd_text, ": sd %.2f deg", degrees(result.sd_rad));
+    result.text += sd_text;
+    return result;
+  }
+
+  void reset() {
+    filter = ParticleFilter(joints, options.filter);
+    fusion.forget_all();
+    state.setZero();
+    current = EstimatorState::kHandNotInView;
+    cloud_covariance.resize(0, 0);
+    best_likelihood = effective_size = contour_rms_px = 0.0;
+    surprised_frames = 0;
+  }
+
+  static constexpr double kMaxStep_rad = 0.2;
+  static constexpr double kSearchSpread_rad = 0.0349066;  ///< 2 deg
+  static constexpr double kSurprise = 400.0;  ///< chi-square of a frame that contradicts the memory
+
+  EstimatorOptions options;
+  RobotSetup setup;
+  StereoRig rig;
+  std::vector<Parameter> parameters;
+  SilhouetteModel silhouettes;
+  std::vector<PinholeIntrinsics> intrinsics;
+  BodyPoseModel body;
+  ContourAlignment alignment;
+  ParticleFilter filter;
+  OffsetFusion fusion;
+  const OffsetFusion first_look;  ///< the prior alone
+  std::unique_ptr<SilhouetteScorer> scorer;
+  std::string engine_reason;
+
+  Eigen::Index joints = 0;
+  Eigen::VectorXd state;  ///< one value per parameter
+  Eigen::VectorXd zero;
+  EstimatorState current = EstimatorState::kHandNotInView;
+  double best_likelihood = 0.0;
+  double effective_size = 0.0;
+  double contour_rms_px = 0.0;
+  double surprise = 0.0;
+  int surprised_frames = 0;
+  Eigen::MatrixXd cloud_covariance;
+  StageTimes times;
+
+  std::uint32_t camera_mask = 0;
+  std::vector<ObservedSilhouette> observed;
+  std::vector<Eigen::Isometry3f> X_CB;
+  std::vector<SilhouetteCounts> counts;
+  Eigen::VectorXd distance;
+  Eigen::VectorXd weights;
+};
+
+Estimator::Estimator(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
+                     const StereoRig& rig, const EstimatorOptions& options)
+    : impl_(std::make_unique<Impl>(std::move(robot), setup, rig, options)) {}
+Estimator::~Estimator() = default;
+Estimator::Estimator(Estimator&&) noexcept = default;
+
+Estimate Estimator::step(const Observation& observation) { return impl_->step(observation); }
+void Estimator::reset() { impl_->reset(); }
+
+BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::size_t camera,
+                                           bool corrected) {
+  std::vector<Eigen::Isometry3f> X_CB(impl_->body.part_count());
+  const Eigen::VectorXd x =
+      corrected ? impl_->state : Eigen::VectorXd(Eigen::VectorXd::Zero(impl_->state.size()));
+  impl_->body.compute(observation.cameras[camera]->joints.q, x, camera, X_CB);
+  return impl_->scorer->render(X_CB, camera);
+}
+
+Pose Estimator::hand_pose(const Eigen::VectorXd& q, std::size_t camera, bool corrected) {
+  return impl_->body.hand_pose(
+      q, corrected ? impl_->state : Eigen::VectorXd(Eigen::VectorXd::Zero(impl_->state.size())),
+      camera);
+}
+
+std::vector<Eigen::Vector3d> Estimator::fingertips(const Eigen::VectorXd& q, std::size_t camera,
+                                                   bool corrected) {
+  std::vector<Eigen::Vector3d> tips;
+  impl_->body.fingertips(
+      q, corrected ? impl_->state : Eigen::VectorXd(Eigen::VectorXd::Zero(impl_->state.size())),
+      camera, tips);
+  return tips;
+}
+
+std::string Estimator::engine_description() const {
+  return impl_->scorer->description() +
+         (impl_->engine_reason.empty() ? "" : ": " + impl_->engine_reason);
+}
+
+}  // namespace bodyschema

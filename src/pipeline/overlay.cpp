@@ -1,0 +1,83 @@
+#include "bodyschema/pipeline/overlay.hpp"
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+namespace {
+
+const cv::Scalar kRed(255, 60, 60);
+const cv::Scalar kGreen(60, 230, 90);
+constexpr int kCaptionHeight_px = 26;
+
+cv::Mat to_matrix(const Image& image) {
+  const int type = image.channels == 3 ? CV_8UC3 : CV_8UC1;
+  cv::Mat view(image.height, image.width, type, const_cast<std::uint8_t*>(image.data.data()));
+  cv::Mat rgb;
+  if (image.channels == 3) {
+    rgb = view.clone();
+  } else {
+    cv::cvtColor(view, rgb, cv::COLOR_GRAY2RGB);
+  }
+  return rgb;
+}
+
+void draw_outline(cv::Mat& picture, const BinaryMask& mask, int enlargement,
+                  const cv::Scalar& colour) {
+  if (mask.empty()) return;
+  cv::Mat bits(mask.height(), mask.width(), CV_8UC1);
+  for (int v = 0; v < mask.height(); ++v) {
+    for (int u = 0; u < mask.width(); ++u) bits.at<std::uint8_t>(v, u) = mask.at(u, v) ? 255 : 0;
+  }
+  cv::Mat large;
+  cv::resize(bits, large, {}, enlargement, enlargement, cv::INTER_NEAREST);
+  std::vector<std::vector<cv::Point>> outlines;
+  cv::findContours(large, outlines, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
+  cv::drawContours(picture, outlines, -1, colour, 1, cv::LINE_AA);
+}
+
+}  // namespace
+
+Image draw_overlay(const std::vector<OverlayView>& views, const std::string& caption,
+                   int enlargement) {
+  std::vector<cv::Mat> pictures;
+  for (const auto& view : views) {
+    cv::Mat picture;
+    cv::resize(to_matrix(*view.image), picture, {}, enlargement, enlargement, cv::INTER_LINEAR);
+    draw_outline(picture, view.nominal, enlargement, kRed);
+    draw_outline(picture, view.corrected, enlargement, kGreen);
+    pictures.push_back(picture);
+  }
+  cv::Mat row;
+  cv::hconcat(pictures, row);
+  cv::Mat page(row.rows + kCaptionHeight_px, row.cols, CV_8UC3, cv::Scalar(24, 24, 28));
+  row.copyTo(page.rowRange(kCaptionHeight_px, page.rows));
+  const auto write = [&](const std::string& text, int x, const cv::Scalar& colour) {
+    cv::putText(page, text, {x, 18}, cv::FONT_HERSHEY_SIMPLEX, 0.45, colour, 1, cv::LINE_AA);
+    return x + cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, 0.45, 1, nullptr).width + 16;
+  };
+  int x = write(caption, 8, cv::Scalar(230, 230, 230));
+  x = write("encoders as they are", x, kRed);
+  write("corrected", x, kGreen);
+  Image result(page.cols, page.rows, 3);
+  std::copy(page.datastart, page.dataend, result.data.begin());
+  return result;
+}
+
+void write_png(const std::filesystem::path& file, const Image& image) {
+  cv::Mat bgr;
+  cv::Mat rgb = to_matrix(image);
+  cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
+  bool written = false;
+  try {
+    if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
+    written = cv::imwrite(file.string(), bgr);
+  } catch (const std::exception&) {
+    written = false;
+  }
+  if (!written) throw FileError(file.string() + ": cannot be written");
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,327 @@
+#include "bodyschema/pipeline/replay.hpp"
+
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "bodyschema/bus/log.hpp"
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/core/progress_bar.hpp"
+#include "bodyschema/pipeline/hand_errors.hpp"
+#include "bodyschema/pipeline/overlay.hpp"
+#include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/pipeline/truth.hpp"
+#include "bodyschema/vision/mask_picture.hpp"
+
+namespace bodyschema {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json matrix_json(const Pose& X) {
+  Json rows = Json::array();
+  for (int r = 0; r < 4; ++r) {
+    Json row = Json::array();
+    for (int c = 0; c < 4; ++c) row.push_back(X.matrix()(r, c));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+Json estimate_json(const Estimate& e, const StereoRig& rig) {
+  Json json;
+  json["utime"] = e.utime;
+  json["state"] = to_string(e.state);
+  for (std::size_t k = 0; k < e.joint_names.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    json["offset_deg"][e.joint_names[k]] = degrees(e.offset_rad(i));
+    json["stddev_deg"][e.joint_names[k]] = degrees(std::sqrt(std::max(0.0, e.covariance_rad2(i, i))));
+  }
+  for (std::size_t k = 0; k < e.nuisance_names.size(); ++k) {
+    json["nuisance"][e.nuisance_names[k]] = e.nuisance(static_cast<Eigen::Index>(k));
+  }
+  for (std::size_t c = 0; c < e.X_CP.size(); ++c) {
+    json["hand_pose_" + rig.cameras[c].name + "_camera"] = matrix_json(e.X_CP[c]);
+  }
+  json["likelihood"] = e.best_likelihood;
+  json["effective_sample_size"] = e.effective_sample_size;
+  json["contour_rms_px"] = e.contour_rms_px;
+  json["hand_sd_mm"] = 1e3 * e.hand_sd_m;
+  return json;
+}
+
+/// Mean over frames of one quantity, before and after correction.
+struct BeforeAfter {
+  double before = 0.0;
+  double after = 0.0;
+  std::size_t n = 0;
+  void add(double b, double a) {
+    before += b;
+    after += a;
+    ++n;
+  }
+  [[nodiscard]] Json json() const {
+    if (n == 0) return nullptr;
+    return {{"before", before / static_cast<double>(n)}, {"after", after / static_cast<double>(n)}};
+  }
+};
+
+struct ErrorTotals {
+  BeforeAfter position_mm, rotation_deg, tip_mm, tip_px;
+  void add(const HandError& before, const HandError& after) {
+    position_mm.add(1e3 * before.position_m, 1e3 * after.position_m);
+    rotation_deg.add(degrees(before.rotation_rad), degrees(after.rotation_rad));
+    tip_mm.add(1e3 * before.fingertip_m, 1e3 * after.fingertip_m);
+    tip_px.add(before.fingertip_px, after.fingertip_px);
+  }
+  [[nodiscard]] Json json() const {
+    return {{"frames", position_mm.n},
+            {"position_mm", position_mm.json()},
+            {"orientation_deg", rotation_deg.json()},
+            {"fingertip_mm", tip_mm.json()},
+            {"fingertip_px", tip_px.json()}};
+  }
+};
+
+Json error_json(const HandError& error) {
+  return {{"position_mm", 1e3 * error.position_m},
+          {"orientation_deg", degrees(error.rotation_rad)},
+          {"fingertip_mm", 1e3 * error.fingertip_m},
+          {"fingertip_px", error.fingertip_px}};
+}
+
+/// Encoder readings of every frame, to judge the final estimate over the whole log.
+struct SeenFrame {
+  std::array<Microseconds, 2> utime{-1, -1};
+  std::array<Eigen::VectorXd, 2> q;
+};
+
+void write_overlay(Pipeline& pipeline, const Observation& observation,
+                   const std::filesystem::path& file, const std::string& caption) {
+  std::vector<OverlayView> views;
+  for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
+    if (!observation.cameras[c]) continue;
+    views.push_back({&observation.cameras[c]->image,
+                     pipeline.estimator().predicted_silhouette(observation, c, false),
+                     pipeline.estimator().predicted_silhouette(observation, c, true)});
+  }
+  if (!views.empty()) write_png(file, draw_overlay(views, caption));
+}
+
+class Replay {
+ public:
+  Replay(const Configuration& configuration, const ReplayOptions& options)
+      : options_(options), pipeline_(configuration) {
+    configuration.reject_unknown_keys();
+    std::error_code error;
+    std::filesystem::create_directories(options.out, error);
+    estimates_.open(options.out / "estimates.jsonl");
+    if (!estimates_) throw FileError(options.out.string() + ": cannot write estimates.jsonl there");
+    if (options.truth) truth_ = Truth::load(*options.truth);
+  }
+
+  std::string run() {
+    if (options_.learn_background_first) {
+      for_each("learning the background", [&](Observation& o) { pipeline_.learn_from(o); });
+      pipeline_.finish_learning();
+    }
+    spdlog::info("silhouettes: {}", pipeline_.estimator().engine_description());
+    std::size_t expected = count_frames();
+    for_each("replay", [&](Observation& o) { take(o, expected); });
+    if (frames_.empty()) {
+      throw DataError(options_.log.string() + ": no synchronised pictures and encoders in this log; " +
+                      complaint_);
+    }
+    estimates_.flush();
+    if (!estimates_) throw FileError(options_.out.string() + ": disk full? estimates.jsonl is cut short");
+    if (last_view_) {
+      write_overlay(pipeline_, *last_view_, options_.out / "overlay_final.png", "last frame");
+    }
+    return finish();
+  }
+
+ private:
+  template <class Action>
+  void for_each(const std::string& label, Action action) {
+    LogReader log(options_.log);
+    ObservationStream stream = pipeline_.make_stream();
+    ProgressBar bar(label, log.size());
+    LogEvent event;
+    const auto drain = [&] {
+      while (auto arrived = stream.next()) action(arrived->observation);
+    };
+    while (log.next(event)) {
+      if (stream.receive(event.channel, event.data, event.time_us)) drain();
+      bar.set(log.position());
+    }
+    stream.finish();
+    drain();
+    statistics_ = stream.statistics();
+    complaint_ = fmt::format("{} messages on {} and {}", statistics_.messages,
+                             stream.channels().joint_state, stream.channels().cameras);
+  }
+
+  std::size_t count_frames() {
+    if (options_.overlays <= 0) return 0;
+    LogReader log(options_.log);
+    LogEvent event;
+    std::size_t pictures = 0;
+    const std::string cameras = pipeline_.bus().channels().cameras;
+    while (log.next(event)) pictures += event.channel == cameras ? 1 : 0;
+    return pictures;
+  }
+
+  void take(Observation& observation, std::size_t expected) {
+    const Estimate estimate = pipeline_.process(observation);
+    Json json = estimate_json(estimate, pipeline_.rig());
+    SeenFrame frame;
+    for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
+      if (!observation.cameras[c]) continue;
+      frame.utime[c] = observation.cameras[c]->utime;
+      frame.q[c] = observation.cameras[c]->joints.q;
+      if (truth_ && c < estimate.X_CP.size()) {
+        if (const TruthInstant* truth = truth_->at(frame.utime[c])) {
+          json["error_" + pipeline_.rig().cameras[c].name] = error_json(hand_error(
+              estimate.X_CP[c], *truth, c, pipeline_.rig().cameras[c].intrinsics));
+        }
+      }
+    }
+    estimates_ << json.dump() << '\n';
+    ++state_counts_[to_string(estimate.state)];
+    const std::size_t every =
+        options_.overlays > 0 ? std::max<std::size_t>(1, expected / static_cast<std::size_t>(options_.overlays)) : 0;
+    if (every > 0 && frames_.size() % every == every / 2) {
+      const std::string name = fmt::format("overlay_{:05d}.png", frames_.size());
+      write_overlay(pipeline_, observation, options_.out / name,
+                    fmt::format("frame {}", frames_.size()));
+    }
+    if (options_.masks) {
+      for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
+        const auto& seen = observation.cameras[c];
+        if (!seen || seen->mask.empty()) continue;
+        write_mask_png(options_.out / "masks" /
+                           fmt::format("{}_{:05d}.png", pipeline_.rig().cameras[c].name, frames_.size()),
+                       seen->mask, seen->valid);
+      }
+    }
+    const bool complete = estimate.state != EstimatorState::kHandNotInView &&
+                          estimate.state != EstimatorState::kLearningBackground;
+    frames_.push_back(std::move(frame));
+    last_ = estimate;
+    if (complete) last_view_ = std::move(observation);
+    if (truth_) online_error(estimate);
+  }
+
+  /// Error of the estimate each frame had at its time, last frames only, see finish().
+  void online_error(const Estimate& estimate) {
+    std::array<std::optional<std::pair<HandError, HandError>>, 2> both;
+    for (std::size_t c = 0; c < pipeline_.rig().cameras.size(); ++c) {
+      if (c >= estimate.X_CP.size() || frames_.back().utime[c] < 0) continue;
+      if (const TruthInstant* truth = truth_->at(frames_.back().utime[c])) {
+        const auto& intrinsics = pipeline_.rig().cameras[c].intrinsics;
+        both[c] = {hand_error(estimate.X_CP_nominal[c], *truth, c, intrinsics),
+                   hand_error(estimate.X_CP[c], *truth, c, intrinsics)};
+      }
+    }
+    online_.push_back(both);
+  }
+
+  std::string finish() {
+    Json summary;
+    summary["log"] = options_.log.filename().string();
+    summary["frames"] = frames_.size();
+    summary["states"] = state_counts_;
+    for (const auto& [name, count] : statistics_.counters()) {
+      if (count > 0) summary["not_used"][name] = count;
+    }
+    summary["engine"] = pipeline_.estimator().engine_description();
+    summary["configuration_hash"] = pipeline_.configuration_hash();
+    summary["estimate"] = estimate_json(last_, pipeline_.rig());
+    summary["weakest_direction"] = last_.weakest.text;
+
+    std::string table = fmt::format("{:<20} {:>10} {:>8}", "joint", "offset deg", "sd deg");
+    if (truth_ && !truth_->offsets().empty()) table += fmt::format(" {:>9} {:>9}", "true deg", "error deg");
+    table += '\n';
+    for (std::size_t k = 0; k < last_.joint_names.size(); ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      table += fmt::format("{:<20} {:>10.2f} {:>8.2f}", last_.joint_names[k],
+                           degrees(last_.offset_rad(i)),
+                           degrees(std::sqrt(std::max(0.0, last_.covariance_rad2(i, i)))));
+      if (truth_) {
+        for (const auto& [name, offset] : truth_->offsets()) {
+          if (name != last_.joint_names[k]) continue;
+          table += fmt::format(" {:>9.2f} {:>9.2f}", degrees(offset),
+                               degrees(last_.offset_rad(i) - offset));
+          summary["offset_error_deg"][name] = degrees(last_.offset_rad(i) - offset);
+        }
+      }
+      table += '\n';
+    }
+    table += "weakest direction: " + last_.weakest.text + '\n';
+    if (truth_) table += truth_table(summary);
+    std::ofstream file(options_.out / "summary.json");
+    file << summary.dump(2) << '\n';
+    if (!file.flush()) throw FileError((options_.out / "summary.json").string() + ": cannot be written");
+    return table;
+  }
+
+  std::string truth_table(Json& summary) {
+    // The last tenth of the frames, at most 30, as the estimate was then; and the final estimate
+    // applied to every frame of the log.
+    const std::size_t tail = std::clamp<std::size_t>(online_.size() / 10, 1, 30);
+    const std::array<std::string, 2> names = {"left", "right"};
+    std::string table = fmt::format("\n{:<34} {:>16} {:>16} {:>18} {:>18}\n", "error, before -> after",
+                                    "position mm", "rotation deg", "fingertips mm", "fingertips px");
+    const auto row = [&](const std::string& name, const ErrorTotals& t) {
+      const auto cell = [](const BeforeAfter& v) {
+        const double n = static_cast<double>(std::max<std::size_t>(v.n, 1));
+        return fmt::format("{:.2f} -> {:.2f}", v.before / n, v.after / n);
+      };
+      table += fmt::format("{:<34} {:>16} {:>16} {:>18} {:>18}\n", name, cell(t.position_mm),
+                           cell(t.rotation_deg), cell(t.tip_mm), cell(t.tip_px));
+    };
+    for (std::size_t c = 0; c < pipeline_.rig().cameras.size(); ++c) {
+      ErrorTotals last_frames;
+      for (std::size_t i = online_.size() - tail; i < online_.size(); ++i) {
+        if (online_[i][c]) last_frames.add(online_[i][c]->first, online_[i][c]->second);
+      }
+      ErrorTotals all;
+      for (const auto& frame : frames_) {
+        if (frame.utime[c] < 0) continue;
+        const TruthInstant* truth = truth_->at(frame.utime[c]);
+        if (truth == nullptr) continue;
+        const auto& intrinsics = pipeline_.rig().cameras[c].intrinsics;
+        all.add(hand_error(pipeline_.estimator().hand_pose(frame.q[c], c, false), *truth, c, intrinsics),
+                hand_error(pipeline_.estimator().hand_pose(frame.q[c], c, true), *truth, c, intrinsics));
+      }
+      row(fmt::format("{} eye, last {} frames", names[c], tail), last_frames);
+      row(fmt::format("{} eye, final offsets, all frames", names[c]), all);
+      summary["errors"][names[c]] = {{"last_frames", last_frames.json()},
+                                     {"final_on_all_frames", all.json()}};
+    }
+    return table;
+  }
+
+  ReplayOptions options_;
+  Pipeline pipeline_;
+  std::optional<Truth> truth_;
+  std::ofstream estimates_;
+  std::vector<SeenFrame> frames_;
+  std::vector<std::array<std::optional<std::pair<HandError, HandError>>, 2>> online_;
+  std::map<std::string, std::size_t> state_counts_;
+  std::optional<Observation> last_view_;
+  Estimate last_;
+  BusStatistics statistics_;
+  std::string complaint_;
+};
+
+}  // namespace
+
+std::string replay(const Configuration& configuration, const ReplayOptions& options) {
+  return Replay(configuration, options).run();
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,152 @@
+#include "bodyschema/estimator/estimator.hpp"
+
+#include <gtest/gtest.h>
+
+#include "estimator/synthetic_reach.hpp"
+
+namespace bodyschema {
+namespace {
+
+const std::filesystem::path kRobot =
+    std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/robot.yaml";
+
+/// Our own robot before its eyes, with the paper's offsets.
+class EstimatorOnOwnRobot : public ::testing::Test {
+ protected:
+  EstimatorOnOwnRobot() : configuration_(Configuration::load(kRobot)) {
+    setup_ = RobotSetup::from(configuration_.section("robot"));
+    robot_ = setup_.load();
+    rig_ = StereoRig::from(configuration_.section("cameras"));
+    offset_rad_.resize(7);
+    offset_rad_ << 5, 4, 3, -2, 3, -7, 3;
+    offset_rad_ *= kPi / 180.0;
+    reach_ = std::make_unique<SyntheticReach>(robot_, setup_, rig_, offset_rad_);
+    options_ = EstimatorOptions::from(configuration_);
+    options_.silhouette.engine = "contour";
+  }
+
+  /// A joint vector of the reach, s from 0 (low and right) to 1.
+  [[nodiscard]] Eigen::VectorXd pose(double s) const {
+    Eigen::VectorXd q = setup_.default_joints(*robot_);
+    const auto set = [&](const char* name, double from_deg, double to_deg) {
+      q(robot_->joint_index(name)) = radians(from_deg + s * (to_deg - from_deg));
+    };
+    set("neck_pitch", -10, -10);
+    set("eyes_tilt", -10, -10);
+    set("r_shoulder_pitch", -68, -74);
+    set("r_shoulder_roll", 20, 24);
+    set("r_shoulder_yaw", 18, 14);
+    set("r_elbow", 72, 78);
+    set("r_wrist_prosup", 50, 42);
+    set("r_wrist_pitch", -20, -12);
+    set("r_wrist_yaw", 5, 2);
+    set("r_thumb_oppose", 50, 50);
+    set("r_index_proximal", 20, 20);
+    set("r_middle_distal", 40, 40);
+    set("r_pinky", 60, 60);
+    return q;
+  }
+
+  Configuration configuration_;
+  RobotSetup setup_;
+  std::shared_ptr<const RobotModel> robot_;
+  StereoRig rig_;
+  Eigen::VectorXd offset_rad_;
+  std::unique_ptr<SyntheticReach> reach_;
+  EstimatorOptions options_;
+};
+
+double position_error_m(const Estimate& estimate, const Pose& truth) {
+  return (estimate.X_CP[0].translation() - truth.translation()).norm();
+}
+
+TEST_F(EstimatorOnOwnRobot, BestModeFindsTheHandWithinTenFrames) {
+  Estimator estimator(robot_, setup_, rig_, options_);
+  Estimate estimate;
+  for (int frame = 0; frame < 10; ++frame) {
+    estimate = estimator.step(reach_->observe(pose(frame / 9.0), frame * 33'333));
+  }
+  const Pose truth = reach_->true_hand(pose(1.0), 0);
+  EXPECT_GT((estimate.X_CP_nominal[0].translation() - truth.translation()).norm(), 0.01);
+  EXPECT_LT(position_error_m(estimate, truth), 3e-4);
+  EXPECT_LT(degrees(rotation_distance(truth.linear(), estimate.X_CP[0].linear())), 0.2);
+  EXPECT_EQ(estimate.state, EstimatorState::kConverged);
+  EXPECT_GT(estimate.best_likelihood, 0.97);
+  EXPECT_FALSE(estimate.weakest.text.empty());
+}
+
+TEST_F(EstimatorOnOwnRobot, PaperModeReducesTheError) {
+  options_.mode = EstimatorMode::kPaper;
+  Estimator estimator(robot_, setup_, rig_, options_);
+  Estimate estimate;
+  for (int frame = 0; frame < 40; ++frame) {
+    estimate = estimator.step(reach_->observe(pose(frame / 39.0), frame * 33'333));
+  }
+  const Pose truth = reach_->true_hand(pose(1.0), 0);
+  EXPECT_LT(position_error_m(estimate, truth),
+            0.6 * (estimate.X_CP_nominal[0].translation() - truth.translation()).norm());
+  EXPECT_TRUE(estimate.nuisance_names.empty());
+}
+
+TEST_F(EstimatorOnOwnRobot, HandNotInViewKeepsTheOffsetsAndComesBack) {
+  Estimator estimator(robot_, setup_, rig_, options_);
+  Estimate before;
+  for (int frame = 0; frame < 6; ++frame) {
+    before = estimator.step(reach_->observe(pose(frame / 20.0), frame * 33'333));
+  }
+  Observation empty = reach_->observe(pose(0.3), 200'000);
+  for (auto& seen : empty.cameras) {
+    seen->mask = BinaryMask(seen->mask.width(), seen->mask.height());
+    seen->coverage.assign(seen->coverage.size(), 0);
+  }
+  const Estimate away = estimator.step(empty);
+  EXPECT_EQ(away.state, EstimatorState::kHandNotInView);
+  EXPECT_TRUE(away.offset_rad == before.offset_rad);
+  const Estimate back = estimator.step(reach_->observe(pose(0.4), 233'333));
+  EXPECT_NE(back.state, EstimatorState::kHandNotInView);
+  EXPECT_LT(position_error_m(back, reach_->true_hand(pose(0.4), 0)), 5e-4);
+}
+
+TEST_F(EstimatorOnOwnRobot, OneCameraIsEnough) {
+  Estimator estimator(robot_, setup_, rig_, options_);
+  Estimate estimate;
+  for (int frame = 0; frame < 10; ++frame) {
+    Observation observation = reach_->observe(pose(frame / 9.0), frame * 33'333);
+    observation.cameras[1].reset();
+    estimate = estimator.step(observation);
+  }
+  EXPECT_LT(position_error_m(estimate, reach_->true_hand(pose(1.0), 0)), 1e-3);
+}
+
+TEST_F(EstimatorOnOwnRobot, SameSeedSameEstimatesWhateverTheThreads) {
+  std::vector<Eigen::VectorXd> results;
+  for (const int threads : {1, 1, 3}) {
+    options_.silhouette.threads = threads;
+    Estimator estimator(robot_, setup_, rig_, options_);
+    Estimate estimate;
+    for (int frame = 0; frame < 5; ++frame) {
+      estimate = estimator.step(reach_->observe(pose(frame / 9.0), frame * 33'333));
+    }
+    results.push_back(estimate.offset_rad);
+  }
+  EXPECT_TRUE(results[0] == results[1]);
+  EXPECT_TRUE(results[0] == results[2]);
+}
+
+TEST_F(EstimatorOnOwnRobot, ASlipOfFiveDegreesIsFoundAgain) {
+  Estimator estimator(robot_, setup_, rig_, options_);
+  for (int frame = 0; frame < 15; ++frame) {
+    estimator.step(reach_->observe(pose(frame / 40.0), frame * 33'333));
+  }
+  Eigen::VectorXd slipped = offset_rad_;
+  slipped(3) += radians(5.0);
+  SyntheticReach after(robot_, setup_, rig_, slipped);
+  Estimate estimate;
+  for (int frame = 15; frame < 40; ++frame) {
+    estimate = estimator.step(after.observe(pose(frame / 40.0), frame * 33'333));
+  }
+  EXPECT_LT(position_error_m(estimate, after.true_hand(pose(39 / 40.0), 0)), 1e-3);
+}
+
+}  // namespace
+}  // namespace bodyschema
