@@ -159,6 +159,7 @@ install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES config/service/bodyschemad.service DESTINATION lib/systemd/system)
 install(FILES config/service/60-bodyschema.conf DESTINATION lib/sysctl.d)
 
+include(LcmBindings)
 include(Package)
 
 if(BODYSCHEMA_BUILD_TESTS)

@@ -1,16 +1,25 @@
+#include <bodyschema/core/error.hpp>
+#include <bodyschema/robot/forward_kinematics.hpp>
+#include <bodyschema/robot/robot_model.hpp>
 #include <cstdio>
-#include <filesystem>
+#include <vector>
 
-#include <bodyschema/core/nearest_name.hpp>
-#include <bodyschema/geometry/pinhole.hpp>
-
-// Calls into one compiled and one header-only library and looks for the installed data folder.
-int main(int, char** argv) {
-  const bodyschema::PinholeIntrinsics camera{320, 240, 257.34, 257.34, 159.5, 119.5};
-  const Eigen::Vector2d pixel = camera.project({0.0, 0.0, 0.3});
-  const std::string nearest = bodyschema::nearest_name("elbwo", {"wrist", "elbow"});
-  const bool data_found = std::filesystem::is_directory(argv[1]);
-  std::printf("principal point (%.1f, %.1f), nearest name %s, %s %s\n", pixel.x(), pixel.y(),
-              nearest.c_str(), argv[1], data_found ? "found" : "missing");
-  return pixel.x() == 159.5 && nearest == "elbow" && data_found ? 0 : 1;
+// Loads a robot and says where a link is: consumer <urdf> <link>
+int main(int argc, char** argv) {
+  if (argc != 3) {
+    return 2;
+  }
+  try {
+    const auto robot = bodyschema::RobotModel::load({.urdf = argv[1]});
+    bodyschema::ForwardKinematics kinematics(robot, {argv[2]});
+    std::vector<bodyschema::Pose> X_WB(1);
+    kinematics.compute(Eigen::VectorXd::Zero(robot->joint_count()), X_WB);
+    const Eigen::Vector3d p_WB = X_WB.front().translation();
+    std::printf("%s: %s at (%.3f, %.3f, %.3f) m\n", robot->name().c_str(), argv[2], p_WB.x(),
+                p_WB.y(), p_WB.z());
+  } catch (const bodyschema::Error& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+  return 0;
 }

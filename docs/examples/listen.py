@@ -1,0 +1,14 @@
+#!/usr/bin/env python3
+"""Prints the joint offsets as they are estimated. Needs PyPI's lcm and our types on PYTHONPATH."""
+import math, os, lcm
+from bodyschema import joint_offsets_t
+
+def show(channel, data):
+    offsets = joint_offsets_t.decode(data)
+    print(offsets.state, *(f"{n} {math.degrees(m):+.2f}" for n, m in
+                           zip(offsets.joint_name, offsets.mean_rad)), flush=True)
+
+bus = lcm.LCM(os.environ.get("LCM_DEFAULT_URL", "udpm://239.255.76.67:7667?ttl=0"))
+bus.subscribe("ICUB_JOINT_OFFSETS", show)
+while True:
+    bus.handle()
