@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bodyschema/geometry/binary_mask.hpp"
+#include "bodyschema/geometry/image.hpp"
+#include "bodyschema/vision/background_model.hpp"
+#include "bodyschema/vision/vision_setup.hpp"
+
+namespace bodyschema {
+
+/// Tells the robot from the background in the pictures of one camera.
+///
+/// For every picture it gives
+///   mask      pixels whose coverage is at least one half, without small pieces and holes
+///   valid     pixels that can be judged: the background there is known and, on the outline,
+///             different enough from the robot. Empty when all pixels count.
+///   coverage  share of each pixel covered by the robot, 0 to 255, row order. On a blurred outline
+///             it is the projection of the pixel's colour onto the line from the background's
+///             colour B to the robot's colour F next to it, (I-B).(F-B) / |F-B|^2, so that its
+///             half level lies on the outline to a fraction of a pixel. Exactly 0 or 255 farther
+///             than about two pixels from an outline.
+///
+/// Learning: `single_colour` and `background_picture` work from the first frame on;
+/// `learned_background` needs either `learn` (offline, all frames of a log) or, live, its first
+/// `learning_frames` frames (better without the robot in view; while learning nothing is valid)
+/// and keeps adapting where the robot is not. `statistics` needs a prediction with every picture.
+///
+/// Throws DataError for an empty picture or one of another size or number of channels than before;
+/// otherwise `segment` neither throws nor allocates once warm. One segmenter per camera and thread.
+class Segmenter {
+ public:
+  /// @param camera  name under which the background picture of this camera is configured
+  /// Throws FileError for a background picture that is missing or of another size,
+  /// ConfigurationError when none is configured for this camera.
+  Segmenter(const VisionSetup& setup, const std::string& camera, int width, int height);
+  ~Segmenter();
+  Segmenter(Segmenter&&) noexcept;
+  Segmenter& operator=(Segmenter&&) noexcept;
+
+  /// Offline: learns the background from frames in which the robot moves or is absent.
+  /// Replaces what was known. No effect for a given picture.
+  void learn(std::span<const Image> frames);
+  /// The same for frames that come one by one: any number, in order, then `finish_learning`.
+  /// A bounded selection is kept in which every stretch of movement has its share.
+  void learn_from(const Image& frame);
+  void finish_learning();
+  /// Whether masks are to be had; false while a live background is still being learned.
+  [[nodiscard]] bool ready() const;
+
+  /// @param predicted  where the robot is thought to be (`statistics`: needed; `learned_background`:
+  ///   protects a resting robot from being learned as background; otherwise unused); may be null
+  void segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
+               std::vector<std::uint8_t>& coverage, const BinaryMask* predicted = nullptr);
+
+  /// The background as now known; empty before anything is.
+  [[nodiscard]] const BackgroundModel& background() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace bodyschema

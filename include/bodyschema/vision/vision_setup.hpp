@@ -1,0 +1,67 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "bodyschema/core/configuration.hpp"
+
+namespace bodyschema {
+
+/// How the robot is told from what lies behind it.
+enum class SegmentationMethod {
+  kSingleColour,       ///< background of one colour, with a slow gradient of light
+  kBackgroundPicture,  ///< still cameras, a picture of the background is given
+  kLearnedBackground,  ///< still cameras, the background is learned from noisy frames
+  kStatistics,         ///< anything: colour statistics on both sides of the predicted outline
+};
+
+/// What the outline of the robot looks like in the pictures.
+enum class EdgeKind {
+  kBlurred,  ///< a pixel on the outline mixes robot and background: real cameras, antialiasing
+  kHard,     ///< a pixel is either robot or background: simulators that draw without antialiasing
+};
+
+/// Settings of the section `vision`, shared by all cameras. Intensities are in levels, 0 to 255.
+struct VisionSetup {
+  SegmentationMethod method = SegmentationMethod::kLearnedBackground;
+  EdgeKind edges = EdgeKind::kBlurred;
+
+  /// Standard deviation of the image noise, levels; 0: estimated from the frames.
+  double noise_levels = 0.0;
+  /// A difference counts from this many standard deviations of the noise ...
+  double threshold_sigma = 4.0;
+  /// ... and from more than this many levels.
+  double threshold_levels = 2.0;
+  /// Robot and background whose colours differ by fewer standard deviations of the noise cannot be
+  /// told apart: such pixels of the outline are marked invalid.
+  double least_contrast_sigma = 4.0;
+
+  /// Connected pieces of robot with fewer pixels than this are dropped.
+  int min_component_px = 40;
+  /// Enclosed pieces of background with at most this many pixels are filled.
+  int max_hole_px = 6;
+
+  /// single_colour: the colour, RGB; absent: the dominant colour of the first frame.
+  std::optional<std::array<double, 3>> background_rgb;
+
+  /// background_picture: one file per camera name.
+  std::map<std::string, std::filesystem::path> background_pictures;
+  /// background_picture: exactly black pixels of the picture are unknown, not black.
+  bool black_is_unknown = false;
+
+  /// learned_background, live: frames that are only learned from before the first mask.
+  int learning_frames = 20;
+  /// learned_background: a pixel's background must be seen in at least this many frames.
+  int min_sightings = 3;
+
+  /// statistics: how far from the predicted outline the robot is searched for, px.
+  int search_px = 12;
+
+  /// Reads and checks the section; throws ConfigurationError.
+  static VisionSetup from(const Configuration& vision);
+};
+
+}  // namespace bodyschema

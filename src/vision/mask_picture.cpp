@@ -1,0 +1,98 @@
+#include "bodyschema/vision/mask_picture.hpp"
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <system_error>
+
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+namespace {
+
+void write(const std::filesystem::path& file, const cv::Mat& picture) {
+  std::error_code ignored;
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), ignored);
+  bool written = false;
+  try {
+    written = cv::imwrite(file.string(), picture);
+  } catch (const cv::Exception&) {
+    // An unknown extension; reported below with the file's name.
+  }
+  if (!written) throw FileError(file.string() + ": cannot write this picture");
+}
+
+}  // namespace
+
+void write_mask_png(const std::filesystem::path& file, const BinaryMask& mask,
+                    const BinaryMask& valid) {
+  if (mask.empty()) throw FileError(file.string() + ": there is no mask to write");
+  cv::Mat picture(mask.height(), mask.width(), CV_8UC1);
+  for (int v = 0; v < mask.height(); ++v) {
+    for (int u = 0; u < mask.width(); ++u) {
+      const bool known = valid.empty() || valid.at(u, v);
+      picture.at<std::uint8_t>(v, u) = !known ? 128 : (mask.at(u, v) ? 255 : 0);
+    }
+  }
+  write(file, picture);
+}
+
+void write_coverage_png(const std::filesystem::path& file, int width, int height,
+                        const std::vector<std::uint8_t>& coverage) {
+  if (coverage.empty() || coverage.size() != static_cast<std::size_t>(width) *
+                                                 static_cast<std::size_t>(height)) {
+    throw FileError(file.string() + ": there is no coverage of this size to write");
+  }
+  cv::Mat picture(height, width, CV_8UC1);
+  for (int v = 0; v < height; ++v) {
+    std::copy_n(coverage.data() + static_cast<std::ptrdiff_t>(v) * width, width,
+                picture.ptr<std::uint8_t>(v));
+  }
+  write(file, picture);
+}
+
+void write_overlay_png(const std::filesystem::path& file, const Image& image,
+                       const BinaryMask& mask, const BinaryMask& valid) {
+  if (image.empty() || mask.width() != image.width || mask.height() != image.height) {
+    throw FileError(file.string() + ": picture and mask differ in size");
+  }
+  cv::Mat picture(image.height, image.width, CV_8UC3);
+  for (int v = 0; v < image.height; ++v) {
+    for (int u = 0; u < image.width; ++u) {
+      const auto* in = image.pixel(u, v);
+      auto& out = picture.at<cv::Vec3b>(v, u);
+      out = image.channels == 3 ? cv::Vec3b(in[2], in[1], in[0]) : cv::Vec3b(in[0], in[0], in[0]);
+      if (!valid.empty() && !valid.at(u, v)) {
+        out[2] = static_cast<std::uint8_t>((out[2] + 255) / 2);
+      }
+      if (!mask.at(u, v)) continue;
+      const bool inner = u > 0 && v > 0 && u + 1 < image.width && v + 1 < image.height &&
+                         mask.at(u - 1, v) && mask.at(u + 1, v) && mask.at(u, v - 1) &&
+                         mask.at(u, v + 1);
+      if (!inner) out = cv::Vec3b(0, 255, 0);
+    }
+  }
+  write(file, picture);
+}
+
+Image read_picture(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) throw FileError(file.string() + ": no such file");
+  cv::Mat picture;
+  try {
+    picture = cv::imread(file.string(), cv::IMREAD_ANYCOLOR);
+  } catch (const cv::Exception&) {
+    // Broken file; reported below.
+  }
+  if (picture.empty()) throw FileError(file.string() + ": not a picture that can be read");
+  if (picture.channels() == 4) cv::cvtColor(picture, picture, cv::COLOR_BGRA2BGR);
+  if (picture.channels() == 3) cv::cvtColor(picture, picture, cv::COLOR_BGR2RGB);
+  Image image(picture.cols, picture.rows, picture.channels());
+  for (int v = 0; v < picture.rows; ++v) {
+    std::copy_n(picture.ptr<std::uint8_t>(v),
+                static_cast<std::size_t>(picture.cols) * static_cast<std::size_t>(picture.channels()),
+                image.pixel(0, v));
+  }
+  return image;
+}
+
+}  // namespace bodyschema

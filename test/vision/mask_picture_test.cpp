@@ -1,0 +1,75 @@
+#include "bodyschema/vision/mask_picture.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+namespace {
+
+class MaskPicture : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() /
+              ("bodyschema_mask_picture_" + std::to_string(::getpid()));
+    std::filesystem::remove_all(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::filesystem::path folder_;
+};
+
+TEST_F(MaskPicture, MaskAndOverlayReadBack) {
+  BinaryMask mask(70, 10), valid(70, 10);
+  valid.fill(true);
+  for (int v = 2; v < 8; ++v) {
+    for (int u = 60; u < 69; ++u) mask.set(u, v);
+  }
+  valid.set(0, 0, false);
+  write_mask_png(folder_ / "deep" / "mask.png", mask, valid);
+  const auto read = read_picture(folder_ / "deep" / "mask.png");
+  ASSERT_EQ(read.width, 70);
+  ASSERT_EQ(read.channels, 1);
+  EXPECT_EQ(*read.pixel(0, 0), 128);
+  EXPECT_EQ(*read.pixel(1, 0), 0);
+  EXPECT_EQ(*read.pixel(68, 7), 255);
+
+  Image image(70, 10, 3);
+  image.pixel(64, 5)[0] = 200;  // red in the middle of the mask
+  write_overlay_png(folder_ / "overlay.png", image, mask, valid);
+  const auto overlay = read_picture(folder_ / "overlay.png");
+  ASSERT_EQ(overlay.channels, 3);
+  EXPECT_EQ(overlay.pixel(64, 5)[0], 200);
+  EXPECT_EQ(overlay.pixel(60, 5)[1], 255);
+  EXPECT_EQ(overlay.pixel(60, 5)[0], 0);
+  EXPECT_EQ(overlay.pixel(0, 0)[0], 127);
+
+  write_coverage_png(folder_ / "coverage.png", 2, 1, {7, 250});
+  EXPECT_EQ(read_picture(folder_ / "coverage.png").data, (std::vector<std::uint8_t>{7, 250}));
+}
+
+TEST_F(MaskPicture, ErrorsNameTheFile) {
+  const auto expect_named = [](const auto& action, const std::string& name) {
+    try {
+      action();
+      FAIL() << "no error for " << name;
+    } catch (const FileError& error) {
+      EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
+    }
+  };
+  expect_named([&] { read_picture(folder_ / "absent.png"); }, "absent.png");
+  std::filesystem::create_directories(folder_);
+  std::ofstream(folder_ / "broken.png") << "not a picture";
+  expect_named([&] { read_picture(folder_ / "broken.png"); }, "broken.png");
+  expect_named([&] { write_mask_png(folder_ / "empty.png", BinaryMask{}); }, "empty.png");
+  expect_named([&] { write_mask_png(folder_ / "mask.nosuchformat", BinaryMask(4, 4)); },
+               "mask.nosuchformat");
+  expect_named([&] { write_overlay_png(folder_ / "o.png", Image(3, 4, 3), BinaryMask(4, 4)); },
+               "o.png");
+  expect_named([&] { write_coverage_png(folder_ / "c.png", 2, 2, {1}); }, "c.png");
+}
+
+}  // namespace
+}  // namespace bodyschema

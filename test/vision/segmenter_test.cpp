@@ -1,0 +1,304 @@
+#include "bodyschema/vision/segmenter.hpp"
+
+#include <gtest/gtest.h>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/vision/mask_picture.hpp"
+#include "vision/scene.hpp"
+
+namespace bodyschema {
+namespace {
+
+using test::Scene;
+using test::Texture;
+
+struct Output {
+  BinaryMask mask, valid;
+  std::vector<std::uint8_t> coverage;
+};
+
+double iou(const BinaryMask& a, const BinaryMask& b) {
+  std::size_t in = 0, all = 0;
+  for (int v = 0; v < a.height(); ++v) {
+    for (int u = 0; u < a.width(); ++u) {
+      in += a.at(u, v) && b.at(u, v);
+      all += a.at(u, v) || b.at(u, v);
+    }
+  }
+  return all == 0 ? 1.0 : static_cast<double>(in) / static_cast<double>(all);
+}
+
+VisionSetup setup_for(SegmentationMethod method) {
+  VisionSetup setup;
+  setup.method = method;
+  return setup;
+}
+
+/// Pictures without the robot, then the outline's error over a few places of the hand.
+test::EdgeStatistics measure(Scene scene, const VisionSetup& setup, unsigned seed) {
+  std::mt19937 random(seed);
+  Segmenter segmenter(setup, "left", scene.width, scene.height);
+  if (setup.method == SegmentationMethod::kLearnedBackground) {
+    const auto empty = scene.without_robot();
+    const auto ideal = empty.ideal();
+    for (int i = 0; i < 30; ++i) segmenter.learn_from(empty.picture(ideal, random));
+    segmenter.finish_learning();
+  }
+  test::EdgeStatistics total;
+  constexpr int kPlaces = 4;
+  Output out;
+  for (int k = 0; k < kPlaces; ++k) {
+    scene.shapes = test::hand(78.0 + 1.37 * k, 62.0 + 0.71 * k);
+    segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
+    EXPECT_GT(iou(out.mask, scene.true_mask()), 0.97);
+    const auto edge = test::edge_statistics(scene.outline(), scene.width, scene.height,
+                                            out.coverage, out.valid);
+    total.bias += edge.bias / kPlaces;
+    total.sd += edge.sd / kPlaces;
+    total.found += edge.found / kPlaces;
+    total.worst = std::max(total.worst, edge.worst);
+  }
+  std::printf("    outline: bias %+.3f px, sd %.3f px, worst %.2f px, found %.1f %%\n", total.bias,
+              total.sd, total.worst, 100.0 * total.found);
+  return total;
+}
+
+TEST(Segmenter, OutlineOnPlainBackgroundIsExactToAFractionOfAPixel) {
+  for (const bool bright : {true, false}) {
+    for (const int channels : {3, 1}) {
+      Scene scene;
+      scene.channels = channels;
+      if (!bright) {
+        for (int c = 0; c < 3; ++c) {
+          scene.robot[c] = 40 + 5 * c;
+          scene.base[c] = 150 + 10 * c;
+        }
+      }
+      const auto edge = measure(scene, setup_for(SegmentationMethod::kSingleColour), 1);
+      EXPECT_LT(std::abs(edge.bias), 0.05) << "bright " << bright << ", channels " << channels;
+      EXPECT_LT(edge.sd, 0.1);
+      EXPECT_GT(edge.found, 0.99);
+    }
+  }
+}
+
+TEST(Segmenter, LightMayVarySlowlyOverASingleColour) {
+  Scene scene;
+  scene.texture = Texture::kGradient;
+  const auto edge = measure(scene, setup_for(SegmentationMethod::kSingleColour), 2);
+  EXPECT_LT(std::abs(edge.bias), 0.05);
+  EXPECT_LT(edge.sd, 0.1);
+}
+
+TEST(Segmenter, OutlineOnClutterLearnedFromNoisyFrames) {
+  for (const bool bright : {true, false}) {
+    Scene scene;
+    scene.texture = Texture::kClutter;
+    if (!bright) {
+      for (int c = 0; c < 3; ++c) scene.robot[c] = 40 + 5 * c;
+    }
+    const auto edge = measure(scene, setup_for(SegmentationMethod::kLearnedBackground), 3);
+    EXPECT_LT(std::abs(edge.bias), 0.1) << "bright " << bright;
+    EXPECT_LT(edge.sd, 0.2);
+    EXPECT_GT(edge.found, 0.9);
+  }
+}
+
+TEST(Segmenter, EmptySceneGivesEmptyMaskWhateverTheNoise) {
+  for (const double noise : {0.0, 1.0, 2.5, 6.0}) {
+    for (const auto texture : {Texture::kPlain, Texture::kClutter}) {
+      Scene scene;
+      scene.texture = texture;
+      scene.noise_levels = noise;
+      std::mt19937 random(4);
+      const auto ideal = scene.ideal();
+      auto setup = setup_for(texture == Texture::kPlain ? SegmentationMethod::kSingleColour
+                                                        : SegmentationMethod::kLearnedBackground);
+      setup.learning_frames = 10;
+      Segmenter segmenter(setup, "left", scene.width, scene.height);
+      Output out;
+      for (int i = 0; i < 20; ++i) {
+        segmenter.segment(scene.picture(ideal, random), out.mask, out.valid, out.coverage);
+        EXPECT_EQ(out.mask.count(), 0u) << "noise " << noise << ", frame " << i;
+      }
+      EXPECT_NEAR(segmenter.background().noise_sd, std::max(noise, 0.4), 0.1 + 0.1 * noise);
+      EXPECT_EQ(out.valid.count(), static_cast<std::size_t>(scene.width * scene.height));
+    }
+  }
+}
+
+TEST(Segmenter, RobotThatFillsTheViewIsAllMask) {
+  Scene scene;
+  std::mt19937 random(5);
+  auto setup = setup_for(SegmentationMethod::kSingleColour);
+  setup.background_rgb = {60, 90, 120};
+  scene.shapes = {{80, 60, 80, 60, 500}};
+  Segmenter segmenter(setup, "left", scene.width, scene.height);
+  Output out;
+  segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
+  EXPECT_EQ(out.mask.count(), static_cast<std::size_t>(scene.width * scene.height));
+}
+
+TEST(Segmenter, LearnsBehindAMovingRobotOffline) {
+  Scene scene;
+  scene.texture = Texture::kClutter;
+  scene.ambient = 0.6;
+  scene.supersampling = 3;
+  std::mt19937 random(6);
+  const auto truth = scene.without_robot().ideal();
+  // A reach that rests for as long as it moves, at both ends; never a frame without the robot.
+  std::vector<Image> frames;
+  for (int i = 0; i < 60; ++i) {
+    const double t = std::clamp((i - 15) / 30.0, 0.0, 1.0);
+    scene.shapes = test::hand(120 - 80 * t, 90 - 40 * t);
+    frames.push_back(scene.picture(random));
+  }
+  Segmenter segmenter(setup_for(SegmentationMethod::kLearnedBackground), "left", scene.width,
+                      scene.height);
+  segmenter.learn(frames);
+  const auto& model = segmenter.background();
+  std::size_t known = 0, wrong = 0;
+  for (int v = 0; v < scene.height; ++v) {
+    for (int u = 0; u < scene.width; ++u) {
+      const auto i = static_cast<std::size_t>(v * scene.width + u);
+      if (model.precision[i] <= 0) continue;
+      ++known;
+      float worst = 0;
+      for (int c = 0; c < 3; ++c) {
+        worst = std::max(worst, std::abs(model.mean[static_cast<std::size_t>(c)][i] -
+                                         truth.at<cv::Vec3f>(v, u)[c]));
+      }
+      wrong += worst > 5.0f;
+    }
+  }
+  std::printf("    known %zu, wrong %zu of %d\n", known, wrong, scene.width * scene.height);
+  EXPECT_GT(known, 0.97 * scene.width * scene.height);
+  EXPECT_LT(wrong, 0.01 * scene.width * scene.height);
+}
+
+TEST(Segmenter, LearnsLiveBeforeTheRobotComes) {
+  Scene scene;
+  scene.texture = Texture::kClutter;
+  scene.supersampling = 4;
+  std::mt19937 random(7);
+  auto setup = setup_for(SegmentationMethod::kLearnedBackground);
+  setup.learning_frames = 15;
+  Segmenter segmenter(setup, "left", scene.width, scene.height);
+  const auto empty = scene.without_robot().ideal();
+  Output out;
+  for (int i = 0; i < 15; ++i) {
+    EXPECT_FALSE(segmenter.ready());
+    segmenter.segment(scene.picture(empty, random), out.mask, out.valid, out.coverage);
+    EXPECT_EQ(out.valid.count(), 0u);
+    EXPECT_EQ(out.mask.count(), 0u);
+  }
+  EXPECT_TRUE(segmenter.ready());
+  // The robot enters and stays: it must not melt into the background.
+  for (int i = 0; i < 8; ++i) {
+    scene.shapes = test::hand(160 - 10 * i, 70);
+    segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
+    EXPECT_GT(iou(out.mask, scene.true_mask()), 0.97) << "frame " << i;
+  }
+  const auto resting = scene.ideal();
+  for (int i = 0; i < 700; ++i) {
+    segmenter.segment(scene.picture(resting, random), out.mask, out.valid, out.coverage);
+  }
+  EXPECT_GT(iou(out.mask, scene.true_mask()), 0.97);
+}
+
+TEST(Segmenter, WhatMovedInTheBackgroundIsLearnedAnewOutsideThePrediction) {
+  Scene scene;
+  std::mt19937 random(8);
+  auto setup = setup_for(SegmentationMethod::kLearnedBackground);
+  setup.learning_frames = 10;
+  Segmenter segmenter(setup, "left", scene.width, scene.height);
+  Output out;
+  const auto empty = scene.without_robot().ideal();
+  for (int i = 0; i < 10; ++i) {
+    segmenter.segment(scene.picture(empty, random), out.mask, out.valid, out.coverage);
+  }
+  Scene with_object = scene;
+  with_object.shapes = {{30, 30, 30, 30, 10}};
+  const auto ideal = with_object.ideal();
+  const BinaryMask prediction(scene.width, scene.height);  // the robot is elsewhere
+  segmenter.segment(scene.picture(ideal, random), out.mask, out.valid, out.coverage, &prediction);
+  EXPECT_GT(out.mask.count(), 250u);
+  for (int i = 0; i < 600; ++i) {
+    segmenter.segment(scene.picture(ideal, random), out.mask, out.valid, out.coverage, &prediction);
+  }
+  EXPECT_EQ(out.mask.count(), 0u);
+}
+
+TEST(Segmenter, RefusesPicturesThatDoNotFit) {
+  Segmenter segmenter(setup_for(SegmentationMethod::kSingleColour), "left", 32, 24);
+  Output out;
+  const auto expect_refused = [&](const Image& image) {
+    EXPECT_THROW(segmenter.segment(image, out.mask, out.valid, out.coverage), DataError);
+    EXPECT_THROW(segmenter.learn_from(image), DataError);
+  };
+  expect_refused(Image{});
+  expect_refused(Image(24, 32, 3));
+  expect_refused(Image(32, 24, 2));
+  Image cut(32, 24, 3);
+  cut.data.pop_back();
+  expect_refused(cut);
+  EXPECT_NO_THROW(segmenter.segment(Image(32, 24, 1), out.mask, out.valid, out.coverage));
+  expect_refused(Image(32, 24, 3));  // gray before, RGB now
+  EXPECT_THROW(Segmenter(VisionSetup{}, "left", 0, 24), ConfigurationError);
+}
+
+TEST(Segmenter, TinyPicturesDoNotBreakAnything) {
+  for (const auto method :
+       {SegmentationMethod::kSingleColour, SegmentationMethod::kLearnedBackground}) {
+    for (const auto& [width, height] : {std::pair{1, 1}, {1, 7}, {2, 2}, {65, 1}, {3, 64}}) {
+      auto setup = setup_for(method);
+      setup.learning_frames = 2;
+      setup.min_component_px = 1;
+      Segmenter segmenter(setup, "left", width, height);
+      Output out;
+      std::mt19937 random(9);
+      for (int i = 0; i < 6; ++i) {
+        Image image(width, height, 3);
+        for (auto& byte : image.data) byte = static_cast<std::uint8_t>(random());
+        segmenter.segment(image, out.mask, out.valid, out.coverage);
+        EXPECT_EQ(out.coverage.size(), static_cast<std::size_t>(width * height));
+      }
+    }
+  }
+}
+
+TEST(Segmenter, BackgroundPictureMustBeThereAndFit) {
+  const auto file = std::filesystem::temp_directory_path() / "bodyschema_segmenter_background.png";
+  write_mask_png(file, BinaryMask(10, 10));
+  auto setup = setup_for(SegmentationMethod::kBackgroundPicture);
+  setup.background_pictures["left"] = file;
+  EXPECT_THROW(Segmenter(setup, "right", 10, 10), ConfigurationError);
+  EXPECT_THROW(Segmenter(setup, "left", 10, 11), FileError);
+  EXPECT_NO_THROW(Segmenter(setup, "left", 10, 10));
+  setup.background_pictures["left"] = "/nonexistent/picture.png";
+  EXPECT_THROW(Segmenter(setup, "left", 10, 10), FileError);
+  std::filesystem::remove(file);
+}
+
+TEST(Segmenter, GivenCleanPictureAndNoisyFrames) {
+  Scene scene;
+  scene.texture = Texture::kClutter;
+  std::mt19937 random(10);
+  auto clean = scene.without_robot();
+  clean.noise_levels = 0;
+  const Image background = clean.picture(random);
+  const auto file = std::filesystem::temp_directory_path() / "bodyschema_segmenter_clean.png";
+  write_overlay_png(file, background, BinaryMask(scene.width, scene.height));
+  auto setup = setup_for(SegmentationMethod::kBackgroundPicture);
+  setup.background_pictures["left"] = file;
+  Segmenter segmenter(setup, "left", scene.width, scene.height);
+  std::filesystem::remove(file);
+  scene.shapes = test::hand(78.3, 62.6);
+  Output out;
+  segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
+  EXPECT_NEAR(segmenter.background().noise_sd, 2.5, 0.4);
+  EXPECT_GT(iou(out.mask, scene.true_mask()), 0.98);
+}
+
+}  // namespace
+}  // namespace bodyschema
