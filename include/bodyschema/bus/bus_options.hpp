@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+
+#include "bodyschema/bus/messages.hpp"
+#include "bodyschema/bus/synchroniser.hpp"
+#include "bodyschema/core/configuration.hpp"
+
+namespace bodyschema {
+
+/// Names of the four channels, e.g. ICUB_JOINT_STATE.
+struct Channels {
+  std::string joint_state;     ///< bot_core::joint_state_t, in
+  std::string cameras;         ///< bot_core::images_t, in
+  std::string joint_offsets;   ///< bodyschema::joint_offsets_t, out
+  std::string offsets_status;  ///< bodyschema::offsets_status_t, out
+  static Channels with_prefix(const std::string& prefix);
+};
+
+/// The `bus` section of the configuration; config/bus.yaml explains every key.
+struct BusOptions {
+  std::string channel_prefix = "ICUB";
+  SynchroniserOptions synchroniser;
+  DecodeLimits limits;
+  /// Observations that may wait for the estimator; beyond it the oldest is shed.
+  int queue_frames = 8;
+
+  [[nodiscard]] Channels channels() const { return Channels::with_prefix(channel_prefix); }
+  /// Throws ConfigurationError.
+  static BusOptions from(const Configuration& bus);
+};
+
+}  // namespace bodyschema

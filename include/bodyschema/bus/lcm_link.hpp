@@ -1,0 +1,55 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "bodyschema/bus/message_sink.hpp"
+
+namespace lcm {
+class LCM;
+}
+
+namespace bodyschema {
+
+/// The network all programs use unless told otherwise. A time to live of zero keeps every packet on
+/// this machine.
+inline constexpr const char* kDefaultLcmUrl = "udpm://239.255.76.67:7667?ttl=0";
+
+/// `-l/--lcm-url` when given and not empty, else LCM_DEFAULT_URL, else kDefaultLcmUrl.
+[[nodiscard]] std::string resolve_lcm_url(const std::optional<std::string>& command_line);
+
+/// A connection to LCM: publishes, and hands every message of the subscribed channels to one
+/// function. publish() may be called from any thread; handle() from one.
+class LcmLink : public MessageSink {
+ public:
+  /// @param arrival_us  when the message reached this machine, microseconds since the Unix epoch
+  using Handler = std::function<void(const std::string& channel, Bytes message, std::int64_t arrival_us)>;
+
+  /// Throws DeviceError naming the URL and what to do when the network cannot be used.
+  explicit LcmLink(std::string url);
+  ~LcmLink() override;
+  LcmLink(const LcmLink&) = delete;
+  LcmLink& operator=(const LcmLink&) = delete;
+
+  /// @param channel  a name, not a pattern
+  /// @param queue_messages  messages that may wait between two calls of handle()
+  /// An exception of the handler is caught and logged. Throws DeviceError when LCM refuses, which it
+  /// does when no multicast packet comes back to it.
+  void subscribe(const std::string& channel, int queue_messages, Handler handler);
+  /// Waits for a message and hands it out; false when none came in time.
+  bool handle(int timeout_ms);
+
+  void publish(const std::string& channel, Microseconds time_us, Bytes message) override;
+
+  [[nodiscard]] const std::string& url() const { return url_; }
+
+ private:
+  struct Subscriber;
+  std::string url_;
+  std::unique_ptr<lcm::LCM> lcm_;
+  std::vector<std::unique_ptr<Subscriber>> subscribers_;
+};
+
+}  // namespace bodyschema

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bodyschema/bus/bus_options.hpp"
+#include "bodyschema/camera/stereo_rig.hpp"
+
+namespace bodyschema {
+
+struct BusStatistics {
+  std::uint64_t messages = 0;           ///< on our two input channels
+  std::uint64_t messages_malformed = 0; ///< not used as a whole
+  std::uint64_t images_malformed = 0;   ///< pictures of good messages that could not be used
+  /// Messages and pictures by what was wrong with them.
+  std::array<std::uint64_t, kMessageFaultCount> faults{};
+  SynchroniserStatistics synchroniser;
+
+  /// Every counter of what was not used, e.g. {"malformed.truncated", 3}, {"dropped.overload", 0},
+  /// {"joint_state.out_of_order", 1}; the order is fixed.
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
+};
+
+/// From raw messages to observations: decodes, refuses what is malformed, synchronises. The live
+/// daemon, replay and diagnosis all enter here, so that the same messages in the same order give
+/// the same observations.
+///
+/// What is wrong with a message is counted, and said in the log at once and then at most every five
+/// seconds per kind. receive() never throws on account of a message. One thread.
+class ObservationStream {
+ public:
+  /// @param joint_names  RobotModel order
+  /// @param fixed_rad  values of joints the robot does not publish
+  /// @param cameras  the rig's: one named "left" or "right", or both, left first; pictures of
+  ///        another size are refused. Throws ConfigurationError for other names.
+  ObservationStream(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad,
+                    const std::vector<CameraModel>& cameras, const BusOptions& options);
+
+  /// @param arrival_us  the caller's clock, handed through to ArrivedObservation
+  /// @return whether the channel is one of our inputs
+  bool receive(std::string_view channel, Bytes message, std::int64_t arrival_us = 0);
+  /// The next observation, oldest first. Call until empty after each receive().
+  std::optional<ArrivedObservation> next() { return synchroniser_.next(); }
+  /// End of the recording: settles what waits; next() yields the rest.
+  void finish();
+
+  [[nodiscard]] BusStatistics statistics() const;
+  [[nodiscard]] const Synchroniser& synchroniser() const { return synchroniser_; }
+  [[nodiscard]] const Channels& channels() const { return channels_; }
+  [[nodiscard]] Microseconds newest_image() const { return newest_image_; }
+
+ private:
+  struct CameraFormat {
+    std::string name;
+    int type;  ///< bot_core::images_t
+    int width;
+    int height;
+  };
+  struct Complaint {
+    std::chrono::steady_clock::time_point last{};
+    std::uint64_t held_back = 0;
+  };
+  void receive_joints(Bytes message);
+  void receive_images(Bytes message, std::int64_t arrival_us);
+  void refuse(const std::string& source, const DecodeResult& result);
+  void warn_of_missing_joints();
+  bool may_complain(Complaint& complaint);
+
+  std::vector<CameraFormat> cameras_;
+  BusOptions options_;
+  Channels channels_;
+  Synchroniser synchroniser_;
+  BusStatistics statistics_;
+  JointStateMessage joint_state_;
+  ImagesView images_;
+  Microseconds newest_image_ = -1;
+  std::map<std::pair<std::string, MessageFault>, Complaint> complaints_;
+  Complaint missing_joints_;
+};
+
+}  // namespace bodyschema

@@ -1,0 +1,140 @@
+#include "bodyschema/bus/joint_history.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bodyschema {
+
+namespace {
+constexpr double kShortestStep_s = 0.010;
+}
+
+JointHistory::JointHistory(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad,
+                           const JointHistoryOptions& options)
+    : names_(std::move(joint_names)), options_(options), rings_(names_.size()) {
+  for (std::size_t j = 0; j < names_.size(); ++j) {
+    index_[names_[j]] = static_cast<Eigen::Index>(j);
+    Ring& ring = rings_[j];
+    ring.buffer.resize(static_cast<std::size_t>(std::max(options_.samples, 2)));
+    if (const auto fixed = fixed_rad.find(names_[j]); fixed != fixed_rad.end()) {
+      ring.is_fixed = true;
+      ring.fixed_rad = fixed->second;
+    }
+  }
+}
+
+void JointHistory::Ring::push(const Sample& sample) {
+  buffer[(first + count) % buffer.size()] = sample;
+  if (count < buffer.size()) {
+    ++count;
+  } else {
+    first = (first + 1) % buffer.size();
+  }
+}
+
+void JointHistory::map_names(const std::vector<std::string>& names) {
+  if (names == mapped_names_) return;
+  mapped_names_ = names;
+  mapping_.assign(names.size(), -1);
+  std::vector<bool> seen(names_.size(), false);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto known = index_.find(names[i]);
+    if (known == index_.end() || seen[static_cast<std::size_t>(known->second)]) continue;
+    seen[static_cast<std::size_t>(known->second)] = true;  // the first of a repeated name counts
+    mapping_[i] = known->second;
+  }
+}
+
+JointHistory::Arrival JointHistory::add(const JointStateMessage& message) {
+  map_names(message.names);
+  bool any = false;
+  Microseconds last = -1;
+  for (const Eigen::Index j : mapping_) {
+    if (j < 0) continue;
+    any = true;
+    last = std::max(last, newest(j));
+  }
+  if (!any) return Arrival::kNoKnownJoint;
+  if (message.utime <= last) return message.utime == last ? Arrival::kDuplicate : Arrival::kOlder;
+  for (std::size_t i = 0; i < mapping_.size(); ++i) {
+    if (mapping_[i] < 0) continue;
+    rings_[static_cast<std::size_t>(mapping_[i])].push(
+        {message.utime, static_cast<double>(message.position_rad[i]), static_cast<double>(message.velocity_rad_s[i])});
+  }
+  newest_ = std::max(newest_, message.utime);
+  return Arrival::kFresh;
+}
+
+JointHistory::Verdict JointHistory::interpolate(const Ring& ring, Microseconds utime, double& q, double& qdot) const {
+  if (ring.count == 0) {
+    q = ring.fixed_rad;
+    qdot = 0.0;
+    return ring.is_fixed ? Verdict::kReady : Verdict::kNotYet;
+  }
+  if (ring.at(ring.count - 1).utime < utime) return Verdict::kNotYet;
+  if (ring.at(0).utime > utime) return Verdict::kTooOld;
+  // The first sample at or after the instant.
+  std::size_t low = 0;
+  std::size_t high = ring.count - 1;
+  while (low < high) {
+    const std::size_t middle = (low + high) / 2;
+    if (ring.at(middle).utime < utime) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  const Sample& after = ring.at(low);
+  const Sample& before = ring.at(low > 0 ? low - 1 : low);
+  const double step_s = seconds(after.utime - before.utime);
+  const bool gap = after.utime - before.utime > options_.max_gap;
+  const bool jump = std::abs(after.q - before.q) > options_.max_speed_rad_s * std::max(step_s, kShortestStep_s);
+  q = after.q;
+  qdot = after.qdot;
+  if (after.utime != utime) {
+    if (gap) return Verdict::kGap;
+    if (jump) return Verdict::kJump;
+    const double share = seconds(utime - before.utime) / step_s;
+    q = before.q + share * (after.q - before.q);
+    qdot = before.qdot + share * (after.qdot - before.qdot);
+  }
+  if (options_.velocity_from_differences) {
+    qdot = gap || jump || step_s == 0.0 ? 0.0 : (after.q - before.q) / step_s;
+  }
+  return Verdict::kReady;
+}
+
+JointHistory::Answer JointHistory::interpolate(Microseconds utime, JointSample& out) const {
+  const auto n = static_cast<Eigen::Index>(rings_.size());
+  out.utime = utime;
+  out.q.resize(n);
+  out.qdot.resize(n);
+  Answer answer;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Verdict verdict = interpolate(rings_[static_cast<std::size_t>(j)], utime, out.q[j], out.qdot[j]);
+    if (verdict == Verdict::kReady) continue;
+    if (verdict != Verdict::kNotYet) return {verdict, j};  // waiting will not mend it
+    if (answer.verdict == Verdict::kReady) answer = {verdict, j};
+  }
+  return answer;
+}
+
+void JointHistory::clear() {
+  for (Ring& ring : rings_) ring.count = ring.first = 0;
+  newest_ = -1;
+}
+
+Microseconds JointHistory::newest(Eigen::Index joint) const {
+  const Ring& ring = rings_[static_cast<std::size_t>(joint)];
+  return ring.count == 0 ? -1 : ring.at(ring.count - 1).utime;
+}
+
+std::vector<std::string> JointHistory::missing_joints() const {
+  std::vector<std::string> missing;
+  for (std::size_t j = 0; j < rings_.size(); ++j) {
+    if (rings_[j].count == 0 && !rings_[j].is_fixed) missing.push_back(names_[j]);
+  }
+  return missing;
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,70 @@
+#include "bodyschema/bus/lcm_link.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <cstdlib>
+#include <lcm/lcm-cpp.hpp>
+
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+
+namespace {
+std::string network_advice(const std::string& url) {
+  return url.rfind("udpm", 0) == 0
+             ? "; is there a route for multicast? (ip link set lo multicast on; "
+               "ip route add 224.0.0.0/4 dev lo)"
+             : "";
+}
+}  // namespace
+
+struct LcmLink::Subscriber {
+  Handler handler;
+  /// Called by C code: nothing may be thrown out of it.
+  void receive(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+    try {
+      handler(channel, Bytes(static_cast<const std::uint8_t*>(buffer->data), buffer->data_size), buffer->recv_utime);
+    } catch (const std::exception& e) {
+      spdlog::error("{}: message could not be handled: {}", channel, e.what());
+    } catch (...) {
+      spdlog::error("{}: message could not be handled", channel);
+    }
+  }
+};
+
+std::string resolve_lcm_url(const std::optional<std::string>& command_line) {
+  if (command_line && !command_line->empty()) return *command_line;
+  const char* from_environment = std::getenv("LCM_DEFAULT_URL");
+  return from_environment != nullptr && *from_environment != '\0' ? from_environment : kDefaultLcmUrl;
+}
+
+LcmLink::LcmLink(std::string url) : url_(std::move(url)), lcm_(std::make_unique<lcm::LCM>(url_)) {
+  if (!lcm_->good()) throw DeviceError("LCM cannot use '" + url_ + "'" + network_advice(url_));
+}
+
+LcmLink::~LcmLink() = default;
+
+void LcmLink::subscribe(const std::string& channel, int queue_messages, Handler handler) {
+  auto subscriber = std::make_unique<Subscriber>(Subscriber{std::move(handler)});
+  // LCM takes a pattern; ours are names of letters, digits, '_' and '-', which stand for themselves.
+  lcm::Subscription* subscription = lcm_->subscribe(channel, &Subscriber::receive, subscriber.get());
+  if (subscription == nullptr) {
+    throw DeviceError("LCM cannot receive on '" + url_ + "'" + network_advice(url_));
+  }
+  subscription->setQueueCapacity(queue_messages);
+  subscribers_.push_back(std::move(subscriber));
+}
+
+bool LcmLink::handle(int timeout_ms) {
+  const int result = lcm_->handleTimeout(timeout_ms);
+  if (result < 0) throw DeviceError("LCM stopped receiving on '" + url_ + "'");
+  return result > 0;
+}
+
+void LcmLink::publish(const std::string& channel, Microseconds /*time_us*/, Bytes message) {
+  if (lcm_->publish(channel, message.data(), static_cast<unsigned int>(message.size())) != 0) {
+    throw DeviceError("LCM cannot send on '" + url_ + "', channel " + channel);
+  }
+}
+
+}  // namespace bodyschema

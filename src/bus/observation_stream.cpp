@@ -1,0 +1,150 @@
+#include "bodyschema/bus/observation_stream.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+
+namespace {
+constexpr std::chrono::seconds kQuietTime{5};
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> BusStatistics::counters() const {
+  std::vector<std::pair<std::string, std::uint64_t>> list;
+  for (std::size_t i = 1; i < kMessageFaultCount; ++i) {
+    list.emplace_back("malformed." + std::string(name_of(static_cast<MessageFault>(i))), faults[i]);
+  }
+  for (std::size_t i = 0; i < kDropReasonCount; ++i) {
+    list.emplace_back("dropped." + std::string(name_of(static_cast<DropReason>(i))), synchroniser.images_dropped[i]);
+  }
+  list.emplace_back("joint_state.duplicate", synchroniser.joint_messages_duplicate);
+  list.emplace_back("joint_state.out_of_order", synchroniser.joint_messages_out_of_order);
+  list.emplace_back("joint_state.no_known_joint", synchroniser.joint_messages_without_known_joint);
+  list.emplace_back("clock_steps", synchroniser.clock_steps);
+  return list;
+}
+
+ObservationStream::ObservationStream(std::vector<std::string> joint_names,
+                                     const std::map<std::string, double>& fixed_rad,
+                                     const std::vector<CameraModel>& cameras, const BusOptions& options)
+    : options_(options),
+      channels_(options.channels()),
+      synchroniser_(std::move(joint_names), fixed_rad, static_cast<int>(cameras.size()), options.synchroniser) {
+  for (const CameraModel& camera : cameras) {
+    const bool left = camera.name == "left";
+    if ((!left && camera.name != "right") || cameras.size() > 2 || (!cameras_.empty() && left)) {
+      throw ConfigurationError("cameras: '" + camera.name + "': a rig is one camera named left or right, or both, left first");
+    }
+    cameras_.push_back({camera.name, left ? bot_core::images_t::LEFT : bot_core::images_t::RIGHT,
+                        camera.intrinsics.width, camera.intrinsics.height});
+  }
+}
+
+bool ObservationStream::receive(std::string_view channel, Bytes message, std::int64_t arrival_us) {
+  if (channel == channels_.joint_state) {
+    ++statistics_.messages;
+    receive_joints(message);
+    return true;
+  }
+  if (channel == channels_.cameras) {
+    ++statistics_.messages;
+    receive_images(message, arrival_us);
+    return true;
+  }
+  return false;
+}
+
+void ObservationStream::receive_joints(Bytes message) {
+  const DecodeResult result = decode(message, joint_state_, options_.limits);
+  if (!result.ok()) {
+    ++statistics_.messages_malformed;
+    return refuse(channels_.joint_state, result);
+  }
+  synchroniser_.add(joint_state_);
+}
+
+void ObservationStream::receive_images(Bytes message, std::int64_t arrival_us) {
+  const DecodeResult result = decode(message, images_, options_.limits);
+  if (!result.ok()) {
+    ++statistics_.messages_malformed;
+    return refuse(channels_.cameras, result);
+  }
+  std::vector<StampedImage> images;
+  for (const ImageView& view : images_.images) {
+    for (std::size_t c = 0; c < cameras_.size(); ++c) {
+      const CameraFormat& camera = cameras_[c];
+      if (view.type != camera.type) continue;
+      StampedImage image;
+      DecodeResult unpacked;
+      if (view.width != camera.width || view.height != camera.height) {
+        unpacked = {MessageFault::kWrongSize,
+                    "picture of " + std::to_string(view.width) + "x" + std::to_string(view.height) +
+                        ", configured are " + std::to_string(camera.width) + "x" + std::to_string(camera.height)};
+      } else {
+        unpacked = unpack(view, image.image, options_.limits);
+      }
+      if (!unpacked.ok()) {
+        ++statistics_.images_malformed;
+        refuse(channels_.cameras + " " + camera.name, unpacked);
+        continue;
+      }
+      image.camera = static_cast<int>(c);
+      image.utime = view.utime;
+      image.arrival_us = arrival_us;
+      newest_image_ = view.utime;
+      images.push_back(std::move(image));
+    }
+  }
+  const std::uint64_t missing_before = synchroniser_.statistics().dropped(DropReason::kMissingJoint);
+  synchroniser_.add(std::move(images));
+  if (synchroniser_.statistics().dropped(DropReason::kMissingJoint) > missing_before) warn_of_missing_joints();
+}
+
+void ObservationStream::finish() {
+  const std::uint64_t missing_before = synchroniser_.statistics().dropped(DropReason::kMissingJoint);
+  synchroniser_.finish();
+  if (synchroniser_.statistics().dropped(DropReason::kMissingJoint) > missing_before) warn_of_missing_joints();
+}
+
+BusStatistics ObservationStream::statistics() const {
+  BusStatistics statistics = statistics_;
+  statistics.synchroniser = synchroniser_.statistics();
+  return statistics;
+}
+
+bool ObservationStream::may_complain(Complaint& complaint) {
+  const auto now = std::chrono::steady_clock::now();
+  if (complaint.last != std::chrono::steady_clock::time_point{} && now - complaint.last < kQuietTime) {
+    ++complaint.held_back;
+    return false;
+  }
+  complaint.last = now;
+  return true;
+}
+
+void ObservationStream::refuse(const std::string& source, const DecodeResult& result) {
+  ++statistics_.faults[static_cast<std::size_t>(result.fault)];
+  Complaint& complaint = complaints_[{source, result.fault}];
+  if (!may_complain(complaint)) return;
+  spdlog::warn("{}: skipped, {}: {}{}", source, name_of(result.fault), result.detail,
+               complaint.held_back > 0 ? " (and " + std::to_string(complaint.held_back) + " more like it)" : "");
+  complaint.held_back = 0;
+}
+
+void ObservationStream::warn_of_missing_joints() {
+  if (!may_complain(missing_joints_)) return;
+  const auto& joints = synchroniser_.joints();
+  const auto never = joints.missing_joints();
+  if (!never.empty()) {
+    std::string list;
+    for (const std::string& name : never) list += (list.empty() ? "" : ", ") + name;
+    spdlog::warn("{}: no reading of {}; publish it or give it a value under robot.fixed_joints_deg",
+                 channels_.joint_state, list);
+  } else if (const auto joint = synchroniser_.statistics().blocking_joint; joint >= 0) {
+    spdlog::warn("{}: readings of {} have stopped", channels_.joint_state,
+                 joints.joint_names()[static_cast<std::size_t>(joint)]);
+  }
+}
+
+}  // namespace bodyschema

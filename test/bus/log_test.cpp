@@ -1,0 +1,257 @@
+#include "bodyschema/bus/log.hpp"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <lcm/lcm-cpp.hpp>
+#include <random>
+
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+namespace {
+
+using Content = std::vector<std::uint8_t>;
+
+class LogFiles : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    directory_ = std::filesystem::temp_directory_path() / ("bodyschema_log_" + std::to_string(getpid()));
+    std::filesystem::create_directories(directory_);
+    file_ = directory_ / "a.log";
+  }
+  void TearDown() override { std::filesystem::remove_all(directory_); }
+
+  static Content content(int i) {
+    Content bytes(static_cast<std::size_t>(i * 7 % 50));
+    for (std::size_t k = 0; k < bytes.size(); ++k) bytes[k] = static_cast<std::uint8_t>(i + static_cast<int>(k));
+    return bytes;
+  }
+  void write_log(int events) {
+    LogWriter writer(file_);
+    for (int i = 0; i < events; ++i) writer.publish(i % 2 == 0 ? "EVEN" : "ODD_CHANNEL", 1000 + i, content(i));
+  }
+  Content slurp() const {
+    std::ifstream in(file_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  void spit(const Content& bytes) const {
+    std::ofstream(file_, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()),
+                                                 static_cast<std::streamsize>(bytes.size()));
+  }
+  /// Every event that can be read; checks that each is one that was written.
+  std::vector<std::int64_t> readable() const {
+    LogReader reader(file_);
+    LogEvent event;
+    std::vector<std::int64_t> numbers;
+    while (reader.next(event)) {
+      const int i = static_cast<int>(event.number);
+      EXPECT_EQ(event.data, content(i));
+      EXPECT_EQ(event.time_us, 1000 + i);
+      EXPECT_EQ(event.channel, i % 2 == 0 ? "EVEN" : "ODD_CHANNEL");
+      numbers.push_back(event.number);
+    }
+    EXPECT_EQ(reader.position(), reader.size());
+    return numbers;
+  }
+  static std::string error_of(const std::filesystem::path& file) {
+    try {
+      LogReader reader(file);
+    } catch (const FileError& e) {
+      return e.what();
+    }
+    return "";
+  }
+  std::filesystem::path directory_;
+  std::filesystem::path file_;
+};
+
+TEST_F(LogFiles, ComeBackWhole) {
+  write_log(100);
+  EXPECT_EQ(readable().size(), 100u);
+  LogReader reader(file_);
+  LogEvent event;
+  while (reader.next(event)) {
+  }
+  EXPECT_EQ(reader.damaged_places(), 0u);
+}
+
+TEST_F(LogFiles, AreReadByLcmsOwnReader) {
+  write_log(20);
+  lcm::LogFile log(file_, "r");
+  ASSERT_TRUE(log.good());
+  for (int i = 0; i < 20; ++i) {
+    const lcm::LogEvent* event = log.readNextEvent();
+    ASSERT_NE(event, nullptr) << i;
+    EXPECT_EQ(event->eventnum, i);
+    EXPECT_EQ(event->timestamp, 1000 + i);
+    EXPECT_EQ(event->channel, i % 2 == 0 ? "EVEN" : "ODD_CHANNEL");
+    const auto* data = static_cast<const std::uint8_t*>(event->data);
+    EXPECT_EQ(Content(data, data + event->datalen), content(i));
+  }
+  EXPECT_EQ(log.readNextEvent(), nullptr);
+}
+
+TEST_F(LogFiles, OfLcmsOwnWriterAreRead) {
+  {
+    lcm::LogFile log(file_, "w");
+    for (int i = 0; i < 20; ++i) {
+      auto bytes = content(i);
+      lcm::LogEvent event{};
+      event.timestamp = 1000 + i;
+      event.channel = i % 2 == 0 ? "EVEN" : "ODD_CHANNEL";
+      event.datalen = static_cast<std::int32_t>(bytes.size());
+      event.data = bytes.data();
+      ASSERT_EQ(log.writeEvent(&event), 0);
+    }
+  }
+  EXPECT_EQ(readable().size(), 20u);
+}
+
+TEST_F(LogFiles, CutAnywhereKeepTheirWholeEvents) {
+  write_log(12);
+  const Content whole = slurp();
+  std::vector<std::size_t> ends;  // of events
+  {
+    LogReader reader(file_);
+    LogEvent event;
+    while (reader.next(event)) ends.push_back(reader.position());
+  }
+  for (std::size_t n = ends[0]; n < whole.size(); ++n) {
+    spit(Content(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n)));
+    const auto expected = static_cast<std::size_t>(std::count_if(ends.begin(), ends.end(), [&](auto e) { return e <= n; }));
+    EXPECT_EQ(readable().size(), expected) << "cut at " << n;
+  }
+}
+
+TEST_F(LogFiles, DamagedAnywhereLoseAtMostThreeEvents) {
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  write_log(30);
+  const Content whole = slurp();
+  for (int round = 0; round < 300; ++round) {
+    Content damaged = whole;
+    // Ten bytes in a row overwritten: at most two events hit, and the one before them, whose end
+    // can no longer be verified. A byte of content alone cannot be noticed by this format.
+    const std::size_t at = random() % (whole.size() - 10);
+    for (std::size_t i = 0; i < 10; ++i) damaged[at + i] = static_cast<std::uint8_t>(random());
+    spit(damaged);
+    LogReader reader(file_);
+    LogEvent event;
+    std::size_t n = 0;
+    while (reader.next(event)) ++n;
+    EXPECT_GE(n, 27u) << "at " << at;
+    EXPECT_LE(n, 30u);
+    EXPECT_EQ(reader.position(), reader.size());
+  }
+}
+
+TEST_F(LogFiles, DamageIsCounted) {
+  write_log(10);
+  Content bytes = slurp();
+  std::size_t end_of_third = 0;
+  {
+    LogReader reader(file_);
+    LogEvent event;
+    for (int i = 0; i < 3; ++i) reader.next(event);
+    end_of_third = reader.position();
+  }
+  bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(end_of_third), 1000, 0xED);
+  spit(bytes);
+  LogReader reader(file_);
+  LogEvent event;
+  std::size_t n = 0;
+  while (reader.next(event)) ++n;
+  EXPECT_GE(n, 9u);
+  EXPECT_EQ(reader.damaged_places(), 1u);
+  EXPECT_GE(reader.skipped_bytes(), 1000u);
+}
+
+TEST_F(LogFiles, WithAHugeLengthDoNotTakeMemory) {
+  write_log(3);
+  Content bytes = slurp();
+  bytes[24] = 0x7f;  // data length of the first event becomes two gigabytes
+  spit(bytes);
+  EXPECT_EQ(readable().size(), 2u);
+}
+
+TEST_F(LogFiles, ThatAreNotLogsAreRefused) {
+  EXPECT_NE(error_of(directory_ / "missing.log").find("no such log file"), std::string::npos);
+  EXPECT_NE(error_of(directory_).find("not a file"), std::string::npos);
+  spit({});
+  EXPECT_NE(error_of(file_).find("is empty"), std::string::npos);
+  const std::string text(5000, 'x');
+  spit(Content(text.begin(), text.end()));
+  EXPECT_NE(error_of(file_).find("expected an LCM log"), std::string::npos);
+  EXPECT_NE(error_of(file_).find(file_.string()), std::string::npos);
+}
+
+TEST_F(LogFiles, OfAKilledWriterHoldEveryPublishedEvent) {
+  int pipe_ends[2];
+  ASSERT_EQ(pipe(pipe_ends), 0);
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    LogWriter writer(file_);
+    for (int i = 0;; ++i) {
+      writer.publish(i % 2 == 0 ? "EVEN" : "ODD_CHANNEL", 1000 + i, content(i));
+      [[maybe_unused]] const auto n = write(pipe_ends[1], &i, sizeof i);
+    }
+  }
+  int last = -1;
+  while (last < 50) ASSERT_EQ(read(pipe_ends[0], &last, sizeof last), static_cast<ssize_t>(sizeof last));
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  close(pipe_ends[1]);
+  for (int i = 0; read(pipe_ends[0], &i, sizeof i) == static_cast<ssize_t>(sizeof i);) last = i;
+  close(pipe_ends[0]);
+  EXPECT_GE(readable().size(), static_cast<std::size_t>(last + 1));
+}
+
+TEST_F(LogFiles, OnAFullDiskEndWithAWholeEvent) {
+  // A limit on the file's size stands for the disk: the write is cut short the same way.
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{1000, 1000};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    LogWriter writer(file_);
+    int failures = 0;
+    for (int i = 0; i < 100; ++i) {
+      try {
+        writer.publish(i % 2 == 0 ? "EVEN" : "ODD_CHANNEL", 1000 + i, content(i));
+      } catch (const DeviceError& e) {
+        ++failures;
+        if (std::string(e.what()).find(file_.string()) == std::string::npos) _exit(2);
+      }
+    }
+    _exit(failures > 0 && writer.bytes_written() <= 1000 ? 0 : 1);
+  }
+  int status = -1;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  LogReader reader(file_);
+  LogEvent event;
+  int n = 0;
+  while (reader.next(event)) ++n;
+  EXPECT_GT(n, 5);
+  EXPECT_EQ(reader.damaged_places(), 0u);
+}
+
+TEST_F(LogFiles, ThatCannotBeCreatedAreRefused) {
+  EXPECT_THROW(LogWriter(directory_ / "no" / "such" / "folder.log"), FileError);
+  LogWriter writer(file_);
+  EXPECT_THROW(writer.publish("", 0, {}), DataError);
+  EXPECT_THROW(writer.publish(std::string(64, 'A'), 0, {}), DataError);
+  EXPECT_EQ(writer.events_written(), 0);
+}
+
+}  // namespace
+}  // namespace bodyschema

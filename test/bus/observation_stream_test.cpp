@@ -1,0 +1,183 @@
+#include "bodyschema/bus/observation_stream.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "bodyschema/bus/lcm_link.hpp"
+#include "bodyschema/bus/observation_queue.hpp"
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr Microseconds kMs = 1000;
+
+std::vector<CameraModel> rig() {
+  std::vector<CameraModel> cameras(2);
+  cameras[0].name = "left";
+  cameras[1].name = "right";
+  for (auto& camera : cameras) camera.intrinsics = {8, 6, 10.0, 10.0, 3.5, 2.5};
+  return cameras;
+}
+
+bot_core::joint_state_t arm(Microseconds utime, float q) {
+  bot_core::joint_state_t m;
+  m.utime = utime;
+  m.num_joints = 1;
+  m.joint_name = {"arm"};
+  m.joint_position = {q};
+  m.joint_velocity = {0.0F};
+  m.joint_effort = {0.0F};
+  return m;
+}
+
+bot_core::images_t pictures(Microseconds utime, Image left = Image(8, 6, 3), Image right = Image(8, 6, 1)) {
+  bot_core::images_t m;
+  m.utime = utime;
+  m.n_images = 3;
+  m.image_types = {2, bot_core::images_t::LEFT, bot_core::images_t::RIGHT};
+  m.images = {to_message(Image(100, 1, 1), utime), to_message(left, utime), to_message(right, utime)};
+  return m;
+}
+
+TEST(ObservationStream, TurnsMessagesIntoObservations) {
+  ObservationStream stream({"arm"}, {}, rig(), {});
+  EXPECT_FALSE(stream.receive("ICUB_JOINT_OFFSETS", {}));
+  for (int i = 0; i < 10; ++i) EXPECT_TRUE(stream.receive("ICUB_JOINT_STATE", encode(arm(10 * i * kMs, 0.5F))));
+  EXPECT_TRUE(stream.receive("ICUB_CAMERAS", encode(pictures(45 * kMs)), 77));
+  const auto arrived = stream.next();
+  ASSERT_TRUE(arrived);
+  EXPECT_EQ(arrived->arrival_us, 77);
+  ASSERT_TRUE(arrived->observation.cameras[0] && arrived->observation.cameras[1]);
+  EXPECT_EQ(arrived->observation.cameras[0]->image.channels, 3);
+  EXPECT_EQ(arrived->observation.cameras[1]->image.channels, 1);
+  EXPECT_EQ(stream.statistics().messages, 11u);
+  for (const auto& [name, count] : stream.statistics().counters()) EXPECT_EQ(count, 0u) << name;
+}
+
+TEST(ObservationStream, CountsAndSkipsWhatIsMalformed) {
+  ObservationStream stream({"arm"}, {}, rig(), {});
+  auto nan = arm(0, std::nanf(""));
+  stream.receive("ICUB_JOINT_STATE", encode(nan));
+  stream.receive("ICUB_JOINT_STATE", {});
+  auto cut = encode(pictures(5 * kMs));
+  cut.resize(cut.size() / 2);
+  stream.receive("ICUB_CAMERAS", cut);
+  for (int i = 0; i < 10; ++i) stream.receive("ICUB_JOINT_STATE", encode(arm(10 * i * kMs, 0.5F)));
+  // A picture of another size is refused by itself; its partner goes on alone.
+  stream.receive("ICUB_CAMERAS", encode(pictures(5 * kMs, Image(9, 6, 3))));
+  stream.finish();
+  const auto arrived = stream.next();
+  ASSERT_TRUE(arrived);
+  EXPECT_FALSE(arrived->observation.cameras[0]);
+  EXPECT_TRUE(arrived->observation.cameras[1]);
+  const auto statistics = stream.statistics();
+  EXPECT_EQ(statistics.messages_malformed, 3u);
+  EXPECT_EQ(statistics.images_malformed, 1u);
+  EXPECT_EQ(statistics.faults[static_cast<std::size_t>(MessageFault::kNotFinite)], 1u);
+  EXPECT_EQ(statistics.faults[static_cast<std::size_t>(MessageFault::kTruncated)], 2u);
+  EXPECT_EQ(statistics.faults[static_cast<std::size_t>(MessageFault::kWrongSize)], 1u);
+  std::uint64_t all = 0;
+  for (const auto& [name, count] : statistics.counters()) all += count;
+  EXPECT_EQ(all, 4u);
+}
+
+TEST(ObservationStream, RefusesARigItCannotServe) {
+  auto swapped = rig();
+  std::swap(swapped[0], swapped[1]);
+  EXPECT_THROW(ObservationStream({"arm"}, {}, swapped, {}), ConfigurationError);
+  auto odd = rig();
+  odd[1].name = "middle";
+  EXPECT_THROW(ObservationStream({"arm"}, {}, odd, {}), ConfigurationError);
+}
+
+TEST(ObservationStream, ServesAMonoRigOfTheRightCamera) {
+  ObservationStream stream({"arm"}, {{"arm", 0.25}}, {rig()[1]}, {});
+  stream.receive("ICUB_CAMERAS", encode(pictures(45 * kMs)));
+  const auto arrived = stream.next();
+  ASSERT_TRUE(arrived);
+  ASSERT_EQ(arrived->observation.cameras.size(), 1u);
+  EXPECT_EQ(arrived->observation.cameras[0]->image.channels, 1);
+}
+
+TEST(BusOptions, ReadTheirSectionAndRefuseNonsense) {
+  const auto configuration = Configuration::parse("bus: {channel_prefix: ROBOT, pairing_window_ms: 20, joint_velocity: differences}");
+  const BusOptions options = BusOptions::from(configuration.section("bus"));
+  EXPECT_EQ(options.channels().cameras, "ROBOT_CAMERAS");
+  EXPECT_EQ(options.synchroniser.pairing_window, 20 * kMs);
+  EXPECT_TRUE(options.synchroniser.joints.velocity_from_differences);
+  EXPECT_NO_THROW(configuration.reject_unknown_keys());
+  for (const char* bad : {"bus: {channel_prefix: 'A.*'}", "bus: {channel_prefix: ''}", "bus: {pairing_window_ms: -1}",
+                          "bus: {joint_velocity: guessed}", "bus: {queue_frames: 0}"}) {
+    EXPECT_THROW(BusOptions::from(Configuration::parse(bad).section("bus")), ConfigurationError) << bad;
+  }
+}
+
+TEST(BusOptions, ShippedFileHoldsTheDefaultsAndOnlyKnownKeys) {
+  const auto configuration = Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/bus.yaml");
+  const BusOptions options = BusOptions::from(configuration.section("bus"));
+  EXPECT_NO_THROW(configuration.reject_unknown_keys());
+  const BusOptions defaults;
+  EXPECT_EQ(options.channel_prefix, defaults.channel_prefix);
+  EXPECT_EQ(options.synchroniser.pairing_window, defaults.synchroniser.pairing_window);
+  EXPECT_EQ(options.synchroniser.encoder_wait, defaults.synchroniser.encoder_wait);
+  EXPECT_NEAR(options.synchroniser.joints.max_speed_rad_s, defaults.synchroniser.joints.max_speed_rad_s, 0.01);
+}
+
+TEST(LcmUrl, ComesFromCommandLineThenEnvironmentThenDefault) {
+  unsetenv("LCM_DEFAULT_URL");
+  EXPECT_EQ(resolve_lcm_url(std::nullopt), "udpm://239.255.76.67:7667?ttl=0");
+  EXPECT_EQ(resolve_lcm_url(""), kDefaultLcmUrl);
+  setenv("LCM_DEFAULT_URL", "memq://", 1);
+  EXPECT_EQ(resolve_lcm_url(std::nullopt), "memq://");
+  EXPECT_EQ(resolve_lcm_url("udpm://239.1.1.1:1?ttl=0"), "udpm://239.1.1.1:1?ttl=0");
+  unsetenv("LCM_DEFAULT_URL");
+}
+
+TEST(LcmLink, CarriesMessagesAndSurvivesAHandlerThatThrows) {
+  LcmLink link("memq://");
+  std::vector<std::string> received;
+  link.subscribe("ICUB_JOINT_STATE", 10, [&](const std::string& channel, Bytes message, std::int64_t) {
+    JointStateMessage out;
+    ASSERT_TRUE(decode(message, out).ok());
+    received.push_back(channel + std::to_string(out.utime));
+    throw std::runtime_error("a handler's own trouble");
+  });
+  link.publish_message("ICUB_JOINT_STATE", 0, arm(11, 0.5F));
+  link.publish_message("ICUB_JOINT_STATE_2", 0, arm(12, 0.5F));
+  link.publish_message("ICUB_JOINT_STATE", 0, arm(13, 0.5F));
+  while (link.handle(50)) {
+  }
+  EXPECT_THAT(received, testing::ElementsAre("ICUB_JOINT_STATE11", "ICUB_JOINT_STATE13"));
+}
+
+TEST(LcmLink, NamesAUrlItCannotUse) {
+  try {
+    LcmLink link("nonsense://here");
+    FAIL();
+  } catch (const DeviceError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("nonsense://here"));
+  }
+}
+
+TEST(ObservationQueue, ShedsTheOldestWhenFull) {
+  ObservationQueue queue(2);
+  for (int i = 0; i < 5; ++i) {
+    ArrivedObservation arrived;
+    arrived.observation.utime = i;
+    queue.push(std::move(arrived));
+  }
+  EXPECT_EQ(queue.shed(), 3u);
+  EXPECT_EQ(queue.pop(std::chrono::milliseconds(0))->observation.utime, 3);
+  EXPECT_EQ(queue.pop(std::chrono::milliseconds(0))->observation.utime, 4);
+  EXPECT_FALSE(queue.pop(std::chrono::milliseconds(1)));
+  queue.close();
+  EXPECT_FALSE(queue.pop(std::chrono::hours(1)));
+}
+
+}  // namespace
+}  // namespace bodyschema

@@ -1,0 +1,496 @@
+#include "bodyschema/bus/synchroniser.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+namespace bodyschema {
+namespace {
+
+using ::testing::ElementsAre;
+
+constexpr Microseconds kMs = 1000;
+
+JointStateMessage joints(Microseconds utime, std::vector<std::pair<std::string, float>> values, float velocity = 0.0F) {
+  JointStateMessage m;
+  m.utime = utime;
+  for (const auto& [name, value] : values) {
+    m.names.push_back(name);
+    m.position_rad.push_back(value);
+    m.velocity_rad_s.push_back(velocity);
+  }
+  return m;
+}
+
+StampedImage image(int camera, Microseconds utime) {
+  StampedImage stamped;
+  stamped.camera = camera;
+  stamped.utime = utime;
+  stamped.image = Image(2, 2, 1);
+  stamped.arrival_us = utime + 1;
+  return stamped;
+}
+
+/// A synchroniser of two joints, fed with encoders that move steadily: arm = 1 rad/s, neck = -0.5.
+class SynchroniserTest : public ::testing::Test {
+ protected:
+  void make(int cameras = 2, SynchroniserOptions options = {}, std::map<std::string, double> fixed = {}) {
+    sync_.emplace(std::vector<std::string>{"arm", "neck"}, fixed, cameras, options);
+  }
+  void encoders(Microseconds from, Microseconds to, Microseconds step = 10 * kMs) {
+    for (Microseconds t = from; t <= to; t += step) {
+      sync_->add(joints(t, {{"neck", static_cast<float>(-0.5 * seconds(t))}, {"arm", static_cast<float>(seconds(t))}}));
+    }
+  }
+  void picture(int camera, Microseconds utime) {
+    std::vector<StampedImage> list;
+    list.push_back(image(camera, utime));
+    sync_->add(std::move(list));
+  }
+  void pair(Microseconds left, Microseconds right) {
+    std::vector<StampedImage> list;
+    list.push_back(image(0, left));
+    list.push_back(image(1, right));
+    sync_->add(std::move(list));
+  }
+  /// What has come out since the last call: stamps of left and right in ms, -1 where missing.
+  std::vector<std::pair<Microseconds, Microseconds>> out() {
+    std::vector<std::pair<Microseconds, Microseconds>> stamps;
+    while (auto arrived = sync_->next()) {
+      const auto& cameras = arrived->observation.cameras;
+      const auto stamp = [&](std::size_t c) {
+        return c < cameras.size() && cameras[c] ? cameras[c]->utime / kMs : Microseconds{-1};
+      };
+      stamps.emplace_back(stamp(0), stamp(1));
+      EXPECT_EQ(arrived->observation.utime, kMs * (stamp(0) >= 0 ? stamp(0) : stamp(1)));
+      for (const auto& camera : cameras) {
+        if (!camera) continue;
+        EXPECT_EQ(camera->joints.utime, camera->utime);
+        EXPECT_EQ(camera->image.width, 2);
+      }
+    }
+    return stamps;
+  }
+  void expect_every_image_accounted_for() {
+    const auto& s = sync_->statistics();
+    EXPECT_EQ(s.images, s.images_used + s.total_dropped() + sync_->waiting_images());
+  }
+  std::uint64_t dropped(DropReason reason) const { return sync_->statistics().dropped(reason); }
+  void TearDown() override {
+    if (sync_) expect_every_image_accounted_for();
+  }
+  std::optional<Synchroniser> sync_;
+};
+
+TEST_F(SynchroniserTest, InterpolatesEncodersToEachPicturesStamp) {
+  make();
+  encoders(0, 100 * kMs);
+  pair(33 * kMs, 45 * kMs);
+  const auto arrived = sync_->next();
+  ASSERT_TRUE(arrived);
+  EXPECT_EQ(arrived->arrival_us, 45 * kMs + 1);
+  const auto& cameras = arrived->observation.cameras;
+  ASSERT_TRUE(cameras[0] && cameras[1]);
+  EXPECT_NEAR(cameras[0]->joints.q[0], 0.033, 1e-8);
+  EXPECT_NEAR(cameras[0]->joints.q[1], -0.0165, 1e-8);
+  EXPECT_NEAR(cameras[1]->joints.q[0], 0.045, 1e-8);
+  EXPECT_EQ(cameras[0]->joints.qdot[0], 0.0);  // as published
+}
+
+TEST_F(SynchroniserTest, VelocityIsPublishedOrFromDifferences) {
+  for (const bool differences : {false, true}) {
+    SynchroniserOptions options;
+    options.joints.velocity_from_differences = differences;
+    make(1, options);
+    sync_->add(joints(0, {{"arm", 0.0F}, {"neck", 0.0F}}, 4.0F));
+    sync_->add(joints(10 * kMs, {{"arm", 0.01F}, {"neck", 0.0F}}, 6.0F));
+    picture(0, 5 * kMs);
+    const auto arrived = sync_->next();
+    ASSERT_TRUE(arrived);
+    EXPECT_NEAR(arrived->observation.cameras[0]->joints.qdot[0], differences ? 1.0 : 5.0, 1e-6);
+  }
+}
+
+TEST_F(SynchroniserTest, WaitsForTheEncoderAfterThePicture) {
+  make();
+  encoders(0, 30 * kMs);
+  pair(33 * kMs, 33 * kMs);
+  EXPECT_TRUE(out().empty());
+  encoders(40 * kMs, 40 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{33, 33}));
+}
+
+TEST_F(SynchroniserTest, PairsSeparateMessagesByStamp) {
+  make();
+  encoders(0, 500 * kMs);
+  for (int i = 0; i < 4; ++i) {
+    picture(1, (20 + 33 * i) * kMs);  // right comes first though it is later
+    picture(0, (10 + 33 * i) * kMs);
+  }
+  sync_->finish();
+  EXPECT_THAT(out(), ElementsAre(std::pair{10, 20}, std::pair{43, 53}, std::pair{76, 86}, std::pair{109, 119}));
+  EXPECT_EQ(sync_->statistics().mono_observations, 0u);
+}
+
+TEST_F(SynchroniserTest, OnceTheFrameRateIsKnownAPairDoesNotWaitForTheNextPicture) {
+  make();
+  encoders(0, 500 * kMs);
+  for (int i = 0; i < 3; ++i) {
+    picture(0, (10 + 33 * i) * kMs);
+    picture(1, (20 + 33 * i) * kMs);
+  }
+  out();
+  picture(0, 109 * kMs);
+  EXPECT_TRUE(out().empty());
+  picture(1, 119 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{109, 119}));
+}
+
+// With a window longer than half a frame, one lost picture must not shift all later pairs by a frame.
+TEST_F(SynchroniserTest, LosesOnePairWhenOnePictureIsLost) {
+  make();
+  encoders(0, 500 * kMs);
+  for (int i = 0; i < 8; ++i) {
+    picture(0, 33 * i * kMs);
+    if (i != 3) picture(1, (33 * i + 2) * kMs);
+  }
+  sync_->finish();
+  EXPECT_THAT(out(), ElementsAre(std::pair{0, 2}, std::pair{33, 35}, std::pair{66, 68}, std::pair{99, -1},
+                                 std::pair{132, 134}, std::pair{165, 167}, std::pair{198, 200}, std::pair{231, 233}));
+}
+
+TEST_F(SynchroniserTest, PicturesBeyondTheWindowAreNotPaired) {
+  SynchroniserOptions options;
+  options.allow_mono = false;
+  make(2, options);
+  encoders(0, 1000 * kMs);
+  pair(100 * kMs, 150 * kMs);  // exactly the window
+  pair(300 * kMs, 351 * kMs);
+  sync_->finish();
+  EXPECT_THAT(out(), ElementsAre(std::pair{100, 150}));
+  EXPECT_EQ(dropped(DropReason::kUnpaired), 2u);
+}
+
+TEST_F(SynchroniserTest, DeadCameraGivesMonoWhenAllowed) {
+  make();
+  encoders(0, 1000 * kMs);
+  for (int i = 0; i < 10; ++i) picture(0, 33 * i * kMs);
+  const auto mono = out();
+  ASSERT_GE(mono.size(), 5u);  // those that camera_wait (100 ms) has passed
+  EXPECT_EQ(mono[0], (std::pair<Microseconds, Microseconds>{0, -1}));
+  EXPECT_EQ(sync_->statistics().mono_observations, mono.size());
+  // The camera returns.
+  pair(330 * kMs, 332 * kMs);
+  EXPECT_EQ(out().back(), (std::pair<Microseconds, Microseconds>{330, 332}));
+}
+
+TEST_F(SynchroniserTest, MonoRigDoesNotWait) {
+  make(1);
+  encoders(0, 100 * kMs);
+  picture(0, 50 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{50, -1}));
+  EXPECT_EQ(sync_->statistics().mono_observations, 0u);
+  picture(1, 60 * kMs);  // not of this rig
+  EXPECT_EQ(sync_->statistics().images, 1u);
+}
+
+TEST_F(SynchroniserTest, PictureThatComesAfterItsPartnersSuccessorStillPairs) {
+  make();
+  encoders(0, 500 * kMs);
+  picture(0, 0);
+  picture(0, 33 * kMs);
+  picture(1, 1 * kMs);
+  picture(0, 66 * kMs);
+  picture(1, 34 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{0, 1}, std::pair{33, 34}));
+}
+
+TEST_F(SynchroniserTest, DuplicatesAndOlderPicturesAreSkipped) {
+  make();
+  encoders(0, 500 * kMs);
+  pair(100 * kMs, 100 * kMs);
+  pair(100 * kMs, 100 * kMs);
+  pair(90 * kMs, 90 * kMs);
+  pair(133 * kMs, 133 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{100, 100}, std::pair{133, 133}));
+  EXPECT_EQ(dropped(DropReason::kDuplicate), 2u);
+  EXPECT_EQ(dropped(DropReason::kOutOfOrder), 2u);
+  EXPECT_EQ(sync_->statistics().clock_steps, 0u);
+}
+
+TEST_F(SynchroniserTest, DuplicateAndOlderEncodersAreSkipped) {
+  make(1);
+  sync_->add(joints(0, {{"arm", 0.0F}, {"neck", 0.0F}}));
+  sync_->add(joints(20 * kMs, {{"arm", 0.2F}, {"neck", 0.0F}}));
+  sync_->add(joints(20 * kMs, {{"arm", 9.0F}, {"neck", 9.0F}}));
+  sync_->add(joints(10 * kMs, {{"arm", 9.0F}, {"neck", 9.0F}}));
+  picture(0, 10 * kMs);
+  const auto arrived = sync_->next();
+  ASSERT_TRUE(arrived);
+  EXPECT_NEAR(arrived->observation.cameras[0]->joints.q[0], 0.1, 1e-7);
+  EXPECT_EQ(sync_->statistics().joint_messages, 2u);
+  EXPECT_EQ(sync_->statistics().joint_messages_duplicate, 1u);
+  EXPECT_EQ(sync_->statistics().joint_messages_out_of_order, 1u);
+}
+
+TEST_F(SynchroniserTest, HeadAndArmMayComeInSeparateMessages) {
+  make(1);
+  for (int i = 0; i < 10; ++i) {
+    sync_->add(joints(10 * i * kMs, {{"arm", static_cast<float>(i)}}, 0.0F));
+    sync_->add(joints((10 * i - 3) * kMs + 5 * kMs, {{"neck", 2.0F}, {"somebody_elses_joint", 5.0F}}));
+  }
+  picture(0, 40 * kMs);
+  const auto arrived = sync_->next();
+  ASSERT_TRUE(arrived);
+  EXPECT_EQ(arrived->observation.cameras[0]->joints.q[0], 4.0);
+  EXPECT_EQ(arrived->observation.cameras[0]->joints.q[1], 2.0);
+  sync_->add(joints(200 * kMs, {{"tail", 1.0F}}));
+  EXPECT_EQ(sync_->statistics().joint_messages_without_known_joint, 1u);
+}
+
+TEST_F(SynchroniserTest, JointThatIsNeverPublishedTakesItsFixedValue) {
+  make(1, {}, {{"neck", -0.7}, {"arm", 9.0}});
+  for (int i = 0; i < 10; ++i) sync_->add(joints(10 * i * kMs, {{"arm", 0.5F}}));
+  picture(0, 40 * kMs);
+  const auto arrived = sync_->next();
+  ASSERT_TRUE(arrived);
+  EXPECT_EQ(arrived->observation.cameras[0]->joints.q[0], 0.5);  // what is published wins
+  EXPECT_EQ(arrived->observation.cameras[0]->joints.q[1], -0.7);
+  EXPECT_EQ(arrived->observation.cameras[0]->joints.qdot[1], 0.0);
+}
+
+TEST_F(SynchroniserTest, JointThatIsNeitherPublishedNorFixedIsNamed) {
+  make(1);
+  for (int i = 0; i < 100; ++i) {
+    sync_->add(joints(10 * i * kMs, {{"arm", 0.5F}}));
+    if (i % 3 == 0) picture(0, 10 * i * kMs);
+  }
+  EXPECT_TRUE(out().empty());
+  EXPECT_GT(dropped(DropReason::kMissingJoint), 20u);
+  EXPECT_EQ(dropped(DropReason::kNoEncoders), 0u);
+  EXPECT_THAT(sync_->joints().missing_joints(), ElementsAre("neck"));
+}
+
+TEST_F(SynchroniserTest, LostJointStopsObservationsAndIsNamed) {
+  make(1, {}, {{"neck", 0.0}});
+  encoders(0, 100 * kMs);
+  for (int i = 0; i < 60; ++i) {
+    sync_->add(joints((110 + 10 * i) * kMs, {{"arm", 0.5F}}));
+    if (i % 3 == 0) picture(0, (110 + 10 * i) * kMs);
+  }
+  EXPECT_TRUE(out().empty());  // a fixed value would be a guess once the joint is known to be published
+  EXPECT_GT(dropped(DropReason::kMissingJoint), 5u);
+  EXPECT_EQ(sync_->statistics().blocking_joint, 1);
+}
+
+TEST_F(SynchroniserTest, LateEncodersAreWaitedForUpToTheLimit) {
+  make();
+  encoders(0, 100 * kMs);
+  for (int i = 0; i < 10; ++i) pair((110 + 33 * i) * kMs, (110 + 33 * i) * kMs);
+  EXPECT_TRUE(out().empty());
+  EXPECT_EQ(sync_->statistics().encoder_lag, (110 + 33 * 9 - 100) * kMs);
+  // 407 is the newest picture; those up to 207 are given up.
+  EXPECT_EQ(dropped(DropReason::kNoEncoders), 6u);
+  encoders(110 * kMs, 450 * kMs);
+  EXPECT_THAT(out(), testing::SizeIs(7));
+}
+
+TEST_F(SynchroniserTest, NothingIsInterpolatedAcrossAGap) {
+  make();
+  encoders(0, 100 * kMs);
+  encoders(300 * kMs, 400 * kMs);
+  pair(200 * kMs, 200 * kMs);
+  pair(350 * kMs, 350 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{350, 350}));
+  EXPECT_EQ(dropped(DropReason::kEncoderGap), 2u);
+}
+
+TEST_F(SynchroniserTest, NothingIsInterpolatedAcrossAJump) {
+  make(1);
+  const auto at = [&](int ms, float q) { sync_->add(joints(ms * kMs, {{"arm", q}, {"neck", 0.0F}})); };
+  at(0, 0.1F);
+  at(10, 0.1F);
+  at(20, 1.1F);  // 100 rad/s
+  at(30, 1.1F);
+  for (const int ms : {5, 15, 20, 25}) picture(0, ms * kMs);
+  std::vector<double> q;
+  while (auto arrived = sync_->next()) q.push_back(arrived->observation.cameras[0]->joints.q[0]);
+  EXPECT_THAT(q, ElementsAre(testing::DoubleNear(0.1, 1e-6), testing::DoubleNear(1.1, 1e-6),
+                             testing::DoubleNear(1.1, 1e-6)));
+  EXPECT_EQ(dropped(DropReason::kEncoderJump), 1u);
+}
+
+TEST_F(SynchroniserTest, PictureOlderThanAllEncodersIsDropped) {
+  make(1);
+  encoders(100 * kMs, 200 * kMs);
+  picture(0, 50 * kMs);
+  EXPECT_EQ(dropped(DropReason::kNoEncoders), 1u);
+}
+
+TEST_F(SynchroniserTest, SilenceOfACameraIsAGap) {
+  make(1);
+  encoders(0, 5000 * kMs);
+  picture(0, 100 * kMs);
+  picture(0, 300 * kMs);
+  picture(0, 501 * kMs);
+  EXPECT_EQ(sync_->statistics().gaps, 1u);
+}
+
+TEST_F(SynchroniserTest, ClockThatStepsBackIsFollowed) {
+  make();
+  const Microseconds late = 3'600'000 * kMs;
+  encoders(late, late + 200 * kMs);
+  for (int i = 0; i < 4; ++i) pair(late + 33 * i * kMs, late + 33 * i * kMs);
+  EXPECT_THAT(out(), testing::SizeIs(4));
+  // An hour back.
+  for (int i = 0; i < 60; ++i) {
+    encoders(10 * i * kMs, 10 * i * kMs);
+    if (i % 3 == 0) pair(10 * i * kMs, 10 * i * kMs);
+  }
+  EXPECT_GE(sync_->statistics().clock_steps, 1u);
+  EXPECT_LE(sync_->statistics().clock_steps, 2u);
+  EXPECT_GE(out().size(), 14u);  // of 20; three of evidence, and what waited then
+}
+
+TEST_F(SynchroniserTest, SingleStrayStampsDoNotResetAnything) {
+  make();
+  encoders(10'000 * kMs, 10'200 * kMs);
+  for (int i = 0; i < 4; ++i) {
+    pair((10'000 + 33 * i) * kMs, (10'000 + 33 * i) * kMs);
+    pair(0, 0);
+    sync_->add(joints(0, {{"arm", 9.0F}, {"neck", 9.0F}}));
+    encoders((10'210 + 10 * i) * kMs, (10'210 + 10 * i) * kMs);
+  }
+  EXPECT_THAT(out(), testing::SizeIs(4));
+  EXPECT_EQ(sync_->statistics().clock_steps, 0u);
+  EXPECT_EQ(sync_->statistics().joint_messages_out_of_order, 4u);
+}
+
+TEST_F(SynchroniserTest, RecoversFromAStampFarInTheFuture) {
+  make();
+  encoders(0, 100 * kMs);
+  pair(50 * kMs, 50 * kMs);
+  pair(9'000'000'000 * kMs, 9'000'000'000 * kMs);
+  sync_->add(joints(9'000'000'000 * kMs, {{"arm", 9.0F}, {"neck", 9.0F}}));
+  for (int i = 0; i < 60; ++i) {
+    encoders((110 + 10 * i) * kMs, (110 + 10 * i) * kMs);
+    if (i % 3 == 0) pair((110 + 10 * i) * kMs, (110 + 10 * i) * kMs);
+  }
+  EXPECT_GE(out().size(), 14u);
+}
+
+TEST_F(SynchroniserTest, BoundsWhatWaitsAndShedsTheOldest) {
+  SynchroniserOptions options;
+  options.max_waiting = 8;
+  options.encoder_wait = 1'000'000 * kMs;
+  options.camera_wait = 1'000'000 * kMs;
+  make(2, options);
+  for (int i = 0; i < 100; ++i) picture(0, 33 * i * kMs);
+  EXPECT_EQ(sync_->waiting_images(), 8u);
+  for (int i = 100; i < 200; ++i) pair(33 * i * kMs, 33 * i * kMs);
+  EXPECT_LE(sync_->waiting_images(), 32u);
+  encoders(0, 33 * 200 * kMs);
+  const auto stamps = out();
+  EXPECT_LE(stamps.size(), 8u);
+  EXPECT_EQ(stamps.back().first, 33 * 199);
+  EXPECT_GT(dropped(DropReason::kOverload), 100u);
+}
+
+TEST_F(SynchroniserTest, FinishSettlesWhatWaits) {
+  make();
+  encoders(0, 100 * kMs);
+  picture(0, 50 * kMs);
+  picture(0, 83 * kMs);
+  pair(110 * kMs, 110 * kMs);  // no encoder after it
+  sync_->finish();
+  EXPECT_THAT(out(), ElementsAre(std::pair{50, -1}, std::pair{83, -1}));
+  EXPECT_EQ(dropped(DropReason::kNoEncoders), 2u);
+  EXPECT_EQ(sync_->waiting_images(), 0u);
+}
+
+// Random arrivals: nothing is lost unaccounted for, stamps rise, encoders are those of the stamp.
+// Encoders and pictures are then interleaved in another order, each stream in its own: the same
+// observations must come out, since only stamps count.
+TEST_F(SynchroniserTest, InterleavingOfStreamsDoesNotChangeTheObservations) {
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  std::vector<std::pair<Microseconds, Microseconds>> reference;
+  struct Arrival {
+    Microseconds at;
+    Microseconds stamp;
+    int source;  // 0, 1: camera; 2: encoders
+  };
+  std::vector<Arrival> stamps;
+  for (int i = 0; i < 300; ++i) {
+    for (int camera = 0; camera < 2; ++camera) {
+      if (random() % 10 == 0) continue;  // lost
+      stamps.push_back({0, (200 + 33 * i + static_cast<int>(random() % 8)) * kMs, camera});
+    }
+  }
+  for (int i = 0; i < 1100; ++i) stamps.push_back({0, 10 * i * kMs, 2});
+  for (int round = 0; round < 5; ++round) {
+    // Every source has a delay that varies by less than its own period, so it stays in order.
+    Microseconds delay[3];
+    for (auto& d : delay) d = static_cast<Microseconds>(random() % 40) * kMs;
+    auto arrivals = stamps;
+    for (auto& a : arrivals) a.at = a.stamp + delay[a.source] + static_cast<Microseconds>(random() % 9) * kMs;
+    std::stable_sort(arrivals.begin(), arrivals.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
+    make();
+    std::vector<std::pair<Microseconds, Microseconds>> result;
+    for (const auto& a : arrivals) {
+      if (a.source == 2) {
+        encoders(a.stamp, a.stamp);
+      } else {
+        picture(a.source, a.stamp);
+      }
+      for (const auto& stamp : out()) result.push_back(stamp);
+    }
+    sync_->finish();
+    for (const auto& stamp : out()) result.push_back(stamp);
+    expect_every_image_accounted_for();
+    EXPECT_EQ(dropped(DropReason::kOutOfOrder), 0u);
+    ASSERT_GT(result.size(), 250u);
+    if (round == 0) {
+      reference = result;
+    } else {
+      EXPECT_EQ(result, reference);
+    }
+  }
+}
+
+TEST_F(SynchroniserTest, SurvivesAnything) {
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937_64 random(seed);
+  for (int round = 0; round < 20; ++round) {
+    make(1 + static_cast<int>(random() % 2));
+    Microseconds last = -1;
+    for (int i = 0; i < 3000; ++i) {
+      const Microseconds t = random() % 20 == 0 ? static_cast<Microseconds>(random() % 9'000'000'000'000'000)
+                                                : static_cast<Microseconds>(random() % 1'000'000);
+      if (random() % 2 == 0) {
+        sync_->add(joints(t, {{"arm", static_cast<float>(random() % 3)}, {"neck", 0.0F}}));
+      } else {
+        std::vector<StampedImage> list;
+        for (std::size_t n = random() % 4; n > 0; --n) list.push_back(image(static_cast<int>(random() % 4) - 1, t));
+        sync_->add(std::move(list));
+      }
+      const auto steps = sync_->statistics().clock_steps;
+      while (auto arrived = sync_->next()) {
+        if (steps == 0) {
+          EXPECT_GT(arrived->observation.utime, last);
+        }
+        last = arrived->observation.utime;
+      }
+      EXPECT_LE(sync_->waiting_images(), 4u * 64u);
+    }
+    expect_every_image_accounted_for();
+  }
+}
+
+}  // namespace
+}  // namespace bodyschema
