@@ -354,14 +354,14 @@ def body():
     neck = [X_neck[r][3] for r in range(3)]
     column = loft(mm((-12, 22, 22), (20, 20, 20)), 16, (0.006, 0.006))
     link_shape('neck_1', 0.3, (column, in_link('neck_1', multiply(translation(*neck), up))))
-    collar = loft(mm((15, 24, 24), (35, 26, 26)), 16, (0.005, 0.005))
+    collar = loft(mm((15, 24, 24), (40, 24, 24), (75, 20, 20)), 16, (0.005, 0.005))
     link_shape('neck_2', 0.3, (collar, in_link('neck_2', multiply(translation(*neck), up))))
     # The skull stays behind the eyes, which stand free in its face.
     X_tilt = zero_pose('eyes_tilt_1')
     face = [X_tilt[r][3] for r in range(3)]
     skull = ellipsoid(0.062, 0.066, 0.075)
     ear = pin(0.022, 0.16)
-    X_skull = translation(face[0] + 0.075, face[1], face[2] + 0.015)
+    X_skull = translation(face[0] + 0.060, face[1], face[2] + 0.015)
     link_shape('head', 1.7,
                (skull, in_link('head', X_skull)),
                (ear, in_link('head', multiply(X_skull, rotation('x', math.pi / 2)))))

@@ -23,9 +23,9 @@ struct MeshReport {
   [[nodiscard]] std::string text() const;
 };
 
-/// Makes vertices at most `tolerance_m` apart one (the default is float
-/// rounding at arm's length, well under a CAD exporter's detail), drops triangles that degenerate and vertices that
-/// no triangle uses.
+/// Makes vertices at most `tolerance_m` apart one, drops triangles that degenerate and vertices that
+/// no triangle uses. The default is rounding of a float at arm's length; files hold finer detail
+/// than a micrometre on purpose.
 void weld(TriangleMesh& mesh, double tolerance_m = 1e-7);
 
 /// Checks a welded mesh and turns what is wound the wrong way: first triangles against the majority

@@ -10,6 +10,7 @@
 #include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/core/error.hpp"
 #include "robot/robot_test_data.hpp"
+#include "robot/temporary_folder.hpp"
 #include "robot/urdf_walk.hpp"
 
 namespace bodyschema {
@@ -55,6 +56,35 @@ TEST(ForwardKinematics, AgreesWithAProductOfTransformsOnTheOfficialRobot) {
 TEST(ForwardKinematics, AgreesWithAProductOfTransformsOnTheRecordingsRobot) {
   SKIP_WITHOUT_DATA();
   expect_kinematics_match("icub_unity/robot.yaml", 2);
+}
+
+TEST(ForwardKinematics, AgreesWithAProductOfTransformsOnOurRobot) {
+  expect_kinematics_match("icub_right/robot.yaml", 6);
+}
+
+TEST(ForwardKinematics, PutsOurHandWhereANominalICubHasIt) {
+  SKIP_WITHOUT_DATA();
+  const auto pose_in_left_eye = [](const std::string& configuration) {
+    RobotSetup setup = robot_setup(configuration);
+    setup.model.rendered_links.clear();
+    const auto robot = setup.load();
+    ForwardKinematics kinematics(robot, {"l_eye_optical", "r_eye_optical", "r_hand"});
+    std::vector<Pose> X_W(3);
+    Eigen::VectorXd q = setup.default_joints(*robot);
+    const std::map<std::string, double> posture_deg = {
+        {"torso_pitch", 5},    {"torso_roll", -4},     {"torso_yaw", 8},      {"neck_pitch", -12},
+        {"neck_roll", 6},      {"neck_yaw", -15},      {"eyes_tilt", -9},     {"l_eye_pan", 7},
+        {"r_eye_pan", -6},     {"r_shoulder_pitch", -60}, {"r_shoulder_roll", 25},
+        {"r_shoulder_yaw", 14}, {"r_elbow", 70},       {"r_wrist_prosup", 33},
+        {"r_wrist_pitch", -21}, {"r_wrist_yaw", 11}};
+    for (const auto& [name, value] : posture_deg) q[robot->joint_index(name)] = radians(value);
+    kinematics.compute(q, X_W);
+    return std::pair<Pose, Pose>(X_W[0].inverse() * X_W[2], X_W[1].inverse() * X_W[2]);
+  };
+  const auto ours = pose_in_left_eye("icub_right/robot.yaml");
+  const auto nominal = pose_in_left_eye("icub_unity/robot_v1.yaml");
+  EXPECT_LT((ours.first.matrix() - nominal.first.matrix()).cwiseAbs().maxCoeff(), 2e-5);
+  EXPECT_LT((ours.second.matrix() - nominal.second.matrix()).cwiseAbs().maxCoeff(), 2e-5);
 }
 
 TEST(ForwardKinematics, AgreesWithTheRecordingsTruthInAllPoses) {
@@ -117,6 +147,99 @@ TEST(ForwardKinematics, AgreesWithTheRecordingsTruthInAllPoses) {
   RecordProperty("worst_deg", std::to_string(worst_deg));
   EXPECT_LT(worst_mm, 0.1);
   EXPECT_LT(worst_deg, 0.01);
+}
+
+TEST(ForwardKinematics, MimicJointsFollowTheirDriverThroughChainsAndOffsets) {
+  TemporaryFolder folder;
+  const auto joint = [](const std::string& name, const std::string& parent,
+                        const std::string& child, const std::string& mimic) {
+    return R"(<joint name=")" + name + R"(" type="revolute"><parent link=")" + parent +
+           R"("/><child link=")" + child +
+           R"("/><axis xyz="0 0 1"/><limit lower="-9" upper="9" effort="1" velocity="1"/>)" +
+           mimic + "</joint>";
+  };
+  const auto urdf = folder.write(
+      "chain.urdf",
+      R"(<robot name="chain"><link name="base"/><link name="driver"/><link name="first"/><link name="second"/>)" +
+          joint("d", "base", "driver", "") +
+          joint("a", "base", "first", R"(<mimic joint="b" multiplier="-0.5" offset="0.3"/>)") +
+          joint("b", "base", "second", R"(<mimic joint="d" multiplier="2" offset="0.1"/>)") +
+          "</robot>");
+  const auto robot = RobotModel::load({urdf, {}, {}});
+  ASSERT_EQ(robot->joint_count(), 1);
+  EXPECT_EQ(robot->joints()[0].name, "d");
+  EXPECT_FALSE(robot->find_joint("a").has_value());
+  ForwardKinematics kinematics(robot, {"first", "second"});
+  std::vector<Pose> X_WB(2);
+  kinematics.compute(Eigen::VectorXd::Constant(1, 0.4), X_WB);
+  const auto yaw = [](const Pose& X) { return std::atan2(X(1, 0), X(0, 0)); };
+  EXPECT_NEAR(yaw(X_WB[1]), 2 * 0.4 + 0.1, 1e-12);
+  EXPECT_NEAR(yaw(X_WB[0]), -0.5 * (2 * 0.4 + 0.1) + 0.3, 1e-12);
+  EXPECT_TRUE(kinematics.moves(0, 0));
+  EXPECT_LT((kinematics.joint_axis(0).direction_W - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+}
+
+TEST(ForwardKinematics, AxesGiveTheMotionOfTheHand) {
+  RobotSetup setup = robot_setup("icub_right/robot.yaml");
+  const auto robot = setup.load();
+  ForwardKinematics kinematics(robot, {"r_hand", "l_eye_optical"});
+  std::vector<Pose> X(2), X_up(2);
+  Eigen::VectorXd q = Eigen::VectorXd::Constant(robot->joint_count(), 0.3);
+  for (Eigen::Index j = 0; j < robot->joint_count(); ++j) {
+    const std::string& name = robot->joints()[static_cast<std::size_t>(j)].name;
+    SCOPED_TRACE(name);
+    Eigen::VectorXd up = q;
+    constexpr double step = 1e-6;
+    up[j] += step;
+    kinematics.compute(up, X_up);
+    kinematics.compute(q, X);
+    const auto axis = kinematics.joint_axis(j);
+    const Eigen::Vector3d p = X[0].translation();
+    const Eigen::Vector3d velocity = (X_up[0].translation() - p) / step;
+    if (kinematics.moves(j, 0)) {
+      EXPECT_LT((axis.direction_W.cross(p - axis.point_W) - velocity).norm(), 1e-5);
+      EXPECT_NEAR(axis.direction_W.norm(), 1.0, 1e-12);
+    } else {
+      EXPECT_EQ(velocity.norm(), 0.0);
+    }
+    EXPECT_EQ(kinematics.moves(j, 0), name.rfind("torso", 0) == 0 || name.rfind("r_shoulder", 0) == 0 ||
+                                          name.rfind("r_wrist", 0) == 0 || name == "r_elbow");
+    if (!kinematics.moves(j, 0) && !kinematics.moves(j, 1)) {
+      EXPECT_EQ(axis.direction_W.norm(), 0.0);
+    }
+  }
+}
+
+TEST(ForwardKinematics, TwoHundredParticlesTakeWellUnderTwoMilliseconds) {
+#ifndef NDEBUG
+  GTEST_SKIP() << "a timing of optimised code";
+#endif
+  const RobotSetup setup = robot_setup("icub_right/robot.yaml");
+  const auto robot = setup.load();
+  auto links = setup.model.rendered_links;
+  links.insert(links.end(), {"l_eye_optical", "r_eye_optical", "r_hand"});
+  ASSERT_EQ(links.size(), 25u);
+  ForwardKinematics kinematics(robot, links);
+  std::vector<Pose> X_WB(links.size());
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> angle(-1.0, 1.0);
+  std::vector<Eigen::VectorXd> particles(200);
+  for (auto& q : particles) {
+    q = Eigen::VectorXd::NullaryExpr(robot->joint_count(), [&] { return angle(random); });
+  }
+  double best_ms = 1e9, sum = 0.0;
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    const auto start = std::chrono::steady_clock::now();
+    for (const auto& q : particles) {
+      kinematics.compute(q, X_WB);
+      sum += X_WB.back().translation().x();
+    }
+    const std::chrono::duration<double, std::milli> taken = std::chrono::steady_clock::now() - start;
+    best_ms = std::min(best_ms, taken.count());
+  }
+  EXPECT_NE(sum, 0.0);
+  RecordProperty("best_ms", std::to_string(best_ms));
+  EXPECT_LT(best_ms, 2.0);
 }
 
 }  // namespace

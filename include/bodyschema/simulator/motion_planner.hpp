@@ -1,0 +1,92 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/robot/forward_kinematics.hpp"
+#include "bodyschema/robot/robot_setup.hpp"
+#include "bodyschema/simulator/random.hpp"
+#include "bodyschema/simulator/trajectory.hpp"
+
+namespace bodyschema::simulator {
+
+/// Where the hand may go and how the head stands.
+struct MotionSettings {
+  double distance_min_m = 0.25;  ///< hand centre to the middle between the eyes
+  double distance_max_m = 0.45;
+  double border_px = 6.0;        ///< hand base and fingertips stay this far inside the pictures
+  double hand_radius_m = 0.075;  ///< room kept around the hand's centre when targets are chosen
+  std::map<std::string, double> posture_deg;  ///< head and fingers; joints left out: RobotSetup's
+  double head_motion_deg = 4.0;  ///< a moving head turns each joint by up to this
+  double slow_deg_s = 18.0;      ///< mean speed of the fastest joint in slow moves
+  double fast_deg_s = 55.0;      ///< ... and in fast ones
+  double hold_s = 15.0;          ///< standing still within a long babble, to measure noise
+};
+
+/// Finds motions of the nominal robot that the cameras can see: postures by inverse kinematics
+/// from random starts, moves between them checked on the way. Seeded. One thread.
+class MotionPlanner {
+ public:
+  /// @param frozen  arm joints that stay where they are
+  MotionPlanner(std::shared_ptr<const RobotModel> model, const RobotSetup& setup, const StereoRig& rig,
+                MotionSettings settings, std::uint64_t seed, bool head_moves = false,
+                const std::vector<std::string>& frozen = {});
+
+  /// The hand crosses the image from lower right to upper left, forearm visible.
+  /// Throws DataError when the robot cannot do that within the settings.
+  Trajectory reach(double duration_s);
+  /// Smooth random motion with the hand in view: slow and fast, a tour of four postures there and
+  /// back at the beginning and again in the middle and at the end, and a static hold (the last three
+  /// when there is time: 40 s or more).
+  Trajectory babble(double duration_s);
+  /// A posture with the arm out of both views; head as in `like`.
+  Eigen::VectorXd rest_posture(const Eigen::VectorXd& like);
+  /// An arm posture with the hand in view, head at its usual place.
+  Eigen::VectorXd visible_posture();
+
+  /// What the cameras see of the nominal robot.
+  struct View {
+    bool whole_hand = false;      ///< hand base and fingertips inside both pictures
+    bool forearm = false;         ///< the forearm next to the wrist is inside both pictures
+    double distance_m = 0.0;      ///< hand centre to the middle between the eyes
+    std::vector<Eigen::Vector2d> centre_px;  ///< hand centre in each camera
+  };
+  View view(const Eigen::VectorXd& q);
+  /// Moves the arm joints of `q` until the hand's centre (mean of base and fingertips) is at
+  /// `centre_W` within 2 mm. False when it cannot be reached from there.
+  bool solve(const Eigen::Vector3d& centre_W, Eigen::VectorXd& q);
+  /// A point in front of the eyes, root frame.
+  /// @param pixel  where it appears, mean of all cameras; @param distance_m  from between the eyes
+  Eigen::Vector3d point_in_view(const Eigen::Vector2d& pixel, double distance_m, const Eigen::VectorXd& q);
+  [[nodiscard]] const Eigen::VectorXd& base_posture() const { return base_; }
+
+ private:
+  void compute(const Eigen::VectorXd& q);
+  Eigen::VectorXd random_arm(const Eigen::VectorXd& like, double share);
+  Eigen::VectorXd move_head(Eigen::VectorXd q);
+  bool good(const View& view) const;
+  double share_in_view(const Eigen::VectorXd& from, const Eigen::VectorXd& to, double* forearm);
+  Eigen::Vector3d random_target(const Eigen::VectorXd& q, double u_low, double u_high, double v_low, double v_high);
+  Eigen::VectorXd next_posture(const Eigen::VectorXd& from);
+  double travel_time(const Eigen::VectorXd& from, const Eigen::VectorXd& to, double speed_deg_s) const;
+
+  std::shared_ptr<const RobotModel> model_;
+  StereoRig rig_;
+  MotionSettings settings_;
+  Random random_;
+  bool head_moves_;
+  std::vector<Eigen::Index> arm_;
+  std::vector<Eigen::Index> head_;
+  std::size_t tips_;
+  bool has_forearm_;
+  std::unique_ptr<ForwardKinematics> kinematics_;  // hand, tips, [wrist, forearm], cameras
+  std::vector<Pose> X_W_;
+  Eigen::VectorXd base_;
+};
+
+}  // namespace bodyschema::simulator

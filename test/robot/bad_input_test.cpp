@@ -1,0 +1,295 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/robot/forward_kinematics.hpp"
+#include "bodyschema/robot/robot_model.hpp"
+#include "robot/robot_test_data.hpp"
+#include "robot/temporary_folder.hpp"
+#include "robot/tiny_meshes.hpp"
+
+namespace bodyschema {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+/// The message of the FileError that loading throws; one line, silent on the terminal.
+class BadInput : public testing::Test {
+ protected:
+  std::string message(const RobotModelOptions& options) {
+    testing::internal::CaptureStderr();
+    testing::internal::CaptureStdout();
+    std::string text = "nothing was thrown";
+    try {
+      RobotModel::load(options);
+    } catch (const FileError& error) {
+      text = error.what();
+    }
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+    EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+    EXPECT_THAT(text, Not(HasSubstr("\n")));
+    EXPECT_THAT(text, HasSubstr(options.urdf.filename().string()));
+    return text;
+  }
+  std::string urdf_message(const std::string& text, const std::vector<std::string>& rendered = {}) {
+    return message({folder_.write("bad.urdf", text), {}, rendered});
+  }
+  /// The error of one mesh file used by an otherwise good URDF.
+  std::string mesh_message(const std::string& name, const std::string& content) {
+    folder_.write(name, content);
+    const auto urdf = folder_.write("good.urdf", one_part_urdf(mesh_visual(name)));
+    try {
+      RobotModel::load({urdf, {}, {"part"}});
+    } catch (const FileError& error) {
+      return error.what();
+    }
+    return "nothing was thrown";
+  }
+  static std::string joint(const std::string& name, const std::string& parent,
+                           const std::string& child, const std::string& rest = "",
+                           const std::string& type = "fixed") {
+    return "<joint name='" + name + "' type='" + type + "'><parent link='" + parent +
+           "'/><child link='" + child + "'/>" + rest + "</joint>";
+  }
+  static std::string robot(const std::string& inside) {
+    return "<robot name='r'>" + inside + "</robot>";
+  }
+  static constexpr const char* kLimit = "<limit lower='-1' upper='1' effort='1' velocity='1'/>";
+  TemporaryFolder folder_;
+};
+
+TEST_F(BadInput, UrdfThatIsNotThere) {
+  EXPECT_THAT(message({folder_.path() / "none.urdf", {}, {}}), HasSubstr("URDF not found"));
+}
+TEST_F(BadInput, UrdfThatIsAFolder) {
+  EXPECT_THAT(message({folder_.path(), {}, {}}), HasSubstr("not a regular file"));
+}
+TEST_F(BadInput, UrdfThatIsNotXml) {
+  EXPECT_THAT(urdf_message("<robot name='r'><link name="), HasSubstr("not a usable URDF"));
+  EXPECT_THAT(urdf_message(""), HasSubstr("not a usable URDF"));
+  EXPECT_THAT(urdf_message("just text"), HasSubstr("not a usable URDF"));
+  EXPECT_THAT(urdf_message(std::string("\0\1\2<\xff>", 6)), HasSubstr("not a usable URDF"));
+}
+TEST_F(BadInput, XmlThatIsNotAUrdf) {
+  EXPECT_THAT(urdf_message("<html><body/></html>"), HasSubstr("robot"));
+}
+TEST_F(BadInput, UrdfWithoutLinks) {
+  EXPECT_THAT(urdf_message(robot("")), HasSubstr("not a usable URDF"));
+}
+TEST_F(BadInput, UrdfThatNestsWithoutEnd) {
+  std::string text = "<robot name='r'>";
+  for (int i = 0; i < 200000; ++i) text += "<a>";
+  EXPECT_THAT(urdf_message(text), HasSubstr("nest 200001 deep"));
+}
+TEST_F(BadInput, UrdfThatIsTooLarge) {
+  const auto file = folder_.write("large.urdf", "<robot/>");
+  std::filesystem::resize_file(file, (16u << 20) + 1);
+  EXPECT_THAT(message({file, {}, {}}), HasSubstr("at most 16777216"));
+}
+TEST_F(BadInput, NumbersThatAreNone) {
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" +
+                                 joint("j", "a", "b", "<origin xyz='0 zero 0'/>"))),
+              HasSubstr("not a usable URDF"));
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" +
+                                 joint("j", "a", "b", "<origin xyz='0 1e999 0'/>"))),
+              AllOf(HasSubstr("bad.urdf"), Not(HasSubstr("nothing was thrown"))));
+}
+TEST_F(BadInput, AxisOfNoLength) {
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" +
+                                 joint("j", "a", "b", "<axis xyz='0 0 0'/>" + std::string(kLimit),
+                                       "revolute"))),
+              HasSubstr("joint 'j': axis is zero"));
+}
+TEST_F(BadInput, LimitsTheWrongWayRound) {
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" +
+                                 joint("j", "a", "b",
+                                       "<axis xyz='1 0 0'/><limit lower='2' upper='1' effort='1' "
+                                       "velocity='1'/>",
+                                       "revolute"))),
+              HasSubstr("joint 'j': limits [2, 1]"));
+}
+TEST_F(BadInput, CycleThroughTheRoot) {
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" + joint("j", "a", "b") +
+                                 joint("k", "b", "a"))),
+              HasSubstr("not a usable URDF"));
+}
+TEST_F(BadInput, CycleThatHangsOffTheRoot) {
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/><link name='c'/>" +
+                                 joint("j", "a", "b") + joint("k", "b", "c") + joint("l", "c", "b"))),
+              HasSubstr("link 'b' is the child of joints 'j' and 'l'"));
+}
+TEST_F(BadInput, CycleBesideTheRoot) {
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/><link name='c'/>" +
+                                 joint("k", "b", "c") + joint("l", "c", "b"))),
+              HasSubstr("link 'b' is not reached from the root 'a'; its joints form a cycle"));
+}
+TEST_F(BadInput, TwoRoots) {
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>")), HasSubstr("not a usable URDF"));
+}
+TEST_F(BadInput, JointToALinkThatIsNotThere) {
+  EXPECT_THAT(urdf_message(robot("<link name='a'/>" + joint("j", "a", "b"))), HasSubstr("b"));
+}
+TEST_F(BadInput, MimicOfAnUnknownJoint) {
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" +
+                                 joint("elbow", "a", "b",
+                                       "<axis xyz='1 0 0'/>" + std::string(kLimit) +
+                                           "<mimic joint='elbo' multiplier='1' offset='0'/>",
+                                       "revolute"))),
+              AllOf(HasSubstr("mimics unknown joint 'elbo'"), HasSubstr("did you mean 'elbow'?")));
+}
+TEST_F(BadInput, MimicsThatChaseEachOther) {
+  const std::string rest = "<axis xyz='1 0 0'/>" + std::string(kLimit);
+  EXPECT_THAT(
+      urdf_message(robot("<link name='a'/><link name='b'/><link name='c'/>" +
+                         joint("j", "a", "b", rest + "<mimic joint='k'/>", "revolute") +
+                         joint("k", "b", "c", rest + "<mimic joint='j'/>", "revolute"))),
+      HasSubstr("its mimic chain is a cycle"));
+}
+TEST_F(BadInput, NegativeMass) {
+  EXPECT_THAT(urdf_message(robot("<link name='a'><inertial><mass value='-1'/><inertia ixx='1' "
+                                 "ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial></link>")),
+              HasSubstr("link 'a': inertial"));
+}
+TEST_F(BadInput, RenderedLinkThatIsUnknown) {
+  EXPECT_THAT(urdf_message(one_part_urdf(""), {"prt"}),
+              AllOf(HasSubstr("no link 'prt' to render"), HasSubstr("did you mean 'part'?")));
+}
+TEST_F(BadInput, RenderedLinkWithoutShape) {
+  EXPECT_THAT(urdf_message(one_part_urdf(""), {"part"}), HasSubstr("link 'part' is to be rendered"));
+}
+TEST_F(BadInput, RenderedLinkNamedTwice) {
+  EXPECT_THAT(urdf_message(one_part_urdf("<visual><geometry><box size='1 1 1'/></geometry></visual>"),
+                           {"part", "part"}),
+              HasSubstr("twice"));
+}
+TEST_F(BadInput, MeshThatIsNotThere) {
+  EXPECT_THAT(urdf_message(one_part_urdf(mesh_visual("meshes/none.stl")), {"part"}),
+              AllOf(HasSubstr("link 'part'"), HasSubstr("'meshes/none.stl' not found; tried ")));
+}
+TEST_F(BadInput, PackageWithoutSearchRoots) {
+  EXPECT_THAT(urdf_message(one_part_urdf(mesh_visual("package://iCub/a.stl")), {"part"}),
+              HasSubstr("mesh_search_roots"));
+}
+TEST_F(BadInput, PathsThatLeaveTheSearchRoots) {
+  folder_.write("outside.obj", obj_text(test_box({0, 0, 0}, {1, 1, 1})));
+  const auto root = folder_.path() / "root";
+  std::filesystem::create_directories(root / "pkg");
+  const std::vector<std::string> names = {
+      "../outside.obj",         "package://../outside.obj",
+      "sub/../../outside.obj",  "package://pkg/../../outside.obj",
+      "model://pkg/../../outside.obj", (folder_.path() / "outside.obj").string(),
+      "file://" + (folder_.path() / "outside.obj").string()};
+  for (const auto& name : names) {
+    SCOPED_TRACE(name);
+    const auto urdf = folder_.write("root/bad.urdf", one_part_urdf(mesh_visual(name)));
+    EXPECT_THAT(message({urdf, {root}, {"part"}}), HasSubstr("leads outside"));
+  }
+}
+TEST_F(BadInput, ScaleOfZero) {
+  folder_.write("a.obj", obj_text(test_box({0, 0, 0}, {1, 1, 1})));
+  EXPECT_THAT(urdf_message(one_part_urdf(mesh_visual("a.obj", "1 0 1")), {"part"}),
+              HasSubstr("scale must be finite and not zero"));
+}
+TEST_F(BadInput, PrimitiveOfNoSize) {
+  EXPECT_THAT(urdf_message(one_part_urdf("<visual><geometry><sphere radius='-1'/></geometry></visual>"),
+                           {"part"}),
+              HasSubstr("sphere radius must be positive"));
+}
+TEST_F(BadInput, MeshesThatCannotBeRead) {
+  const std::string good = binary_stl(test_box({0, 0, 0}, {1, 1, 1}));
+  const std::vector<std::pair<std::string, std::string>> broken = {
+      {"empty.obj", ""},
+      {"empty.stl", ""},
+      {"empty.dae", ""},
+      {"no_faces.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"},
+      {"noise.stl", std::string(300, '\x7f')},
+      {"cut.stl", good.substr(0, good.size() / 2)},
+      {"noise.dae", "<COLLADA><oops"},
+      {"no_scene.dae", "<COLLADA xmlns='x' version='1.4.1'><asset/></COLLADA>"},
+      {"wrong_index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 999999999\n"},
+      {"flat.obj", "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n"},
+      {"not_finite.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"},
+      {"unknown.ply", "ply\n"},
+  };
+  for (const auto& [name, content] : broken) {
+    SCOPED_TRACE(name);
+    const std::string text = mesh_message(name, content);
+    EXPECT_THAT(text, HasSubstr(name));
+    EXPECT_THAT(text, Not(HasSubstr("\n")));
+  }
+}
+TEST_F(BadInput, StlThatClaimsFourBillionTriangles) {
+  std::string text = binary_stl(test_box({0, 0, 0}, {1, 1, 1}));
+  const std::uint32_t claim = 0xfffffff0u;
+  std::memcpy(text.data() + 80, &claim, 4);
+  EXPECT_THAT(mesh_message("claim.stl", text), HasSubstr("claim.stl"));
+}
+TEST_F(BadInput, UnknownNamesNameTheNearest) {
+  const auto urdf = folder_.write("good.urdf", one_part_urdf(""));
+  const auto model = RobotModel::load({urdf, {}, {}});
+  const auto text_of = [](const std::function<void()>& action) {
+    try {
+      action();
+    } catch (const ConfigurationError& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing was thrown");
+  };
+  EXPECT_THAT(text_of([&] { ForwardKinematics(model, {"prt"}); }), HasSubstr("did you mean 'part'?"));
+  EXPECT_THAT(text_of([&] { (void)model->joint_index("jj"); }), HasSubstr("did you mean 'j'?"));
+  EXPECT_FALSE(model->find_joint("jj").has_value());
+}
+
+TEST(RobotSetupErrors, NamesAreCheckedAgainstTheRobot) {
+  const auto text_of = [](const std::function<void(RobotSetup&)>& spoil) {
+    RobotSetup setup = robot_setup("icub_right/robot.yaml");
+    setup.model.rendered_links.clear();
+    spoil(setup);
+    try {
+      (void)setup.load();
+    } catch (const ConfigurationError& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing was thrown");
+  };
+  EXPECT_EQ(text_of([](RobotSetup&) {}), "nothing was thrown");
+  EXPECT_EQ(text_of([](RobotSetup& s) { s.hand_link = "r_hnd"; }),
+            "robot.hand_link: 'r_hnd' is not in robot 'icub_right'; did you mean 'r_hand'?");
+  EXPECT_THAT(text_of([](RobotSetup& s) { s.estimated_joints[0] = "r_elbo"; }),
+              AllOf(HasSubstr("robot.estimated_joints"), HasSubstr("'r_elbow'")));
+  EXPECT_THAT(text_of([](RobotSetup& s) { s.head_joints[0] = "x"; }), HasSubstr("robot.head_joints"));
+  EXPECT_THAT(text_of([](RobotSetup& s) { s.fingertip_links[0] = "x"; }),
+              HasSubstr("robot.fingertip_links"));
+  EXPECT_THAT(text_of([](RobotSetup& s) { s.fixed_joints_rad["x"] = 0; }),
+              HasSubstr("robot.fixed_joints_deg"));
+}
+
+TEST(RobotSetupErrors, ValuesAreChecked) {
+  const auto text_of = [](const std::string& yaml) {
+    try {
+      RobotSetup::from(Configuration::parse(yaml).section("robot"));
+    } catch (const ConfigurationError& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing was thrown");
+  };
+  const std::string good =
+      "robot:\n  urdf: a.urdf\n  rendered_links: [a]\n  hand_link: a\n  estimated_joints: [j]\n";
+  EXPECT_EQ(text_of(good), "nothing was thrown");
+  EXPECT_THAT(text_of(good + "  gravity_m_s2: [0, 1]\n"), HasSubstr("gravity_m_s2"));
+  EXPECT_THAT(text_of(good + "  face_culling: front\n"), HasSubstr("face_culling"));
+  EXPECT_THAT(text_of(good + "  fixed_joints_deg: {j: x}\n"), HasSubstr("fixed_joints_deg"));
+  EXPECT_THAT(text_of("robot:\n  urdf: a.urdf\n  rendered_links: []\n  hand_link: a\n"
+                      "  estimated_joints: [j]\n"),
+              HasSubstr("rendered_links"));
+  EXPECT_THAT(text_of("robot:\n  urdf: a.urdf\n  rendered_links: [a]\n  hand_link: a\n"
+                      "  estimated_joints: [j, j]\n"),
+              HasSubstr("estimated_joints"));
+}
+
+}  // namespace
+}  // namespace bodyschema
