@@ -155,6 +155,7 @@ foreach(folder IN ITEMS config meshes)
   endif()
 endforeach()
 install(FILES LICENSE README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN "__pycache__" EXCLUDE)
 
 # ---- the service ---------------------------------------------------------------------------------
 install(FILES config/service/bodyschemad.service DESTINATION lib/systemd/system)

@@ -19,3 +19,26 @@ if(TARGET lcmtypes_python AND Python3_FOUND)
   set_tests_properties(install.python_example PROPERTIES LABELS install TIMEOUT 240
     SKIP_RETURN_CODE 77)
 endif()
+
+find_program(BODYSCHEMA_DPKG_DEB dpkg-deb)
+mark_as_advanced(BODYSCHEMA_DPKG_DEB)
+if(BODYSCHEMA_DPKG_DEB AND BODYSCHEMA_PROGRAMS AND Python3_FOUND)
+  add_test(NAME install.package
+    COMMAND ${CMAKE_COMMAND}
+      -D BUILD_DIR=${PROJECT_BINARY_DIR} -D SOURCE_DIR=${PROJECT_SOURCE_DIR}
+      -D SCRATCH_DIR=${PROJECT_BINARY_DIR}/test-package
+      -D CPACK=${CMAKE_CPACK_COMMAND} -D DPKG_DEB=${BODYSCHEMA_DPKG_DEB}
+      -D "PROGRAMS=${BODYSCHEMA_PROGRAMS}"
+      -P ${PROJECT_SOURCE_DIR}/test/install/package.cmake)
+  set_tests_properties(install.package PROPERTIES LABELS install TIMEOUT 300)
+endif()
+
+find_program(BODYSCHEMA_SYSTEMD_ANALYZE systemd-analyze)
+mark_as_advanced(BODYSCHEMA_SYSTEMD_ANALYZE)
+if(BODYSCHEMA_SYSTEMD_ANALYZE)
+  # The score of a hardened unit: 0 is a service that can do nothing, 10 one that may do anything.
+  add_test(NAME install.unit_is_hardened
+    COMMAND ${BODYSCHEMA_SYSTEMD_ANALYZE} security --offline=true --threshold=20 --no-pager
+      ${PROJECT_SOURCE_DIR}/config/service/bodyschemad.service)
+  set_tests_properties(install.unit_is_hardened PROPERTIES LABELS install TIMEOUT 60)
+endif()

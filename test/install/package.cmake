@@ -1,0 +1,49 @@
+# Run by ctest (see tests.cmake): makes the Debian package and looks into it.
+file(REMOVE_RECURSE ${SCRATCH_DIR})
+file(MAKE_DIRECTORY ${SCRATCH_DIR})
+execute_process(COMMAND ${CPACK} -G DEB -B ${SCRATCH_DIR} --config ${BUILD_DIR}/CPackConfig.cmake
+                WORKING_DIRECTORY ${SCRATCH_DIR}
+                RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+if(NOT result EQUAL 0)
+  message(FATAL_ERROR "cpack failed:\n${output}")
+endif()
+file(GLOB package ${SCRATCH_DIR}/bodyschema_*.deb)
+execute_process(COMMAND ${DPKG_DEB} -x ${package} ${SCRATCH_DIR}/content COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${DPKG_DEB} -e ${package} ${SCRATCH_DIR}/control COMMAND_ERROR_IS_FATAL ANY)
+
+foreach(path IN ITEMS
+    etc/bodyschema/estimator.yaml etc/default/bodyschemad
+    usr/lib/systemd/system/bodyschemad.service usr/lib/sysctl.d/60-bodyschema.conf
+    usr/share/bodyschema/config/icub_right/estimator.yaml
+    usr/share/bodyschema/meshes/icub_right/icub_right.urdf
+    usr/share/bodyschema/lcmtypes/bodyschema_joint_offsets_t.lcm
+    usr/share/bodyschema/python/bodyschema/joint_offsets_t.py
+    usr/lib/cmake/bodyschema/bodyschemaConfig.cmake
+    usr/include/bodyschema/robot/robot_model.hpp)
+  if(NOT EXISTS ${SCRATCH_DIR}/content/${path})
+    message(SEND_ERROR "the package lacks ${path}")
+  endif()
+endforeach()
+foreach(program IN LISTS PROGRAMS)
+  foreach(path IN ITEMS usr/bin/${program} usr/share/man/man1/${program}.1
+                        usr/share/bash-completion/completions/${program})
+    if(NOT EXISTS ${SCRATCH_DIR}/content/${path})
+      message(SEND_ERROR "the package lacks ${path}")
+    endif()
+  endforeach()
+endforeach()
+
+# Where it was built must not matter to it.
+file(GLOB_RECURSE files ${SCRATCH_DIR}/content/*)
+foreach(file IN LISTS files)
+  file(STRINGS ${file} leaks REGEX "${SOURCE_DIR}/" LIMIT_COUNT 1)
+  if(leaks)
+    message(SEND_ERROR "${file} holds a path of the machine that built it: ${leaks}")
+  endif()
+endforeach()
+
+# The two files in /etc survive upgrades.
+file(STRINGS ${SCRATCH_DIR}/control/conffiles conffiles)
+if(NOT conffiles STREQUAL "/etc/bodyschema/estimator.yaml;/etc/default/bodyschemad")
+  message(SEND_ERROR "conffiles: ${conffiles}")
+endif()
