@@ -254,6 +254,7 @@ std::unique_ptr<Context> create_osmesa() { return std::make_unique<OsmesaContext
 }  // namespace
 
 Context::Context() = default;
+Context::~Context() = default;
 
 void Context::load(std::string platform, GetFunction get_function) {
   functions_ = std::make_unique<Functions>();

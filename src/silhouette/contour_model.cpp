@@ -150,13 +150,18 @@ Part prepare(const TriangleMesh& mesh, FaceCulling culling) {
     high = high.cwiseMax(p);
   }
   part.centre = 0.5f * (low + high);
+  part.half_extent = Eigen::Vector3f::Zero();
   part.vertices.reserve(topology.vertices.size());
   for (const auto& p : topology.vertices) {
     part.vertices.push_back(p - part.centre);
     part.radius = std::max(part.radius, part.vertices.back().norm());
+    part.half_extent = part.half_extent.cwiseMax(part.vertices.back().cwiseAbs());
   }
   part.radius *= 1.0f + 1e-5f;
   part.triangles = topology.triangles;
+  for (const auto component : topology.component) {
+    part.closed.push_back(topology.component_closed[component]);
+  }
 
   std::vector<Plane> planes;
   planes.reserve(part.triangles.size());

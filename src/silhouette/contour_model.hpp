@@ -21,8 +21,10 @@ void check(const SilhouetteModel& model, std::span<const PinholeIntrinsics> came
 struct Part {
   Eigen::Vector3f centre;  ///< part frame, metres
   float radius = 0.0f;     ///< of the sphere around centre that holds every vertex
+  Eigen::Vector3f half_extent;  ///< of the box around centre, metres
   std::vector<Eigen::Vector3f> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::vector<bool> closed;  ///< per triangle: belongs to a closed surface
   std::vector<BlockBounds> bounds;
   std::vector<EdgeBlock> blocks;
   std::vector<EdgeEnds> ends;

@@ -1,5 +1,7 @@
 #include <stdexcept>
 
+#include "atlas_scorer.hpp"
+#include "bodyschema/gl/context.hpp"
 #include "bodyschema/silhouette/silhouette_scorer.hpp"
 #include "contour_scorer.hpp"
 
@@ -9,12 +11,32 @@ std::unique_ptr<SilhouetteScorer> make_silhouette_scorer(const SilhouetteModel& 
                                                          std::span<const PinholeIntrinsics> cameras,
                                                          const SilhouetteOptions& options,
                                                          std::string* reason) {
-  if (options.engine == "contour" || options.engine == "auto") {
-    if (reason != nullptr) *reason = "contour, as asked for";
+  const auto because = [&](std::string why) {
+    if (reason != nullptr) *reason = std::move(why);
+  };
+  if (options.engine == "contour") {
+    because("the configuration asks for contour");
     return make_contour_scorer(model, cameras, options.threads);
   }
-  throw std::invalid_argument("silhouette engine '" + options.engine +
-                              "', expected auto, contour or atlas");
+  if (options.engine == "atlas") {
+    because("the configuration asks for atlas");
+    return make_atlas_scorer(model, cameras, gl::Context::create(options.gl_platform));
+  }
+  if (options.engine != "auto") {
+    throw std::invalid_argument("silhouette engine '" + options.engine +
+                                "', expected auto, contour or atlas");
+  }
+  try {
+    auto context = gl::Context::create(options.gl_platform);
+    if (!context->is_software()) {
+      because("auto: " + context->description() + " is a GPU");
+      return make_atlas_scorer(model, cameras, std::move(context));
+    }
+    because("auto: " + context->description() + " draws in software");
+  } catch (const gl::ContextError& error) {
+    because(std::string("auto: ") + error.what());
+  }
+  return make_contour_scorer(model, cameras, options.threads);
 }
 
 }  // namespace bodyschema

@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <random>
 #include <string>
 
+#include "atlas_scorer.hpp"
 #include "silhouette/reference.hpp"
 #include "silhouette/synthetic_hand.hpp"
 
@@ -18,12 +20,22 @@ struct EngineChoice {
   std::string name;
   SilhouetteOptions options;
   std::string kernel;  // BODYSCHEMA_CONTOUR_KERNEL
+  AtlasOptions atlas;
 };
 
 void PrintTo(const EngineChoice& choice, std::ostream* out) { *out << choice.name; }
 
 class Engine : public testing::TestWithParam<EngineChoice> {
  protected:
+  void SetUp() override {
+    if (GetParam().options.engine != "atlas") return;
+    try {
+      gl::Context::create(GetParam().options.gl_platform);
+    } catch (const gl::ContextError& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+
   std::unique_ptr<SilhouetteScorer> make(const SilhouetteModel& model,
                                          std::span<const PinholeIntrinsics> cameras) const {
     if (GetParam().kernel.empty()) {
@@ -31,7 +43,10 @@ class Engine : public testing::TestWithParam<EngineChoice> {
     } else {
       setenv("BODYSCHEMA_CONTOUR_KERNEL", GetParam().kernel.c_str(), 1);
     }
-    return make_silhouette_scorer(model, cameras, GetParam().options);
+    const auto& options = GetParam().options;
+    if (options.engine != "atlas") return make_silhouette_scorer(model, cameras, options);
+    return make_atlas_scorer(model, cameras, gl::Context::create(options.gl_platform),
+                             GetParam().atlas);
   }
 };
 
@@ -190,6 +205,21 @@ TEST_P(Engine, DisagreeingWindingIsDrawnWithoutCulling) {
   observed[0].mask = BinaryMask(320, 240);
   const auto scorer = make(model, cameras);
   expect_scores(*scorer, model, cameras, observed, X_CB);
+}
+
+TEST_P(Engine, PartTurnedInsideOutDoesNotPunchAHole) {
+  auto inverted = synthetic::lumpy_tube("inside out", 0.12f, 0.05f, 0.04f, 800);
+  for (auto& t : inverted.triangles) std::swap(t[0], t[1]);
+  const auto other = synthetic::lumpy_tube("other", 0.10f, 0.04f, 0.06f, 800);
+  const std::vector cameras{synthetic::camera(320, 240)};
+  const std::vector<Eigen::Isometry3f> X_CB(2, Eigen::Isometry3f(Eigen::Translation3f(-0.06f, 0, 0.4f)));
+  std::vector<ObservedSilhouette> observed(1);
+  observed[0].mask = BinaryMask(320, 240);
+  for (const auto culling : {FaceCulling::kNone, FaceCulling::kBack}) {
+    const SilhouetteModel model{{inverted, other}, culling};
+    const auto scorer = make(model, cameras);
+    expect_scores(*scorer, model, cameras, observed, X_CB);
+  }
 }
 
 TEST_P(Engine, UnweldedTrianglesAreOneSurface) {
@@ -421,10 +451,28 @@ TEST_P(Engine, RejectsWhatItCannotUse) {
   EXPECT_THROW(make(model, flat), std::invalid_argument);
 }
 
+EngineChoice contour_engine(const char* name, int threads, const char* kernel) {
+  return {name, {"contour", "auto", threads}, kernel, {}};
+}
+
+EngineChoice atlas_engine(const char* name, const char* platform, AtlasPass pass) {
+  return {name, {"atlas", platform, 0}, "", {pass, 8192, 4096}};
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Silhouette, Engine,
-    testing::Values(EngineChoice{"contour", {"contour", "auto", 2}, ""},
-                    EngineChoice{"contour_baseline", {"contour", "auto", 1}, "baseline"}),
+    testing::Values(contour_engine("contour", 2, ""),
+                    contour_engine("contour_baseline", 1, "baseline"),
+                    atlas_engine("atlas_compute_egl_device", "egl_device", AtlasPass::kCompute),
+                    atlas_engine("atlas_compute_egl_surfaceless", "egl_surfaceless", AtlasPass::kCompute),
+                    atlas_engine("atlas_compute_osmesa", "osmesa", AtlasPass::kCompute),
+                    atlas_engine("atlas_raster_egl_device", "egl_device", AtlasPass::kRaster),
+                    atlas_engine("atlas_raster_osmesa", "osmesa", AtlasPass::kRaster),
+                    // Room for a single tile or two, and few tiles at once: many passes.
+                    EngineChoice{"atlas_raster_many_passes",
+                                 {"atlas", "egl_surfaceless", 0}, "", {AtlasPass::kRaster, 384, 33}},
+                    EngineChoice{"atlas_compute_many_passes",
+                                 {"atlas", "egl_surfaceless", 0}, "", {AtlasPass::kCompute, 384, 33}}),
     [](const auto& param_info) { return param_info.param.name; });
 
 TEST(Contour, ResultsDoNotDependOnThreads) {
@@ -452,6 +500,44 @@ TEST(Contour, ClosedMeshesLookTheSameWithBothCullings) {
   model.culling = FaceCulling::kBack;
   make_silhouette_scorer(model, cameras, {"contour", "auto", 1})->score(X_CB, back);
   EXPECT_EQ(none, back);
+}
+
+TEST(MakeScorer, AutoTakesContourWhereOpenGlDrawsInSoftware) {
+  const auto model = synthetic::hand(500);
+  const std::vector cameras{synthetic::camera(160, 120)};
+  bool gpu = false;
+  try {
+    gpu = !gl::Context::create("auto")->is_software();
+  } catch (const gl::ContextError&) {
+  }
+  std::string reason;
+  const auto scorer = make_silhouette_scorer(model, cameras, {}, &reason);
+  EXPECT_THAT(scorer->description(), testing::StartsWith(gpu ? "atlas on " : "contour ("));
+  EXPECT_THAT(reason, testing::StartsWith("auto: "));
+}
+
+// Runs in a process of its own, where EGL finds no vendor and there is no OSMesa.
+void choose_without_gl(const char* engine) {
+  setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere/vendor.json", 1);
+  setenv("BODYSCHEMA_OSMESA", "/nowhere/libOSMesa.so", 1);
+  const auto model = synthetic::hand(500);
+  const std::vector cameras{synthetic::camera(160, 120)};
+  try {
+    std::string reason;
+    const auto scorer = make_silhouette_scorer(model, cameras, {engine, "auto", 1}, &reason);
+    std::fprintf(stderr, "%s because %s\n", scorer->description().c_str(), reason.c_str());
+    std::_Exit(0);
+  } catch (const gl::ContextError& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    std::_Exit(3);
+  }
+}
+
+TEST(MakeScorerDeathTest, WithoutOpenGlAutoIsContourAndAtlasSaysWhy) {
+  testing::FLAGS_gtest_death_test_style = "threadsafe";
+  EXPECT_EXIT(choose_without_gl("auto"), testing::ExitedWithCode(0),
+              "contour .* because auto: no headless OpenGL context");
+  EXPECT_EXIT(choose_without_gl("atlas"), testing::ExitedWithCode(3), "no headless OpenGL context");
 }
 
 TEST(MakeScorer, NamesUnknownEngine) {

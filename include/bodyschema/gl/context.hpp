@@ -29,7 +29,7 @@ class Context {
   /// Throws ContextError when there is no such context, std::invalid_argument for an unknown name.
   static std::unique_ptr<Context> create(std::string_view platform = "auto");
 
-  virtual ~Context() = default;
+  virtual ~Context();
   Context(const Context&) = delete;
   Context& operator=(const Context&) = delete;
 

@@ -71,6 +71,7 @@ namespace bodyschema::gl {
   X(Uniform2f, PFNGLUNIFORM2FPROC)                              \
   X(Uniform3f, PFNGLUNIFORM3FPROC)                              \
   X(Uniform4f, PFNGLUNIFORM4FPROC)                              \
+  X(Uniform4iv, PFNGLUNIFORM4IVPROC)                            \
   X(UniformMatrix3fv, PFNGLUNIFORMMATRIX3FVPROC)                \
   X(UniformMatrix4fv, PFNGLUNIFORMMATRIX4FVPROC)                \
   X(UseProgram, PFNGLUSEPROGRAMPROC)                            \

@@ -1,0 +1,220 @@
+#pragma once
+
+namespace bodyschema::atlas {
+
+// Buffers shared by the shaders (std430):
+//  0 placements  per tile and part: three rows of P (centred part frame to homogeneous pixels) and
+//                (camera centre in the centred part frame, 1 if the part is wholly in front)
+//  1 windows     per tile: corner in the atlas x, y; corner in the picture u, v
+//  2 jobs        per workgroup: tile, first column, first row, camera; columns, rows, 0, 0
+//  3 masks       32 pixels a word, per camera all observed words, then all valid words
+//  4 counts      per tile: intersection, predicted
+//  5 rendered    32 pixels a word, one picture, only where a picture is asked for
+//  6, 7          planes and ends of edges
+
+// ---- raster pass -----------------------------------------------------------------------------
+
+// Pixel centres: OpenCV's (u, v) is (u + 0.5, v + 0.5) in window coordinates; rows run upwards in the
+// atlas, so the picture stands on its head there and triangles wind the other way round.
+inline constexpr const char* kRasterVertex = R"(#version 430 core
+layout(location = 0) in vec3 position;
+layout(location = 1) in uint part;
+layout(std430, binding = 0) readonly buffer Placements { vec4 placements[]; };
+layout(std430, binding = 1) readonly buffer Windows { ivec4 windows[]; };
+uniform int parts;
+uniform int first_tile;
+uniform float near_m;
+uniform vec2 tile_size;
+uniform vec2 atlas_size;
+out gl_PerVertex { vec4 gl_Position; float gl_ClipDistance[4]; };
+void main() {
+  int tile = first_tile + gl_InstanceID;
+  int row = (tile * parts + int(part)) * 4;
+  vec4 p = vec4(position, 1.0);
+  vec3 h = vec3(dot(placements[row], p), dot(placements[row + 1], p), dot(placements[row + 2], p));
+  vec4 window = vec4(windows[tile]);
+  vec2 in_tile = h.xy + (0.5 - window.zw) * h.z;  // times depth, like all that follows
+  gl_ClipDistance[0] = in_tile.x;
+  gl_ClipDistance[1] = tile_size.x * h.z - in_tile.x;
+  gl_ClipDistance[2] = in_tile.y;
+  gl_ClipDistance[3] = tile_size.y * h.z - in_tile.y;
+  vec2 in_atlas = in_tile + window.xy * h.z;
+  gl_Position = vec4(2.0 * in_atlas / atlas_size - h.z, h.z - 2.0 * near_m, h.z);
+}
+)";
+
+inline constexpr const char* kRasterFragment = R"(#version 430 core
+layout(location = 0) out float covered;
+void main() { covered = 1.0; }
+)";
+
+// One workgroup a tile; each invocation takes words of 32 pixels.
+inline constexpr const char* kReduce = R"(#version 430 core
+layout(local_size_x = 64) in;
+layout(std430, binding = 1) readonly buffer Windows { ivec4 windows[]; };
+struct Job { ivec4 where; ivec4 size; };
+layout(std430, binding = 2) readonly buffer Jobs { Job jobs[]; };
+layout(std430, binding = 3) readonly buffer Masks { uint masks[]; };
+layout(std430, binding = 4) buffer Counts { uvec2 counts[]; };
+layout(std430, binding = 5) buffer Rendered { uint rendered[]; };
+layout(binding = 0) uniform sampler2D atlas;
+uniform ivec4 cameras[32];  // words a row, rows, first observed word, first valid word
+uniform int first_job;
+uniform int keep_picture;
+shared uint intersection;
+shared uint predicted;
+void main() {
+  Job job = jobs[first_job + int(gl_WorkGroupID.x)];
+  ivec4 window = windows[job.where.x];
+  ivec4 camera = cameras[job.where.w];
+  if (gl_LocalInvocationIndex == 0u) { intersection = 0u; predicted = 0u; }
+  barrier();
+  int words = (job.size.x + 31) / 32;
+  uint in_both = 0u;
+  uint in_one = 0u;
+  for (int i = int(gl_LocalInvocationIndex); i < words * job.size.y; i += 64) {
+    int word = i % words;
+    int row = i / words;
+    int columns = min(32, job.size.x - word * 32);
+    ivec2 at = window.xy + ivec2(word * 32, row);
+    uint bits = 0u;
+    for (int k = 0; k < columns; ++k) {
+      if (texelFetch(atlas, at + ivec2(k, 0), 0).r > 0.5) bits |= 1u << k;
+    }
+    int v = window.w + row;
+    int index = v * camera.x + window.z / 32 + word;
+    in_both += uint(bitCount(bits & masks[camera.z + index]));
+    in_one += uint(bitCount(bits & masks[camera.w + index]));
+    if (keep_picture != 0) rendered[index] = bits;
+  }
+  atomicAdd(intersection, in_both);
+  atomicAdd(predicted, in_one);
+  barrier();
+  if (gl_LocalInvocationIndex == 0u) counts[job.where.x] = uvec2(intersection, predicted);
+}
+)";
+
+// ---- compute pass ----------------------------------------------------------------------------
+
+// One workgroup a strip of a tile. Contour edges add the change of the winding number where they
+// cross the centre of a column, four columns a word, a byte each; sums of such words are exact as
+// integers, so a borrow between bytes on the way disappears again in the sum down the column. A bias
+// of 16 a byte keeps sums non-negative where rounding makes a winding number slip below zero.
+// kLocal, kSharedWords are set in front of this text.
+inline constexpr const char* kContour = R"(
+layout(local_size_x = kLocal) in;
+layout(std430, binding = 0) readonly buffer Placements { vec4 placements[]; };
+struct Job { ivec4 where; ivec4 size; };
+layout(std430, binding = 2) readonly buffer Jobs { Job jobs[]; };
+layout(std430, binding = 3) readonly buffer Masks { uint masks[]; };
+layout(std430, binding = 4) buffer Counts { uint counts[]; };
+layout(std430, binding = 5) buffer Rendered { uint rendered[]; };
+struct Planes { vec4 left; vec4 right; };
+layout(std430, binding = 6) readonly buffer EdgePlanes { Planes planes[]; };
+struct Ends { vec4 from; vec4 to; };  // from.w: 0 counts once, 1 counts twice, 2 open
+layout(std430, binding = 7) readonly buffer EdgeEnds { Ends ends[]; };
+layout(std430, binding = 8) readonly buffer Parts { ivec2 edge_range[]; };
+uniform ivec4 cameras[32];  // words a row, rows, first observed word, first valid word
+uniform int parts;
+uniform int first_job;
+uniform int keep_picture;
+shared uint deltas[kSharedWords];
+shared uint intersection;
+shared uint predicted;
+
+// `precise`: a corner or a triangle met in two edges must come out the same.
+float side(vec4 plane, vec3 c) {
+  precise float s = plane.x * c.x;
+  s = s + plane.y * c.y;
+  s = s + plane.z * c.z;
+  s = s - plane.w;
+  return s;
+}
+float row_times(vec4 row, vec3 p) {
+  precise float s = row.x * p.x;
+  s = s + row.y * p.y;
+  s = s + row.z * p.z;
+  s = s + row.w;
+  return s;
+}
+
+void main() {
+  int me = int(gl_LocalInvocationIndex);
+  Job job = jobs[first_job + int(gl_WorkGroupID.x)];
+  int tile = job.where.x;
+  ivec4 camera = cameras[job.where.w];
+  int columns = job.size.x;
+  int rows = job.size.y;
+  int stride = columns / 4;
+  for (int i = me; i < stride * (rows + 1); i += kLocal) deltas[i] = 0u;
+  if (me == 0) { intersection = 0u; predicted = 0u; }
+  barrier();
+
+  float u_origin = float(job.where.y);
+  float v_origin = float(job.where.z);
+  float width = float(columns);
+  float height = float(rows);
+  for (int part = 0; part < parts; ++part) {
+    int placement = (tile * parts + part) * 4;
+    vec4 c = placements[placement + 3];
+    if (c.w == 0.0) continue;
+    vec4 P0 = placements[placement];
+    vec4 P1 = placements[placement + 1];
+    vec4 P2 = placements[placement + 2];
+    ivec2 range = edge_range[part];
+    for (int e = range.x + me; e < range.y; e += kLocal) {
+      bool left = side(planes[e].left, c.xyz) > 0.0;
+      bool right = side(planes[e].right, c.xyz) > 0.0;
+      vec4 from = ends[e].from;
+      if (left == right && from.w != 2.0) continue;
+      vec3 to = ends[e].to.xyz;
+      int step = left ? -1 : 1;
+      if (from.w == 1.0) step *= 2;
+      precise float z0 = row_times(P2, from.xyz);
+      precise float z1 = row_times(P2, to);
+      precise float u0 = row_times(P0, from.xyz) / z0 - u_origin;
+      precise float u1 = row_times(P0, to) / z1 - u_origin;
+      precise float v0 = row_times(P1, from.xyz) / z0 - v_origin;
+      precise float v1 = row_times(P1, to) / z1 - v_origin;
+      int first = int(ceil(clamp(min(u0, u1), 0.0, width)));
+      int end = int(ceil(clamp(max(u0, u1), 0.0, width)));
+      if (u0 > u1) step = -step;
+      float slope = (v1 - v0) / (u1 - u0);
+      for (int u = first; u < end; ++u) {
+        float v = clamp(v0 + (float(u) - u0) * slope, 0.0, height);
+        int row = int(ceil(v));
+        atomicAdd(deltas[row * stride + (u >> 2)], uint(step) << ((u & 3) * 8));
+      }
+    }
+  }
+  barrier();
+
+  uint in_both = 0u;
+  uint in_one = 0u;
+  for (int word = me; word < stride; word += kLocal) {
+    uint sum = 0x10101010u;
+    int u = job.where.y + word * 4;
+    int index = job.where.z * camera.x + (u >> 5);
+    int shift = u & 31;
+    for (int row = 0; row < rows; ++row) {
+      sum += deltas[row * stride + word];
+      uint other = sum ^ 0x10101010u;
+      uint high = (((other & 0x7f7f7f7fu) + 0x7f7f7f7fu) | other) & 0x80808080u;
+      uint bits = ((high * 0x00204081u) >> 28) << shift;
+      in_both += uint(bitCount(bits & masks[camera.z + index]));
+      in_one += uint(bitCount(bits & masks[camera.w + index]));
+      if (keep_picture != 0) atomicOr(rendered[index], bits);
+      index += camera.x;
+    }
+  }
+  atomicAdd(intersection, in_both);
+  atomicAdd(predicted, in_one);
+  barrier();
+  if (me == 0) {
+    atomicAdd(counts[2 * tile], intersection);
+    atomicAdd(counts[2 * tile + 1], predicted);
+  }
+}
+)";
+
+}  // namespace bodyschema::atlas
