@@ -36,6 +36,7 @@ BusOptions BusOptions::from(const Configuration& bus) {
   sync.max_waiting = static_cast<int>(bus.integer_or("max_waiting", sync.max_waiting, 1, 10'000));
   JointHistoryOptions& joints = sync.joints;
   joints.max_gap = milliseconds(bus, "max_encoder_gap_ms", joints.max_gap, 1e5);
+  joints.max_still_gap = milliseconds(bus, "max_still_encoder_gap_ms", joints.max_still_gap, 1e5);
   joints.max_speed_rad_s =
       radians(bus.number_or("max_joint_speed_deg_s", degrees(joints.max_speed_rad_s), 0.0, 1e6));
   joints.samples = static_cast<int>(bus.integer_or("encoder_samples", joints.samples, 2, 1'000'000));

@@ -7,6 +7,8 @@ namespace bodyschema {
 
 namespace {
 constexpr double kShortestStep_s = 0.010;
+/// Readings this close are the same: a joint at rest.
+constexpr double kStill_rad = 2e-4;
 }
 
 JointHistory::JointHistory(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad,
@@ -87,7 +89,8 @@ JointHistory::Verdict JointHistory::interpolate(const Ring& ring, Microseconds u
   const Sample& after = ring.at(low);
   const Sample& before = ring.at(low > 0 ? low - 1 : low);
   const double step_s = seconds(after.utime - before.utime);
-  const bool gap = after.utime - before.utime > options_.max_gap;
+  const bool still = std::abs(after.q - before.q) <= kStill_rad;
+  const bool gap = after.utime - before.utime > (still ? options_.max_still_gap : options_.max_gap);
   const bool jump = std::abs(after.q - before.q) > options_.max_speed_rad_s * std::max(step_s, kShortestStep_s);
   q = after.q;
   qdot = after.qdot;

@@ -3,12 +3,40 @@
 #include <spdlog/spdlog.h>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/robot/forward_kinematics.hpp"
 
 namespace bodyschema {
 
 namespace {
+
 constexpr std::chrono::seconds kQuietTime{5};
+
+std::vector<std::string> joint_names(const RobotModel& robot) {
+  std::vector<std::string> names;
+  for (const JointInfo& joint : robot.joints()) names.push_back(joint.name);
+  return names;
 }
+
+/// Values of the joints that need not be published: those the configuration fixes, and those that
+/// move nothing that is seen or sees.
+std::map<std::string, double> resting_joints(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                                             const StereoRig& rig) {
+  std::vector<std::string> links = setup.model.rendered_links;
+  links.push_back(setup.hand_link);
+  links.insert(links.end(), setup.fingertip_links.begin(), setup.fingertip_links.end());
+  for (const CameraModel& camera : rig.cameras) links.push_back(camera.link);
+  const ForwardKinematics kinematics(robot, links);
+  const Eigen::VectorXd q = setup.default_joints(*robot);
+  std::map<std::string, double> resting = setup.fixed_joints_rad;
+  for (Eigen::Index j = 0; j < robot->joint_count(); ++j) {
+    bool matters = false;
+    for (std::size_t link = 0; link < links.size() && !matters; ++link) matters = kinematics.moves(j, link);
+    if (!matters) resting.emplace(robot->joints()[static_cast<std::size_t>(j)].name, q[j]);
+  }
+  return resting;
+}
+
+}  // namespace
 
 std::vector<std::pair<std::string, std::uint64_t>> BusStatistics::counters() const {
   std::vector<std::pair<std::string, std::uint64_t>> list;
@@ -40,6 +68,10 @@ ObservationStream::ObservationStream(std::vector<std::string> joint_names,
                         camera.intrinsics.width, camera.intrinsics.height});
   }
 }
+
+ObservationStream::ObservationStream(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                                     const StereoRig& rig, const BusOptions& options)
+    : ObservationStream(joint_names(*robot), resting_joints(robot, setup, rig), rig.cameras, options) {}
 
 bool ObservationStream::receive(std::string_view channel, Bytes message, std::int64_t arrival_us) {
   if (channel == channels_.joint_state) {

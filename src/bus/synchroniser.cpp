@@ -205,7 +205,7 @@ void Synchroniser::resolve(bool finishing) {
       case Verdict::kNotYet: {
         if (!finishing && newest_image_ - utime <= options_.encoder_wait) return;
         // One joint stopped while others go on, or all encoders are late?
-        const bool others_go_on = history_.newest() >= utime;
+        const bool others_go_on = history_.newest() - history_.newest(answer.joint) > options_.joints.max_gap;
         drop(instant, others_go_on ? DropReason::kMissingJoint : DropReason::kNoEncoders);
         continue;
       }

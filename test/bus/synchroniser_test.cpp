@@ -308,6 +308,16 @@ TEST_F(SynchroniserTest, NothingIsInterpolatedAcrossAGap) {
   EXPECT_EQ(dropped(DropReason::kEncoderGap), 2u);
 }
 
+TEST_F(SynchroniserTest, AGapAtRestIsBridgedUpToItsOwnLimit) {
+  make(1);
+  const auto still = [&](int ms) { sync_->add(joints(ms * kMs, {{"arm", 0.4F}, {"neck", 0.1F}})); };
+  for (const int ms : {0, 900, 2000}) still(ms);
+  picture(0, 500 * kMs);
+  picture(0, 1500 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{500, -1}));
+  EXPECT_EQ(dropped(DropReason::kEncoderGap), 1u);
+}
+
 TEST_F(SynchroniserTest, NothingIsInterpolatedAcrossAJump) {
   make(1);
   const auto at = [&](int ms, float q) { sync_->add(joints(ms * kMs, {{"arm", q}, {"neck", 0.0F}})); };

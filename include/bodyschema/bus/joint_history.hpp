@@ -12,8 +12,10 @@ namespace bodyschema {
 struct JointHistoryOptions {
   /// Samples kept per joint; at 100 Hz 1024 are ten seconds.
   int samples = 1024;
-  /// Neighbouring samples further apart than this are not interpolated across.
+  /// Neighbouring samples further apart than this are not interpolated across,
   Microseconds max_gap = 100'000;
+  /// unless the joint reads the same on both sides and they are no further apart than this.
+  Microseconds max_still_gap = 1'000'000;
   /// Neighbouring samples that differ by more than this speed allows (taken over at least 10 ms, for
   /// the noise of closely spaced samples) are a jump, across which nothing is interpolated either.
   double max_speed_rad_s = 20.0;

@@ -2,12 +2,16 @@
 
 #include <array>
 #include <chrono>
+#include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "bodyschema/bus/bus_options.hpp"
 #include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/robot/robot_model.hpp"
+#include "bodyschema/robot/robot_setup.hpp"
 
 namespace bodyschema {
 
@@ -38,6 +42,10 @@ class ObservationStream {
   ///        another size are refused. Throws ConfigurationError for other names.
   ObservationStream(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad,
                     const std::vector<CameraModel>& cameras, const BusOptions& options);
+  /// For a configured robot. A joint that moves a rendered link, the hand, a fingertip or a camera
+  /// must be published or fixed; all others (the other arm, legs) rest at their default.
+  ObservationStream(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup, const StereoRig& rig,
+                    const BusOptions& options);
 
   /// @param arrival_us  the caller's clock, handed through to ArrivedObservation
   /// @return whether the channel is one of our inputs
