@@ -9,11 +9,13 @@
 #include <assimp/Importer.hpp>
 #include <cctype>
 #include <cmath>
+#include <fstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "bodyschema/core/error.hpp"
+#include "collada_guard.hpp"
 
 namespace bodyschema {
 namespace {
@@ -83,6 +85,14 @@ TriangleMesh read_mesh_file(const fs::path& file) {
   if (size > kMaxMeshBytes) {
     throw FileError(file.string() + ": mesh of " + std::to_string(size) + " bytes, at most " +
                     std::to_string(kMaxMeshBytes) + " expected");
+  }
+
+  if (extension == ".dae") {
+    std::string text(size, '\0');
+    std::ifstream(file, std::ios::binary).read(text.data(), static_cast<std::streamsize>(size));
+    if (const std::string danger = collada_danger(text); !danger.empty()) {
+      throw FileError(file.string() + ": mesh cannot be read: " + danger);
+    }
   }
 
   Assimp::Importer importer;

@@ -7,9 +7,9 @@
 #include <fstream>
 #include <mutex>
 #include <sstream>
-#include <string_view>
 
 #include "bodyschema/core/error.hpp"
+#include "xml_scan.hpp"
 
 namespace bodyschema {
 namespace {
@@ -46,42 +46,6 @@ class MessageCollector : public console_bridge::OutputHandler {
   std::unique_lock<std::mutex> lock_;
   std::vector<std::string> errors_;
 };
-
-/// How deep elements nest, found without recursion: the XML parser below recurses once per level,
-/// so a hostile file must be turned away before it is parsed.
-int xml_depth(std::string_view text) {
-  int depth = 0;
-  int deepest = 0;
-  std::size_t i = 0;
-  const auto skip_past = [&](std::string_view end) {
-    const auto at = text.find(end, i);
-    i = at == std::string_view::npos ? text.size() : at + end.size();
-  };
-  while ((i = text.find('<', i)) != std::string_view::npos) {
-    const auto rest = text.substr(i);
-    if (rest.starts_with("<!--")) {
-      skip_past("-->");
-    } else if (rest.starts_with("<![CDATA[")) {
-      skip_past("]]>");
-    } else if (rest.starts_with("<?") || rest.starts_with("<!")) {
-      skip_past(">");
-    } else if (rest.starts_with("</")) {
-      --depth;
-      skip_past(">");
-    } else {
-      char quote = 0;
-      for (++i; i < text.size() && (quote != 0 || text[i] != '>'); ++i) {
-        if (quote != 0) {
-          if (text[i] == quote) quote = 0;
-        } else if (text[i] == '"' || text[i] == '\'') {
-          quote = text[i];
-        }
-      }
-      if (i < text.size() && text[i - 1] != '/') deepest = std::max(deepest, ++depth);
-    }
-  }
-  return deepest;
-}
 
 std::string read_text(const fs::path& file) {
   std::error_code error;
@@ -158,6 +122,7 @@ void break_links(urdf::ModelInterface& model) {
 
 UrdfTree read_urdf(const fs::path& file) {
   const std::string text = read_text(file);
+  // The XML parser below recurses once per level.
   if (const int depth = xml_depth(text); depth > kMaxXmlDepth) {
     throw FileError(file.string() + ": elements nest " + std::to_string(depth) +
                     " deep, at most " + std::to_string(kMaxXmlDepth) + " expected");

@@ -228,6 +228,45 @@ TEST_F(BadInput, StlThatClaimsFourBillionTriangles) {
   std::memcpy(text.data() + 80, &claim, 4);
   EXPECT_THAT(mesh_message("claim.stl", text), HasSubstr("claim.stl"));
 }
+TEST_F(BadInput, ColladaThatNestsOrUnfoldsWithoutEnd) {
+  const std::string good = dae_text(test_box({0, 0, 0}, {1, 1, 1}), "1", "Z_UP", "", "");
+  const auto spoilt = [&](const std::string& nodes, const std::string& library = "") {
+    std::string text = good;
+    const std::string scenes = "<library_visual_scenes>";
+    text.insert(text.find("<node id=\"outer\">"), nodes);
+    text.insert(text.find(scenes), library);
+    return text;
+  };
+  EXPECT_THAT(mesh_message("good.dae", spoilt("<node id='n'/>")), "nothing was thrown");
+  EXPECT_THAT(mesh_message("deep.dae", spoilt([] {
+                std::string open, close;
+                for (int i = 0; i < 100000; ++i) {
+                  open += "<node>";
+                  close += "</node>";
+                }
+                return open + close;
+              }())),
+              AllOf(HasSubstr("deep.dae"), HasSubstr("deep, at most 100")));
+  EXPECT_THAT(mesh_message("self.dae", spoilt("<node id='n'><instance_node url='#n'/></node>")),
+              HasSubstr("cycle"));
+  std::string library = "<library_nodes>";
+  for (int i = 0; i < 9; ++i) {
+    library += "<node id='n" + std::to_string(i) + "'>";
+    for (int k = 0; k < 10; ++k) library += "<instance_node url=\"#n" + std::to_string(i + 1) + "\"/>";
+    library += "</node>";
+  }
+  library += "<node id='n9'/></library_nodes>";
+  EXPECT_THAT(mesh_message("laughs.dae", spoilt("<node><instance_node url='#n0'/></node>", library)),
+              HasSubstr("unfold to more than 100000"));
+  std::string chain = "<library_nodes>";
+  for (int i = 0; i < 50000; ++i) {
+    chain += "<node id='c" + std::to_string(i) + "'><instance_node url='#c" + std::to_string(i + 1) +
+             "'/></node>";
+  }
+  chain += "</library_nodes>";
+  EXPECT_THAT(mesh_message("chain.dae", spoilt("<node><instance_node url='#c0'/></node>", chain)),
+              HasSubstr("nest more than 100 deep"));
+}
 TEST_F(BadInput, UnknownNamesNameTheNearest) {
   const auto urdf = folder_.write("good.urdf", one_part_urdf(""));
   const auto model = RobotModel::load({urdf, {}, {}});

@@ -211,7 +211,7 @@ TEST(ForwardKinematics, AxesGiveTheMotionOfTheHand) {
 }
 
 TEST(ForwardKinematics, TwoHundredParticlesTakeWellUnderTwoMilliseconds) {
-#ifndef NDEBUG
+#if !defined(NDEBUG) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "a timing of optimised code";
 #endif
   const RobotSetup setup = robot_setup("icub_right/robot.yaml");

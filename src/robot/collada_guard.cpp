@@ -1,0 +1,100 @@
+#include "collada_guard.hpp"
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "xml_scan.hpp"
+
+namespace bodyschema {
+namespace {
+
+constexpr int kMaxDepth = 100;
+constexpr std::uint64_t kMaxNodes = 100'000;
+
+struct Node {
+  std::vector<std::size_t> below;                 // nodes inside it
+  std::vector<std::string_view> instances;        // names of nodes it instances
+  enum class State { kNew, kOpen, kDone } state = State::kNew;
+  std::uint64_t unfolded = 0;                     // nodes it stands for, itself included
+};
+
+struct Scene {
+  std::vector<Node> nodes;
+  std::multimap<std::string_view, std::size_t> by_name;  // id, sid and name
+  std::string danger;
+
+  /// Counts what a node unfolds to. Recursion stops at kMaxDepth.
+  std::uint64_t unfold(std::size_t index, int depth) {
+    if (nodes[index].state == Node::State::kDone) return nodes[index].unfolded;
+    if (nodes[index].state == Node::State::kOpen) {
+      danger = "its nodes instance each other in a cycle";
+    } else if (depth > kMaxDepth) {
+      danger = "its nodes nest more than " + std::to_string(kMaxDepth) + " deep";
+    }
+    if (!danger.empty()) return 1;
+    nodes[index].state = Node::State::kOpen;
+    std::uint64_t count = 1;
+    const auto add = [&](std::size_t child) {
+      count += unfold(child, depth + 1);
+      if (count > kMaxNodes && danger.empty()) {
+        danger = "its nodes unfold to more than " + std::to_string(kMaxNodes);
+      }
+    };
+    for (const std::size_t child : nodes[index].below) {
+      if (danger.empty()) add(child);
+    }
+    for (const auto name : nodes[index].instances) {
+      const auto [first, last] = by_name.equal_range(name);
+      for (auto at = first; at != last && danger.empty(); ++at) add(at->second);
+    }
+    nodes[index].state = Node::State::kDone;
+    nodes[index].unfolded = count;
+    return count;
+  }
+};
+
+}  // namespace
+
+std::string collada_danger(std::string_view text) {
+  if (const int depth = xml_depth(text); depth > kMaxDepth) {
+    return "elements nest " + std::to_string(depth) + " deep, at most " +
+           std::to_string(kMaxDepth) + " expected";
+  }
+  Scene scene;
+  std::vector<std::size_t> open;
+  std::vector<std::size_t> tops;
+  XmlScanner scanner(text);
+  for (XmlTag tag; scanner.next(tag);) {
+    if (tag.name == "node" && tag.kind != XmlTag::Kind::kClose) {
+      const std::size_t index = scene.nodes.size();
+      scene.nodes.emplace_back();
+      std::set<std::string_view> names;  // id and name are often the same
+      for (const char* key : {"id", "sid", "name"}) names.insert(tag.attribute(key));
+      names.erase("");
+      for (const auto name : names) scene.by_name.emplace(name, index);
+      if (open.empty()) {
+        tops.push_back(index);
+      } else {
+        scene.nodes[open.back()].below.push_back(index);
+      }
+      if (tag.kind == XmlTag::Kind::kOpen) open.push_back(index);
+    } else if (tag.name == "node" && !open.empty()) {
+      open.pop_back();
+    } else if (tag.name == "instance_node" && tag.kind != XmlTag::Kind::kClose && !open.empty()) {
+      std::string_view url = tag.attribute("url");
+      if (url.starts_with('#')) url.remove_prefix(1);
+      scene.nodes[open.back()].instances.push_back(url);
+    }
+  }
+  std::uint64_t total = 0;
+  for (const std::size_t top : tops) {
+    total += scene.unfold(top, 0);
+    if (!scene.danger.empty()) return scene.danger;
+    if (total > kMaxNodes) return "its nodes unfold to more than " + std::to_string(kMaxNodes);
+  }
+  return {};
+}
+
+}  // namespace bodyschema
