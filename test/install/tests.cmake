@@ -43,3 +43,8 @@ if(BODYSCHEMA_SYSTEMD_ANALYZE)
       ${PROJECT_SOURCE_DIR}/config/service/bodyschemad.service)
   set_tests_properties(install.unit_is_hardened PROPERTIES LABELS install TIMEOUT 60)
 endif()
+
+add_test(NAME docs.pages_agree_with_the_tree
+  COMMAND ${CMAKE_COMMAND} -D SOURCE_DIR=${PROJECT_SOURCE_DIR} -D "STOREYS=${BODYSCHEMA_STOREYS}"
+    -P ${PROJECT_SOURCE_DIR}/test/install/docs.cmake)
+set_tests_properties(docs.pages_agree_with_the_tree PROPERTIES LABELS docs TIMEOUT 60)

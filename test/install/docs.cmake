@@ -1,0 +1,23 @@
+# Run by ctest (see tests.cmake): the pages agree with the tree. Every storey is described, in order;
+# every link to a file leads somewhere.
+file(READ ${SOURCE_DIR}/docs/architecture.md page)
+string(REGEX MATCHALL "\n\\| `[a-z_]+` \\|" rows "${page}")
+string(REGEX REPLACE "[^a-z_;]" "" rows "${rows}")
+if(NOT rows STREQUAL "${STOREYS}")
+  message(SEND_ERROR "docs/architecture.md describes\n  ${rows}\nbut the storeys are\n  ${STOREYS}")
+endif()
+
+file(GLOB_RECURSE pages ${SOURCE_DIR}/docs/*.md)
+foreach(page IN LISTS pages ITEMS ${SOURCE_DIR}/README.md)
+  file(READ ${page} text)
+  get_filename_component(folder ${page} DIRECTORY)
+  # CMake takes a bracket inside a list for a quotation, so the mark goes first.
+  string(REGEX REPLACE "\\]\\(" " link=" text "${text}")
+  string(REGEX MATCHALL " link=[^][;)#: ]+" links "${text}")
+  foreach(link IN LISTS links)
+    string(REPLACE " link=" "" link "${link}")
+    if(NOT EXISTS ${folder}/${link})
+      message(SEND_ERROR "${page}: the link to ${link} leads nowhere")
+    endif()
+  endforeach()
+endforeach()
