@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
   CLI::App app{"Body Schema: markerless calibration of a humanoid's arm from its own eyes"};
   app.require_subcommand(1);
   app.set_version_flag("--version", BODYSCHEMA_VERSION);
+  bodyschema::apps::add_import_yarp(app);
   bodyschema::apps::add_replay(app);
   try {
     app.parse(argc, argv);

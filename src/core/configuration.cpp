@@ -559,7 +559,12 @@ std::vector<std::string> Configuration::texts_or(const std::string& key,
   return texts(key);
 }
 
-void Configuration::reject_unknown_keys() const { reject_unknown(document_->root, ""); }
+void Configuration::reject_unknown_keys() const {
+  const Entry* mapping = document_->find(prefix_, "");
+  if (mapping != nullptr && mapping->mapping) {
+    reject_unknown(*mapping, prefix_.empty() ? "" : prefix_ + ".");
+  }
+}
 
 std::string Configuration::print() const {
   YAML::Emitter out;

@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include "bodyschema/bus/yarp_import.hpp"
+
 namespace bodyschema {
 
 Pipeline::Pipeline(const Configuration& configuration)
@@ -13,6 +15,8 @@ Pipeline::Pipeline(const Configuration& configuration)
       robot_(setup_.load()),
       estimator_(robot_, setup_, rig_, options_),
       configuration_hash_(configuration.hash()) {
+  // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
+  if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
   for (const auto& camera : rig_.cameras) {
     eyes_.push_back({Segmenter(vision_, camera.name, camera.intrinsics.width,
                                camera.intrinsics.height),
@@ -21,9 +25,7 @@ Pipeline::Pipeline(const Configuration& configuration)
 }
 
 ObservationStream Pipeline::make_stream() const {
-  std::vector<std::string> names;
-  for (const auto& joint : robot_->joints()) names.push_back(joint.name);
-  return {names, setup_.fixed_joints_rad, rig_.cameras, bus_};
+  return {robot_, setup_, rig_, bus_};
 }
 
 void Pipeline::straighten(CameraObservation& seen, std::size_t camera) {

@@ -60,7 +60,7 @@ class Configuration {
   [[nodiscard]] std::vector<double> numbers_or(const std::string& key, const std::vector<double>& fallback) const;
   [[nodiscard]] std::vector<std::string> texts_or(const std::string& key, const std::vector<std::string>& fallback) const;
 
-  /// Throws for the first key of the whole document that no getter asked for, e.g.
+  /// Throws for the first key of this mapping, and of those below it, that no getter asked for, e.g.
   /// "config/a.yaml:12: unknown key 'filter.particle'; did you mean 'filter.particles'?".
   void reject_unknown_keys() const;
   /// The whole document with includes, overrides and defaults in force, as YAML.
