@@ -223,9 +223,9 @@ struct Simulator::Impl {
     eye.has_room = true;
   }
 
-  void shoot(std::size_t c, int index, double exposure_s, CameraFrame& frame) const {
+  /// @param frame  null for a dead camera: only the truth is worked out
+  void shoot(std::size_t c, int index, double exposure_s, CameraTruth& truth, CameraFrame* frame) const {
     Eye& eye = eyes[c];
-    CameraTruth& truth = frame.truth;
     robot->joints(exposure_s, eye.q);
     eye.kinematics->compute(eye.q, eye.X_W);
     const Pose X_WC = eye.kinematics->camera(c, eye.X_W.back());
@@ -239,7 +239,7 @@ struct Simulator::Impl {
       truth.fingertips_C.push_back(tip_C);
       truth.fingertips_px.push_back(project(eye.camera, tip_C));
     }
-    if (plan.output == Output::kJoints) return;
+    if (plan.output == Output::kJoints || frame == nullptr) return;
 
     for (std::size_t p = 0; p < parts; ++p) eye.X_CB[p] = (X_CW * eye.X_W[p]).cast<float>();
     Lighting lighting;
@@ -247,12 +247,12 @@ struct Simulator::Impl {
     lighting.ambient = static_cast<float>(settings.ambient);
     lighting.diffuse = static_cast<float>(settings.diffuse);
     eye.rasterizer->draw(eye.X_CB, eye.camera, lighting, static_cast<float>(robot->body().dilation_px));
-    frame.silhouette = eye.rasterizer->mask();
+    frame->silhouette = eye.rasterizer->mask();
     const auto& coverage = eye.rasterizer->coverage();
-    frame.coverage.resize(coverage.size());
+    frame->coverage.resize(coverage.size());
     double covered = 0.0;
     for (std::size_t i = 0; i < coverage.size(); ++i) {
-      frame.coverage[i] = static_cast<std::uint8_t>(255.0f * coverage[i] + 0.5f);
+      frame->coverage[i] = static_cast<std::uint8_t>(255.0f * coverage[i] + 0.5f);
       covered += coverage[i];
     }
     truth.visible_share = covered / static_cast<double>(coverage.size());
@@ -275,7 +275,7 @@ struct Simulator::Impl {
     const double exposure =
         1.0 + settings.exposure_swing * std::sin(2.0 * kPi * exposure_s / settings.exposure_period_s);
     Random noise(plan.seed, c == 0 ? "left image noise" : "right image noise", static_cast<std::uint64_t>(index));
-    eye.sensor->expose(eye.light, exposure, noise, frame.image);
+    eye.sensor->expose(eye.light, exposure, noise, frame->image);
   }
 
   static Eigen::Vector2d project(const CameraModel& camera, const Eigen::Vector3d& p_C) {
@@ -335,6 +335,7 @@ std::optional<SimulatedFrame> Simulator::next() {
   frame.index = static_cast<int>(s.next_slot);
   frame.phase = slot.phase;
   frame.cameras.resize(s.rig.cameras.size());
+  frame.truth.resize(s.rig.cameras.size());
   std::vector<double> exposures(s.rig.cameras.size());
   double latest_s = 0.0;
   for (std::size_t c = 0; c < frame.cameras.size(); ++c) {
@@ -350,7 +351,7 @@ std::optional<SimulatedFrame> Simulator::next() {
     frame.cameras[c]->utime = s.utime(stamp_s);
   }
   const auto shoot = [&](std::size_t c) {
-    if (frame.cameras[c]) s.shoot(c, frame.index, exposures[c], *frame.cameras[c]);
+    s.shoot(c, frame.index, exposures[c], frame.truth[c], frame.cameras[c] ? &*frame.cameras[c] : nullptr);
   };
   if (s.plan.threads > 1 && frame.cameras.size() > 1) {
     std::thread other([&] { shoot(1); });

@@ -54,7 +54,7 @@ struct CameraTruth {
   Pose X_WC = Pose::Identity();     ///< true camera in the root frame
   std::vector<Eigen::Vector3d> fingertips_C;  ///< metres, RobotSetup::fingertip_links
   std::vector<Eigen::Vector2d> fingertips_px; ///< by the true lens
-  double visible_share = 0.0;       ///< of the picture's pixels that show the robot
+  double visible_share = 0.0;       ///< of the picture's pixels that show the robot; 0 without pictures
 };
 
 /// One picture as a camera delivers it.
@@ -63,7 +63,6 @@ struct CameraFrame {
   Image image;                          ///< RGB; empty unless Output::kPictures
   BinaryMask silhouette;                ///< exact; empty with Output::kJoints
   std::vector<std::uint8_t> coverage;   ///< share of each pixel that is robot, 0-255, row order
-  CameraTruth truth;
 };
 
 /// One instant of the cameras and the encoder samples up to it.
@@ -72,6 +71,7 @@ struct SimulatedFrame {
   Phase phase = Phase::kMotion;
   Microseconds utime = 0;  ///< stamp of the first camera present
   std::vector<std::optional<CameraFrame>> cameras;  ///< absent: the camera is dead
+  std::vector<CameraTruth> truth;                   ///< one per camera, dead ones included
   /// Encoder readings since the last frame, oldest first: they reach at least one sample beyond the
   /// latest stamp of this frame, so that its joints can be interpolated at once. Velocities are
   /// backward differences of the readings over 50 ms.
