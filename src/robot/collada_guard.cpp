@@ -1,5 +1,6 @@
 #include "collada_guard.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <set>
@@ -55,6 +56,23 @@ struct Scene {
   }
 };
 
+/// Whether the content of an element, which starts here, is whole numbers between blanks and nothing
+/// else. The mesh reader never gets past a character that it cannot read as part of one.
+bool is_index_list(std::string_view content) {
+  const auto end = std::min(content.find('<'), content.size());
+  if (content.substr(end).starts_with("<![CDATA[")) return false;
+  bool after_digit = false, after_sign = false;
+  for (const char c : content.substr(0, end)) {
+    const bool digit = c >= '0' && c <= '9';
+    const bool sign = c == '-' || c == '+';
+    const bool blank = c == ' ' || c == '\t' || c == '\n' || c == '\r';
+    if (!(digit || blank || sign) || (sign && after_digit) || (after_sign && !digit)) return false;
+    after_digit = digit;
+    after_sign = sign;
+  }
+  return !after_sign;
+}
+
 }  // namespace
 
 std::string collada_danger(std::string_view text) {
@@ -67,6 +85,10 @@ std::string collada_danger(std::string_view text) {
   std::vector<std::size_t> tops;
   XmlScanner scanner(text);
   for (XmlTag tag; scanner.next(tag);) {
+    if (tag.kind == XmlTag::Kind::kOpen && (tag.name == "p" || tag.name == "vcount") &&
+        !is_index_list(scanner.rest())) {
+      return "its <" + std::string(tag.name) + "> holds something that is not a whole number";
+    }
     if (tag.name == "node" && tag.kind != XmlTag::Kind::kClose) {
       const std::size_t index = scene.nodes.size();
       scene.nodes.emplace_back();

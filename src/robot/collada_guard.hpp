@@ -5,9 +5,10 @@
 
 namespace bodyschema {
 
-/// Why a COLLADA text must not be given to the mesh reader, which follows nodes recursively: elements
-/// nest deeper than 100, nodes instance each other in a cycle or a chain longer than 100, or the scene
-/// would unfold to more than 100 000 nodes. Empty when it is harmless.
+/// Why a COLLADA text must not be given to the mesh reader. That reader follows nodes recursively, so
+/// elements must not nest deeper than 100, nodes not instance each other in a cycle or a chain longer
+/// than 100, and the scene not unfold to more than 100 000 nodes; and it loops for ever on an index
+/// list that holds anything but whole numbers. Empty when the text is harmless.
 std::string collada_danger(std::string_view text);
 
 }  // namespace bodyschema

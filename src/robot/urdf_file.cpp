@@ -5,8 +5,11 @@
 
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <mutex>
+#include <set>
 #include <sstream>
+#include <string_view>
 
 #include "bodyschema/core/error.hpp"
 #include "xml_scan.hpp"
@@ -110,11 +113,46 @@ void check_link(const fs::path& file, const urdf::Link& link) {
   }
 }
 
-/// A cycle of links keeps itself alive through urdfdom's shared pointers.
-void break_links(urdf::ModelInterface& model) {
-  for (auto& [name, link] : model.links_) {
-    link->child_links.clear();
-    link->child_joints.clear();
+/// Throws when a link is the child of two joints or its own ancestor. Done on the text: urdfdom
+/// accepts such models and its shared pointers then keep them alive for ever.
+void check_no_cycle(const fs::path& file, std::string_view text) {
+  struct Above {
+    std::string joint;
+    std::string parent;
+  };
+  std::map<std::string, Above> above;  // by child link
+  int depth = 0;
+  std::string joint, parent, child;
+  XmlScanner scanner(text);
+  for (XmlTag tag; scanner.next(tag);) {
+    const bool opens = tag.kind != XmlTag::Kind::kClose;
+    if (opens && depth == 1 && tag.name == "joint") joint = tag.attribute("name");
+    if (opens && depth == 2 && tag.name == "parent") parent = tag.attribute("link");
+    if (opens && depth == 2 && tag.name == "child") child = tag.attribute("link");
+    depth += tag.kind == XmlTag::Kind::kOpen ? 1 : tag.kind == XmlTag::Kind::kClose ? -1 : 0;
+    if (depth != 1 || tag.name != "joint") continue;
+    if (!child.empty()) {
+      const auto [at, fresh] = above.emplace(child, Above{joint, parent});
+      if (!fresh) {
+        throw FileError(file.string() + ": link '" + child + "' is the child of joints '" +
+                        at->second.joint + "' and '" + joint +
+                        "'; a URDF must be a tree without cycles");
+      }
+    }
+    parent.clear();
+    child.clear();
+  }
+  std::set<std::string> safe;  // links known to lead to a root
+  for (const auto& [link, unused] : above) {
+    std::set<std::string> path;
+    for (auto at = above.find(link); at != above.end() && safe.count(at->first) == 0;
+         at = above.find(at->second.parent)) {
+      if (!path.insert(at->first).second) {
+        throw FileError(file.string() + ": link '" + at->first +
+                        "' is its own ancestor; a URDF must be a tree without cycles");
+      }
+    }
+    safe.merge(path);
   }
 }
 
@@ -127,6 +165,7 @@ UrdfTree read_urdf(const fs::path& file) {
     throw FileError(file.string() + ": elements nest " + std::to_string(depth) +
                     " deep, at most " + std::to_string(kMaxXmlDepth) + " expected");
   }
+  check_no_cycle(file, text);
 
   urdf::ModelInterfaceSharedPtr model;
   {
@@ -141,31 +180,13 @@ UrdfTree read_urdf(const fs::path& file) {
     if (!model) throw FileError(file.string() + ": not a usable URDF: " + reason);
   }
 
-  // urdfdom accepts a link with two parents and cycles that hang off the root.
-  std::map<std::string, std::string> parent_joint;  // by child link
-  for (const auto& [name, joint] : model->joints_) {
-    const auto [at, fresh] = parent_joint.emplace(joint->child_link_name, name);
-    if (!fresh) {
-      break_links(*model);
-      throw FileError(file.string() + ": link '" + joint->child_link_name +
-                      "' is the child of joints '" + at->second + "' and '" + name +
-                      "'; a URDF must be a tree without cycles");
-    }
-  }
   UrdfTree tree;
   tree.links.push_back(model->root_link_.get());
-  for (std::size_t i = 0; i < tree.links.size(); ++i) {
+  for (std::size_t i = 0; i < tree.links.size() && i < model->links_.size(); ++i) {
     for (const auto& child : tree.links[i]->child_links) tree.links.push_back(child.get());
   }
   if (tree.links.size() != model->links_.size()) {
-    std::map<std::string, bool> reached;
-    for (const auto* link : tree.links) reached[link->name] = true;
-    for (const auto& [name, link] : model->links_) {
-      if (reached.count(name) != 0) continue;
-      break_links(*model);
-      throw FileError(file.string() + ": link '" + name + "' is not reached from the root '" +
-                      model->root_link_->name + "'; its joints form a cycle");
-    }
+    throw FileError(file.string() + ": its links are not one tree");
   }
 
   for (const auto& [name, joint] : model->joints_) check_joint(file, *joint);

@@ -23,6 +23,8 @@ class XmlScanner {
   explicit XmlScanner(std::string_view text) : text_(text) {}
   /// False at the end of the text.
   bool next(XmlTag& tag);
+  /// What follows the last tag, to the end of the text.
+  [[nodiscard]] std::string_view rest() const { return text_.substr(at_); }
 
  private:
   void skip_past(std::string_view end);

@@ -115,7 +115,7 @@ TEST_F(BadInput, LimitsTheWrongWayRound) {
 TEST_F(BadInput, CycleThroughTheRoot) {
   EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" + joint("j", "a", "b") +
                                  joint("k", "b", "a"))),
-              HasSubstr("not a usable URDF"));
+              HasSubstr("link 'a' is its own ancestor"));
 }
 TEST_F(BadInput, CycleThatHangsOffTheRoot) {
   EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/><link name='c'/>" +
@@ -125,7 +125,7 @@ TEST_F(BadInput, CycleThatHangsOffTheRoot) {
 TEST_F(BadInput, CycleBesideTheRoot) {
   EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/><link name='c'/>" +
                                  joint("k", "b", "c") + joint("l", "c", "b"))),
-              HasSubstr("link 'b' is not reached from the root 'a'; its joints form a cycle"));
+              HasSubstr("link 'b' is its own ancestor"));
 }
 TEST_F(BadInput, TwoRoots) {
   EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>")), HasSubstr("not a usable URDF"));
@@ -266,6 +266,16 @@ TEST_F(BadInput, ColladaThatNestsOrUnfoldsWithoutEnd) {
   chain += "</library_nodes>";
   EXPECT_THAT(mesh_message("chain.dae", spoilt("<node><instance_node url='#c0'/></node>", chain)),
               HasSubstr("nest more than 100 deep"));
+}
+TEST_F(BadInput, ColladaWhoseIndicesAreNotNumbers) {
+  const std::string good = dae_text(test_box({0, 0, 0}, {1, 1, 1}), "1", "Z_UP", "", "");
+  ASSERT_THAT(mesh_message("good.dae", good), "nothing was thrown");
+  for (const char* inserted : {"x ", "- ", "1-2 ", "1.5 ", "&#49; ", "<![CDATA[-]]>"}) {
+    SCOPED_TRACE(inserted);
+    std::string text = good;
+    text.insert(text.find("<p>") + 3, inserted);
+    EXPECT_THAT(mesh_message("indices.dae", text), HasSubstr("its <p> holds something that is not"));
+  }
 }
 TEST_F(BadInput, UnknownNamesNameTheNearest) {
   const auto urdf = folder_.write("good.urdf", one_part_urdf(""));
