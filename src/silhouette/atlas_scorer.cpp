@@ -17,7 +17,9 @@ namespace {
 
 using contour::View;
 
-constexpr int kLocal = 64;           // invocations of a workgroup of the compute pass
+// Invocations of a workgroup of the compute pass: one vector of llvmpipe's, four warps of a GPU's.
+constexpr int kLocalSoftware = 8;
+constexpr int kLocalGpu = 128;
 constexpr int kSharedWords = 7168;   // 28 KiB of the 32 KiB every driver gives
 constexpr int kMaxCameras = 32;
 
@@ -75,7 +77,35 @@ struct TileCounts {
   std::uint32_t intersection, predicted;
 };
 struct CameraLayout {
-  std::int32_t words_per_row, rows, observed, valid;
+  std::int32_t words_per_row, first;
+};
+struct MaskPair {
+  std::uint32_t observed, valid;
+};
+
+// Units of the buffer textures.
+enum TextureUnit : GLuint { kAtlasUnit, kMasksUnit, kPlacementsUnit, kPlanesUnit, kEndsUnit };
+
+// A buffer seen through a texture.
+class BufferTexture {
+ public:
+  BufferTexture(const gl::Functions& gl, GLenum format) : gl_(gl), format_(format) {
+    gl_.GenTextures(1, &id_);
+  }
+  ~BufferTexture() { gl_.DeleteTextures(1, &id_); }
+  BufferTexture(const BufferTexture&) = delete;
+  BufferTexture& operator=(const BufferTexture&) = delete;
+  void bind(TextureUnit unit, const Buffer& buffer) const {
+    gl_.ActiveTexture(GL_TEXTURE0 + unit);
+    gl_.BindTexture(GL_TEXTURE_BUFFER, id_);
+    gl_.TexBuffer(GL_TEXTURE_BUFFER, format_, buffer.id());
+    gl_.ActiveTexture(GL_TEXTURE0);
+  }
+
+ private:
+  const gl::Functions& gl_;
+  GLenum format_;
+  GLuint id_ = 0;
 };
 
 // Pixels a tile may cover: [u_begin, u_end) x [v_begin, v_end).
@@ -100,10 +130,12 @@ class AtlasScorer final : public SilhouetteScorer {
     for (const auto& intrinsics : cameras) cameras_.emplace_back(intrinsics);
     const gl::Context::Current current(*context_);
     if (!current.ok()) throw gl::ContextError("cannot make " + context_->description() + " current");
-    gl_ = std::make_unique<Objects>(context_->functions());
+    gl_ = std::make_unique<Objects>(context_->functions(), context_->is_software());
     read_limits();
     upload_model(model);
     upload_masks();
+    max_tiles_ = std::clamp<std::size_t>(max_texels_ / (4 * model_.parts().size()), 1,
+                                         static_cast<std::size_t>(options_.max_tiles));
     warm_up();
   }
 
@@ -131,7 +163,7 @@ class AtlasScorer final : public SilhouetteScorer {
     for (std::size_t next = 0; next < counts.size();) {
       tiles_.clear();
       placements_.clear();
-      while (next < counts.size() && tiles_.size() < static_cast<std::size_t>(options_.max_tiles)) {
+      while (next < counts.size() && tiles_.size() < max_tiles_) {
         if (((camera_mask >> (next % cameras_.size())) & 1u) != 0) {
           add_tile(next, X_CB.subspan(next * parts, parts));
         }
@@ -178,14 +210,16 @@ class AtlasScorer final : public SilhouetteScorer {
 
  private:
   struct Objects {
-    explicit Objects(const gl::Functions& functions)
+    Objects(const gl::Functions& functions, bool software)
         : gl(functions), placements(gl), windows(gl), jobs(gl), masks(gl), counts(gl), rendered(gl),
-          planes(gl), ends(gl), edge_ranges(gl), vertices(gl), indices(gl),
+          planes(gl), ends(gl), edge_ends(gl), vertices(gl), indices(gl),
+          masks_texture(gl, GL_RG32UI), placements_texture(gl, GL_RGBA32F),
+          planes_texture(gl, GL_RGBA32F), ends_texture(gl, GL_RGBA32F),
           raster(gl, "atlas raster",
                  {{GL_VERTEX_SHADER, atlas::kRasterVertex},
                   {GL_FRAGMENT_SHADER, atlas::kRasterFragment}}),
           reduce(gl, "atlas reduce", {{GL_COMPUTE_SHADER, atlas::kReduce}}),
-          contour(gl, "atlas contour", {{GL_COMPUTE_SHADER, contour_source()}}) {
+          contour(gl, "atlas contour", {{GL_COMPUTE_SHADER, contour_source(software)}}) {
       gl.GenVertexArrays(1, &vertex_array);
       gl.GenFramebuffers(1, &framebuffer);
     }
@@ -197,16 +231,16 @@ class AtlasScorer final : public SilhouetteScorer {
     Objects(const Objects&) = delete;
     Objects& operator=(const Objects&) = delete;
 
-    static const std::string& contour_source() {
-      static const std::string source = "#version 430 core\n#define kLocal " +
-                                        std::to_string(kLocal) + "\n#define kSharedWords " +
-                                        std::to_string(kSharedWords) + "\n" + atlas::kContour;
-      return source;
+    static std::string contour_source(bool software) {
+      return "#version 430 core\n#define kLocal " +
+             std::to_string(software ? kLocalSoftware : kLocalGpu) + "\n#define kSharedWords " +
+             std::to_string(kSharedWords) + "\n" + atlas::kContour;
     }
 
     const gl::Functions& gl;
-    Buffer placements, windows, jobs, masks, counts, rendered, planes, ends, edge_ranges;
+    Buffer placements, windows, jobs, masks, counts, rendered, planes, ends, edge_ends;
     Buffer vertices, indices;
+    BufferTexture masks_texture, placements_texture, planes_texture, ends_texture;
     gl::Program raster, reduce, contour;
     GLuint vertex_array = 0;
     GLuint framebuffer = 0;
@@ -249,7 +283,7 @@ class AtlasScorer final : public SilhouetteScorer {
       float v[4];
     };
     std::vector<Four> planes, ends;
-    std::vector<std::int32_t> ranges;
+    std::vector<std::int32_t> edge_ends;
     for (std::size_t p = 0; p < model_.parts().size(); ++p) {
       const contour::Part& part = model_.parts()[p];
       const auto first = static_cast<std::uint32_t>(vertices.size());
@@ -260,7 +294,6 @@ class AtlasScorer final : public SilhouetteScorer {
         auto& indices = part.closed[t] ? closed : open;
         for (const auto v : part.triangles[t]) indices.push_back(first + v);
       }
-      ranges.push_back(static_cast<std::int32_t>(planes.size() / 2));
       for (const auto& run : part.runs) {
         const float kind = run.always ? 2.0f : run.weight == 2 ? 1.0f : 0.0f;
         for (std::int32_t e = 0; e < run.edge_count; ++e) {
@@ -273,7 +306,7 @@ class AtlasScorer final : public SilhouetteScorer {
           ends.push_back({{edge.to[0], edge.to[1], edge.to[2], 0.0f}});
         }
       }
-      ranges.push_back(static_cast<std::int32_t>(planes.size() / 2));
+      edge_ends.push_back(static_cast<std::int32_t>(planes.size() / 2));
     }
     closed_indices_ = static_cast<GLsizei>(closed.size());
     open_indices_ = static_cast<GLsizei>(open.size());
@@ -284,7 +317,11 @@ class AtlasScorer final : public SilhouetteScorer {
     gl_->indices.write<std::uint32_t>(closed);
     gl_->planes.write<Four>(planes);
     gl_->ends.write<Four>(ends);
-    gl_->edge_ranges.write<std::int32_t>(ranges);
+    gl_->edge_ends.write<std::int32_t>(edge_ends);
+    GLint texels = 0;
+    gl.GetIntegerv(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
+    max_texels_ = static_cast<std::size_t>(texels);
+    if (planes.size() > max_texels_) options_.pass = AtlasPass::kRaster;  // too many edges for it
     gl.BindVertexArray(gl_->vertex_array);
     gl.BindBuffer(GL_ARRAY_BUFFER, gl_->vertices.id());
     gl.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, gl_->indices.id());
@@ -303,22 +340,21 @@ class AtlasScorer final : public SilhouetteScorer {
     std::array<CameraLayout, kMaxCameras> layout{};
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
       const BinaryMask& observed = masks_.observed(c);
-      layout[c] = {2 * observed.words_per_row(), observed.height(), 0, 0};
-      for (const BinaryMask* mask : {&observed, &masks_.valid(c)}) {
-        (mask == &observed ? layout[c].observed : layout[c].valid) =
-            static_cast<std::int32_t>(mask_words_.size());
-        for (int v = 0; v < mask->height(); ++v) {
-          for (int w = 0; w < mask->words_per_row(); ++w) {
-            mask_words_.push_back(static_cast<std::uint32_t>(mask->row(v)[w]));
-            mask_words_.push_back(static_cast<std::uint32_t>(mask->row(v)[w] >> 32));
+      const BinaryMask& valid = masks_.valid(c);
+      layout[c] = {2 * observed.words_per_row(), static_cast<std::int32_t>(mask_words_.size())};
+      for (int v = 0; v < observed.height(); ++v) {
+        for (int w = 0; w < observed.words_per_row(); ++w) {
+          for (const int shift : {0, 32}) {
+            mask_words_.push_back({static_cast<std::uint32_t>(observed.row(v)[w] >> shift),
+                                   static_cast<std::uint32_t>(valid.row(v)[w] >> shift)});
           }
         }
       }
     }
-    gl_->masks.write<std::uint32_t>(mask_words_);
+    gl_->masks.write<MaskPair>(mask_words_);
     for (const gl::Program* program : {&gl_->reduce, &gl_->contour}) {
       program->use();
-      gl.Uniform4iv(program->uniform("cameras"), static_cast<GLsizei>(cameras_.size()),
+      gl.Uniform2iv(program->uniform("cameras"), static_cast<GLsizei>(cameras_.size()),
                     &layout[0].words_per_row);
     }
     masks_changed_ = false;
@@ -400,8 +436,7 @@ class AtlasScorer final : public SilhouetteScorer {
     gl_->placements.write<Placement>(placements_);
     gl_->counts.write<TileCounts>(tile_counts_);
     if (!keep_picture) gl_->rendered.reserve(16);
-    gl_->placements.bind(0);
-    gl_->masks.bind(3);
+    gl_->masks_texture.bind(kMasksUnit, gl_->masks);
     gl_->counts.bind(4);
     gl_->rendered.bind(5);
 
@@ -427,9 +462,10 @@ class AtlasScorer final : public SilhouetteScorer {
     if (!jobs_.empty()) {
       gl_->jobs.write<Job>(jobs_);
       gl_->jobs.bind(2);
-      gl_->planes.bind(6);
-      gl_->ends.bind(7);
-      gl_->edge_ranges.bind(8);
+      gl_->edge_ends.bind(6);
+      gl_->placements_texture.bind(kPlacementsUnit, gl_->placements);
+      gl_->planes_texture.bind(kPlanesUnit, gl_->planes);
+      gl_->ends_texture.bind(kEndsUnit, gl_->ends);
       gl_->contour.use();
       gl.Uniform1i(gl_->contour.uniform("parts"), static_cast<GLint>(model_.parts().size()));
       gl.Uniform1i(gl_->contour.uniform("keep_picture"), keep_picture ? 1 : 0);
@@ -483,6 +519,7 @@ class AtlasScorer final : public SilhouetteScorer {
     gl_->jobs.write<Job>(jobs_);
     gl_->jobs.bind(2);
     gl_->placements.write<Placement>(raster_placements_);
+    gl_->placements.bind(0);
 
     gl.BindFramebuffer(GL_FRAMEBUFFER, gl_->framebuffer);
     gl.Viewport(0, 0, columns * width, rows * height);
@@ -563,7 +600,7 @@ class AtlasScorer final : public SilhouetteScorer {
     const auto pass = options_.pass;
     std::vector<Eigen::Isometry3f> X_CB(model_.parts().size(),
                                         Eigen::Isometry3f(Eigen::Translation3f(0.0f, 0.0f, 1.0f)));
-    for (const auto warmed : {AtlasPass::kRaster, AtlasPass::kCompute}) {
+    for (const auto warmed : {AtlasPass::kRaster, pass}) {
       options_.pass = warmed;
       tiles_.clear();
       placements_.clear();
@@ -584,6 +621,8 @@ class AtlasScorer final : public SilhouetteScorer {
   std::unique_ptr<gl::Context> context_;
   std::unique_ptr<Objects> gl_;
   int max_side_ = 0;
+  std::size_t max_texels_ = 0;  // of a buffer texture
+  std::size_t max_tiles_ = 0;   // in flight at once
   GLsizei closed_indices_ = 0;
   GLsizei open_indices_ = 0;
   bool cull_ = false;
@@ -598,7 +637,7 @@ class AtlasScorer final : public SilhouetteScorer {
   std::vector<Window> reduce_windows_;
   std::vector<Job> jobs_;
   std::vector<TileCounts> tile_counts_;
-  std::vector<std::uint32_t> mask_words_;
+  std::vector<MaskPair> mask_words_;
 };
 
 }  // namespace

@@ -2,15 +2,20 @@
 
 namespace bodyschema::atlas {
 
-// Buffers shared by the shaders (std430):
-//  0 placements  per tile and part: three rows of P (centred part frame to homogeneous pixels) and
-//                (camera centre in the centred part frame, 1 if the part is wholly in front)
+// Shader storage buffers (std430):
+//  0 placements  raster pass: per tile and part four rows, see below
 //  1 windows     per tile: corner in the atlas x, y; corner in the picture u, v
 //  2 jobs        per workgroup: tile, first column, first row, camera; columns, rows, 0, 0
-//  3 masks       32 pixels a word, per camera all observed words, then all valid words
 //  4 counts      per tile: intersection, predicted
 //  5 rendered    32 pixels a word, one picture, only where a picture is asked for
-//  6, 7          planes and ends of edges
+//  6 parts       per part: one beyond its last edge
+// Buffer textures, which llvmpipe reads several times faster than storage buffers:
+//  0 atlas       (a plain texture) the framebuffer
+//  1 masks       per camera and 32 pixels: observed, valid
+//  2 placements  per tile and part: three rows of P (centred part frame to homogeneous pixels) and
+//                (camera centre in the centred part frame, 1 if the part is wholly in front)
+//  3 planes      per edge: plane of the left triangle, plane of the right one
+//  4 ends        per edge: from, and 0 for counts once, 1 for counts twice, 2 for open; to, 0
 
 // ---- raster pass -----------------------------------------------------------------------------
 
@@ -54,11 +59,11 @@ layout(local_size_x = 64) in;
 layout(std430, binding = 1) readonly buffer Windows { ivec4 windows[]; };
 struct Job { ivec4 where; ivec4 size; };
 layout(std430, binding = 2) readonly buffer Jobs { Job jobs[]; };
-layout(std430, binding = 3) readonly buffer Masks { uint masks[]; };
 layout(std430, binding = 4) buffer Counts { uvec2 counts[]; };
 layout(std430, binding = 5) buffer Rendered { uint rendered[]; };
 layout(binding = 0) uniform sampler2D atlas;
-uniform ivec4 cameras[32];  // words a row, rows, first observed word, first valid word
+layout(binding = 1) uniform usamplerBuffer masks;
+uniform ivec2 cameras[32];  // words a row, first word
 uniform int first_job;
 uniform int keep_picture;
 shared uint intersection;
@@ -66,7 +71,7 @@ shared uint predicted;
 void main() {
   Job job = jobs[first_job + int(gl_WorkGroupID.x)];
   ivec4 window = windows[job.where.x];
-  ivec4 camera = cameras[job.where.w];
+  ivec2 camera = cameras[job.where.w];
   if (gl_LocalInvocationIndex == 0u) { intersection = 0u; predicted = 0u; }
   barrier();
   int words = (job.size.x + 31) / 32;
@@ -83,8 +88,9 @@ void main() {
     }
     int v = window.w + row;
     int index = v * camera.x + window.z / 32 + word;
-    in_both += uint(bitCount(bits & masks[camera.z + index]));
-    in_one += uint(bitCount(bits & masks[camera.w + index]));
+    uvec2 mask = texelFetch(masks, camera.y + index).xy;
+    in_both += uint(bitCount(bits & mask.x));
+    in_one += uint(bitCount(bits & mask.y));
     if (keep_picture != 0) rendered[index] = bits;
   }
   atomicAdd(intersection, in_both);
@@ -103,18 +109,16 @@ void main() {
 // kLocal, kSharedWords are set in front of this text.
 inline constexpr const char* kContour = R"(
 layout(local_size_x = kLocal) in;
-layout(std430, binding = 0) readonly buffer Placements { vec4 placements[]; };
 struct Job { ivec4 where; ivec4 size; };
 layout(std430, binding = 2) readonly buffer Jobs { Job jobs[]; };
-layout(std430, binding = 3) readonly buffer Masks { uint masks[]; };
 layout(std430, binding = 4) buffer Counts { uint counts[]; };
 layout(std430, binding = 5) buffer Rendered { uint rendered[]; };
-struct Planes { vec4 left; vec4 right; };
-layout(std430, binding = 6) readonly buffer EdgePlanes { Planes planes[]; };
-struct Ends { vec4 from; vec4 to; };  // from.w: 0 counts once, 1 counts twice, 2 open
-layout(std430, binding = 7) readonly buffer EdgeEnds { Ends ends[]; };
-layout(std430, binding = 8) readonly buffer Parts { ivec2 edge_range[]; };
-uniform ivec4 cameras[32];  // words a row, rows, first observed word, first valid word
+layout(std430, binding = 6) readonly buffer Parts { int edge_ends[]; };
+layout(binding = 1) uniform usamplerBuffer masks;
+layout(binding = 2) uniform samplerBuffer placements;
+layout(binding = 3) uniform samplerBuffer planes;
+layout(binding = 4) uniform samplerBuffer ends;
+uniform ivec2 cameras[32];  // words a row, first word
 uniform int parts;
 uniform int first_job;
 uniform int keep_picture;
@@ -142,7 +146,7 @@ void main() {
   int me = int(gl_LocalInvocationIndex);
   Job job = jobs[first_job + int(gl_WorkGroupID.x)];
   int tile = job.where.x;
-  ivec4 camera = cameras[job.where.w];
+  ivec2 camera = cameras[job.where.w];
   int columns = job.size.x;
   int rows = job.size.y;
   int stride = columns / 4;
@@ -154,20 +158,25 @@ void main() {
   float v_origin = float(job.where.z);
   float width = float(columns);
   float height = float(rows);
+  int next_edge = 0;
   for (int part = 0; part < parts; ++part) {
     int placement = (tile * parts + part) * 4;
-    vec4 c = placements[placement + 3];
+    vec4 c = texelFetch(placements, placement + 3);
+    int first_edge = next_edge;
+    next_edge = edge_ends[part];
     if (c.w == 0.0) continue;
-    vec4 P0 = placements[placement];
-    vec4 P1 = placements[placement + 1];
-    vec4 P2 = placements[placement + 2];
-    ivec2 range = edge_range[part];
-    for (int e = range.x + me; e < range.y; e += kLocal) {
-      bool left = side(planes[e].left, c.xyz) > 0.0;
-      bool right = side(planes[e].right, c.xyz) > 0.0;
-      vec4 from = ends[e].from;
+    vec4 P0 = texelFetch(placements, placement);
+    vec4 P1 = texelFetch(placements, placement + 1);
+    vec4 P2 = texelFetch(placements, placement + 2);
+    for (int e = first_edge + me; e < next_edge; e += kLocal) {
+      bool left = side(texelFetch(planes, 2 * e), c.xyz) > 0.0;
+      vec4 other = texelFetch(planes, 2 * e + 1);
+      bool right = side(other, c.xyz) > 0.0;
+      bool open = other == vec4(0.0, 0.0, 0.0, 1.0);
+      if (left == right && !open) continue;
+      vec4 from = texelFetch(ends, 2 * e);
       if (left == right && from.w != 2.0) continue;
-      vec3 to = ends[e].to.xyz;
+      vec3 to = texelFetch(ends, 2 * e + 1).xyz;
       int step = left ? -1 : 1;
       if (from.w == 1.0) step *= 2;
       precise float z0 = row_times(P2, from.xyz);
@@ -201,8 +210,9 @@ void main() {
       uint other = sum ^ 0x10101010u;
       uint high = (((other & 0x7f7f7f7fu) + 0x7f7f7f7fu) | other) & 0x80808080u;
       uint bits = ((high * 0x00204081u) >> 28) << shift;
-      in_both += uint(bitCount(bits & masks[camera.z + index]));
-      in_one += uint(bitCount(bits & masks[camera.w + index]));
+      uvec2 mask = texelFetch(masks, camera.y + index).xy;
+      in_both += uint(bitCount(bits & mask.x));
+      in_one += uint(bitCount(bits & mask.y));
       if (keep_picture != 0) atomicOr(rendered[index], bits);
       index += camera.x;
     }

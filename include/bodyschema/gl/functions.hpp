@@ -6,10 +6,12 @@ namespace bodyschema::gl {
 
 // Every OpenGL function the project calls, as (name without gl, type of its pointer).
 #define BODYSCHEMA_GL_FUNCTIONS(X)                              \
+  X(ActiveTexture, PFNGLACTIVETEXTUREPROC)                      \
   X(AttachShader, PFNGLATTACHSHADERPROC)                        \
   X(BindBuffer, PFNGLBINDBUFFERPROC)                            \
   X(BindBufferBase, PFNGLBINDBUFFERBASEPROC)                    \
   X(BindFramebuffer, PFNGLBINDFRAMEBUFFERPROC)                  \
+  X(BindRenderbuffer, PFNGLBINDRENDERBUFFERPROC)                \
   X(BindTexture, PFNGLBINDTEXTUREPROC)                          \
   X(BindVertexArray, PFNGLBINDVERTEXARRAYPROC)                  \
   X(BufferData, PFNGLBUFFERDATAPROC)                            \
@@ -63,6 +65,7 @@ namespace bodyschema::gl {
   X(BlitFramebuffer, PFNGLBLITFRAMEBUFFERPROC)                  \
   X(Scissor, PFNGLSCISSORPROC)                                  \
   X(ShaderSource, PFNGLSHADERSOURCEPROC)                        \
+  X(TexBuffer, PFNGLTEXBUFFERPROC)                              \
   X(TexParameteri, PFNGLTEXPARAMETERIPROC)                      \
   X(TexStorage2D, PFNGLTEXSTORAGE2DPROC)                        \
   X(TexSubImage2D, PFNGLTEXSUBIMAGE2DPROC)                      \
@@ -71,7 +74,7 @@ namespace bodyschema::gl {
   X(Uniform2f, PFNGLUNIFORM2FPROC)                              \
   X(Uniform3f, PFNGLUNIFORM3FPROC)                              \
   X(Uniform4f, PFNGLUNIFORM4FPROC)                              \
-  X(Uniform4iv, PFNGLUNIFORM4IVPROC)                            \
+  X(Uniform2iv, PFNGLUNIFORM2IVPROC)                            \
   X(UniformMatrix3fv, PFNGLUNIFORMMATRIX3FVPROC)                \
   X(UniformMatrix4fv, PFNGLUNIFORMMATRIX4FVPROC)                \
   X(UseProgram, PFNGLUSEPROGRAMPROC)                            \
