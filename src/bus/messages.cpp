@@ -1,14 +1,12 @@
 #include "bodyschema/bus/messages.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-#include <optional>
 
-#include "bodyschema/core/error.hpp"
+#include "jpeg.hpp"
 #include "wire_reader.hpp"
 
 namespace bodyschema {
@@ -47,70 +45,8 @@ void read_image(WireReader& in, ImageView& image) {
   }
 }
 
-/// Width and height from a JPEG's frame header; nothing when the bytes are not a whole JPEG file.
-/// Segments are walked as in ITU-T T.81, annex B.
-std::optional<std::pair<int, int>> jpeg_size(Bytes file) {
-  if (file.size() < 4 || file[0] != 0xFF || file[1] != 0xD8) return std::nullopt;
-  // A file cut short would decode to a picture whose lower part is gray: insist on the end marker,
-  // which some encoders follow with zeros.
-  std::size_t end = file.size();
-  while (end > 4 && file[end - 1] == 0) --end;
-  if (file[end - 2] != 0xFF || file[end - 1] != 0xD9) return std::nullopt;
-  std::size_t at = 2;
-  while (at + 4 <= file.size()) {
-    if (file[at] != 0xFF) return std::nullopt;
-    const std::uint8_t marker = file[at + 1];
-    if (marker == 0xFF) {  // fill byte
-      ++at;
-      continue;
-    }
-    const std::size_t length = static_cast<std::size_t>(file[at + 2]) << 8 | file[at + 3];
-    const bool is_frame = marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 &&
-                          marker != 0xCC;
-    if (is_frame) {
-      if (length < 8 || at + 9 > file.size()) return std::nullopt;
-      return std::pair{file[at + 7] << 8 | file[at + 8], file[at + 5] << 8 | file[at + 6]};
-    }
-    if (marker == 0xDA || length < 2) return std::nullopt;  // scan before frame, or a broken length
-    at += 2 + length;
-  }
-  return std::nullopt;
-}
-
 std::string size_text(int width, int height) {
   return std::to_string(width) + "x" + std::to_string(height);
-}
-
-DecodeResult unpack_jpeg(const ImageView& view, Image& out) {
-  const auto size = jpeg_size(view.data);
-  if (!size) return {MessageFault::kBrokenPicture, "not a whole JPEG file"};
-  if (*size != std::pair{view.width, view.height}) {
-    return {MessageFault::kWrongSize, "JPEG of " + size_text(size->first, size->second) +
-                                          " in a message that says " +
-                                          size_text(view.width, view.height)};
-  }
-  try {
-    const cv::Mat file(1, static_cast<int>(view.data.size()), CV_8U,
-                       const_cast<std::uint8_t*>(view.data.data()));
-    const cv::Mat picture = cv::imdecode(file, cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
-    if (picture.empty() || picture.depth() != CV_8U || picture.cols != view.width ||
-        picture.rows != view.height || (picture.channels() != 1 && picture.channels() != 3)) {
-      return {MessageFault::kBrokenPicture, "JPEG does not decode"};
-    }
-    out.width = view.width;
-    out.height = view.height;
-    out.channels = picture.channels();
-    out.data.resize(picture.total() * picture.elemSize());
-    cv::Mat target(picture.rows, picture.cols, picture.type(), out.data.data());
-    if (picture.channels() == 3) {
-      cv::cvtColor(picture, target, cv::COLOR_BGR2RGB);
-    } else {
-      picture.copyTo(target);
-    }
-  } catch (const std::exception&) {  // libjpeg's and OpenCV's complaints, and lack of memory
-    return {MessageFault::kBrokenPicture, "JPEG does not decode"};
-  }
-  return {};
 }
 
 }  // namespace
@@ -248,7 +184,9 @@ DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limit
   if (view.width > limits.max_width_px || view.height > limits.max_height_px) {
     return {MessageFault::kTooLarge, "picture of " + size_text(view.width, view.height)};
   }
-  if (view.pixelformat == image_t::PIXEL_FORMAT_MJPEG) return unpack_jpeg(view, out);
+  if (view.pixelformat == image_t::PIXEL_FORMAT_MJPEG) {
+    return decompress_jpeg(view.data, view.width, view.height, out);
+  }
   const bool gray = view.pixelformat == image_t::PIXEL_FORMAT_GRAY;
   const bool bgr = view.pixelformat == image_t::PIXEL_FORMAT_BGR;
   if (!gray && !bgr && view.pixelformat != image_t::PIXEL_FORMAT_RGB) {
@@ -296,17 +234,8 @@ bot_core::image_t to_message(const Image& image, Microseconds utime) {
 }
 
 bot_core::image_t to_jpeg_message(const Image& image, Microseconds utime, int quality) {
-  if (image.empty() || (image.channels != 1 && image.channels != 3)) {
-    throw DataError("a picture of " + size_text(image.width, image.height) + " with " +
-                    std::to_string(image.channels) + " channels cannot be compressed");
-  }
-  cv::Mat picture(image.height, image.width, image.channels == 1 ? CV_8UC1 : CV_8UC3,
-                  const_cast<std::uint8_t*>(image.data.data()));
-  cv::Mat bgr;
-  if (image.channels == 3) cv::cvtColor(picture, bgr, cv::COLOR_RGB2BGR);
   bot_core::image_t message;
-  cv::imencode(".jpg", image.channels == 3 ? bgr : picture, message.data,
-               {cv::IMWRITE_JPEG_QUALITY, quality});
+  message.data = compress_jpeg(image, quality);
   message.utime = utime;
   message.width = image.width;
   message.height = image.height;

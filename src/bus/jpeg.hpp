@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bodyschema/bus/messages.hpp"
+
+namespace bodyschema {
+
+/// Decompresses a whole JPEG file of exactly this size to gray or RGB. The file's own size is read
+/// and compared before any memory for pixels is taken; whatever libjpeg doubts (an early end, bad
+/// codes) is an error, because a half-decoded picture would look like a good one.
+DecodeResult decompress_jpeg(Bytes file, int width, int height, Image& out);
+
+/// Compresses a gray or RGB picture. @param quality  1 to 100. Throws DataError when it is neither.
+std::vector<std::uint8_t> compress_jpeg(const Image& image, int quality);
+
+}  // namespace bodyschema
