@@ -48,3 +48,15 @@ add_test(NAME docs.pages_agree_with_the_tree
   COMMAND ${CMAKE_COMMAND} -D SOURCE_DIR=${PROJECT_SOURCE_DIR} -D "STOREYS=${BODYSCHEMA_STOREYS}"
     -P ${PROJECT_SOURCE_DIR}/test/install/docs.cmake)
 set_tests_properties(docs.pages_agree_with_the_tree PROPERTIES LABELS docs TIMEOUT 60)
+
+find_program(BODYSCHEMA_JAVA java)
+mark_as_advanced(BODYSCHEMA_JAVA)
+if(TARGET lcmtypes_jar AND BODYSCHEMA_JAVA)
+  add_test(NAME install.lcm_spy_knows_our_types
+    COMMAND ${BODYSCHEMA_JAVA}
+      -cp ${BODYSCHEMA_LCM_JAR}:${PROJECT_BINARY_DIR}/bodyschema-lcmtypes.jar
+      ${PROJECT_SOURCE_DIR}/test/install/LcmSpyTypes.java)
+  list(LENGTH lcm_files type_count)
+  set_tests_properties(install.lcm_spy_knows_our_types PROPERTIES LABELS install TIMEOUT 120
+    PASS_REGULAR_EXPRESSION "Found ${type_count} LCM types\n")
+endif()
