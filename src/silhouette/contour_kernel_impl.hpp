@@ -42,8 +42,43 @@ inline void order(Floats& u0, Floats& v0, Floats& u1, Floats& v1) {
   v1.v = _mm256_blendv_ps(v1.v, v, swap);
 }
 inline void store(float* p, Floats a) { _mm256_store_ps(p, a.v); }
-inline void store_ints(std::int32_t* p, Floats a) {
-  _mm256_store_si256(reinterpret_cast<__m256i*>(p), _mm256_cvttps_epi32(a.v));
+// row * stride + column, for whole numbers.
+inline void store_offsets(std::int32_t* p, Floats row, std::int32_t stride, Floats column) {
+  const __m256i begin = _mm256_mullo_epi32(_mm256_cvttps_epi32(row.v), _mm256_set1_epi32(stride));
+  _mm256_store_si256(reinterpret_cast<__m256i*>(p),
+                     _mm256_add_epi32(begin, _mm256_cvttps_epi32(column.v)));
+}
+inline unsigned low_bits(const std::uint32_t* found) {
+  const __m256i v = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(found));
+  return static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_slli_epi32(v, 31))));
+}
+// For every set of lanes, their numbers in a row, a byte each.
+struct LaneTable {
+  std::uint64_t lanes[256];
+  constexpr LaneTable() : lanes() {
+    for (unsigned set = 0; set < 256; ++set) {
+      unsigned count = 0;
+      for (unsigned lane = 0; lane < 8; ++lane) {
+        if ((set >> lane) & 1u) lanes[set] |= static_cast<std::uint64_t>(lane) << (8 * count++);
+      }
+    }
+  }
+};
+constexpr LaneTable kLaneTable;
+// Appends first + lane for the lanes set in `edges`, with the bit of `left_front` below. Writes all
+// eight: `out` has room.
+inline void append(unsigned edges, unsigned left_front, std::uint32_t first, std::uint32_t*& out) {
+  const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+  const __m256i front =
+      _mm256_and_si256(_mm256_srlv_epi32(_mm256_set1_epi32(static_cast<int>(left_front)), lane),
+                       _mm256_set1_epi32(1));
+  const __m256i number =
+      _mm256_add_epi32(lane, _mm256_set1_epi32(static_cast<int>(first)));
+  const __m256i entry = _mm256_or_si256(_mm256_slli_epi32(number, 1), front);
+  const __m256i order = _mm256_cvtepu8_epi32(
+      _mm_cvtsi64_si128(static_cast<long long>(kLaneTable.lanes[edges])));
+  _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), _mm256_permutevar8x32_epi32(entry, order));
+  out += __builtin_popcount(edges);
 }
 // Rows of eight edges (from, to, unused) to columns.
 inline void gather_ends(const EdgeEnds* ends, const std::uint32_t* found, Floats from[3],
@@ -122,8 +157,22 @@ inline void order(Floats& u0, Floats& v0, Floats& u1, Floats& v1) {
 inline void store(float* p, Floats a) {
   for (int k = 0; k < kLanes; ++k) p[k] = a.v[k];
 }
-inline void store_ints(std::int32_t* p, Floats a) {
-  for (int k = 0; k < kLanes; ++k) p[k] = static_cast<std::int32_t>(a.v[k]);
+inline void store_offsets(std::int32_t* p, Floats row, std::int32_t stride, Floats column) {
+  for (int k = 0; k < kLanes; ++k) {
+    p[k] = static_cast<std::int32_t>(row.v[k]) * stride + static_cast<std::int32_t>(column.v[k]);
+  }
+}
+inline unsigned low_bits(const std::uint32_t* found) {
+  unsigned bits = 0;
+  for (int k = 0; k < kLanes; ++k) bits |= (found[k] & 1u) << k;
+  return bits;
+}
+inline void append(unsigned edges, unsigned left_front, std::uint32_t first, std::uint32_t*& out) {
+  while (edges != 0) {
+    const auto lane = static_cast<unsigned>(__builtin_ctz(edges));
+    *out++ = ((first + lane) << 1) | ((left_front >> lane) & 1u);
+    edges &= edges - 1;
+  }
 }
 inline void gather_ends(const EdgeEnds* ends, const std::uint32_t* found, Floats from[3],
                         Floats to[3]) {
@@ -203,14 +252,6 @@ inline Floats side(const float* nx, const float* ny, const float* nz, const floa
   return fma(load(nz), cz, fma(load(ny), cy, fma(load(nx), cx, splat(0.0f) - load(d))));
 }
 
-inline void append(unsigned edges, unsigned left_front, std::uint32_t first, std::uint32_t*& out) {
-  while (edges != 0) {
-    const auto lane = static_cast<unsigned>(__builtin_ctz(edges));
-    *out++ = ((first + lane) << 1) | ((left_front >> lane) & 1u);
-    edges &= edges - 1;
-  }
-}
-
 std::int32_t find(const EdgeRun& run, const float c[3], std::uint32_t* out) {
   const Floats cx = splat(c[0]);
   const Floats cy = splat(c[1]);
@@ -261,6 +302,8 @@ void accumulate(const EdgeRun& run, std::uint32_t* found, std::int32_t count, co
   Floats v_min = splat(pixel_bounds.v_min), v_max = splat(pixel_bounds.v_max);
   const auto width = static_cast<float>(image.width);
   const auto height = static_cast<float>(image.height);
+  const std::uint8_t step[2] = {static_cast<std::uint8_t>(run.weight),
+                                static_cast<std::uint8_t>(-run.weight)};
   for (std::int32_t first = 0; first < count; first += kLanes) {
     const std::uint32_t* const edges = found + first;
     Floats from[3], to[3];
@@ -278,43 +321,32 @@ void accumulate(const EdgeRun& run, std::uint32_t* found, std::int32_t count, co
     v_min = min(v_min, min(v0, v1));
     v_max = max(v_max, max(v0, v1));
 
-    // The edge crosses the centres of columns first_column .. end_column - 1.
-    const Floats first_column = ceil(min(max(u0, splat(0.0f)), splat(width)));
-    const Floats end_column = ceil(min(max(u1, splat(0.0f)), splat(width)));
+    // The edge crosses the centres of columns first .. end - 1, a column of all eight at a time.
+    Floats column = ceil(min(max(u0, splat(0.0f)), splat(width)));
+    const Floats end = ceil(min(max(u1, splat(0.0f)), splat(width)));
+    const std::int32_t lanes = count - first < kLanes ? count - first : kLanes;
+    unsigned left = greater(end, column) & (0xFFu >> (kLanes - lanes));
+    if (left == 0) continue;
+    const unsigned negative = ~(low_bits(edges) ^ backwards);
     const Floats slope = (v1 - v0) / (u1 - u0);
-    const Floats v_first = fma(first_column - u0, slope, v0);
-    // Rounding must not carry a crossing beyond the bounds that resolve() clears.
+    // Rounding must not carry a crossing beyond the bounds that resolve() clears; an overflow that
+    // made a NaN ends at `low`.
     const Floats low = min(max(min(v0, v1), splat(0.0f)), splat(height));
     const Floats high = min(max(max(v0, v1), splat(0.0f)), splat(height));
-    alignas(32) std::int32_t column[kLanes];
-    alignas(32) std::int32_t end[kLanes];
-    alignas(32) float v_lane[kLanes];
-    alignas(32) float slope_lane[kLanes];
-    alignas(32) float low_lane[kLanes];
-    alignas(32) float high_lane[kLanes];
-    store_ints(column, first_column);
-    store_ints(end, end_column);
-    store(v_lane, v_first);
-    store(slope_lane, slope);
-    store(low_lane, low);
-    store(high_lane, high);
-    const std::int32_t lanes = count - first < kLanes ? count - first : kLanes;
-    for (std::int32_t k = 0; k < lanes; ++k) {
-      const std::int32_t columns = end[k] - column[k];
-      if (columns <= 0) continue;
-      const bool negative = ((edges[k] ^ 1u ^ (backwards >> k)) & 1u) != 0;
-      const auto step = static_cast<std::uint8_t>(negative ? -run.weight : run.weight);
-      std::uint8_t* at = image.deltas + column[k];
-      for (std::int32_t i = 0; i < columns; ++i, ++at) {
-        float v = v_lane[k] + static_cast<float>(i) * slope_lane[k];
-        v = v > low_lane[k] ? v : low_lane[k];  // also where an overflow made a NaN
-        v = v < high_lane[k] ? v : high_lane[k];
-        auto row = static_cast<std::int32_t>(v);
-        row += static_cast<float>(row) < v ? 1 : 0;
-        std::uint8_t& delta = at[static_cast<std::ptrdiff_t>(row) * image.stride];
-        delta = static_cast<std::uint8_t>(delta + step);
-      }
-    }
+    do {
+      const Floats v = min(max(fma(column - u0, slope, v0), low), high);
+      alignas(32) std::int32_t offset[kLanes];
+      store_offsets(offset, ceil(v), image.stride, column);
+      unsigned todo = left;
+      do {
+        const int k = __builtin_ctz(todo);
+        todo &= todo - 1;
+        std::uint8_t& delta = image.deltas[offset[k]];
+        delta = static_cast<std::uint8_t>(delta + step[(negative >> k) & 1u]);
+      } while (todo != 0);
+      column = column + splat(1.0f);
+      left &= greater(end, column);
+    } while (left != 0);
   }
   alignas(32) float lane[4][kLanes];
   store(lane[0], u_min);

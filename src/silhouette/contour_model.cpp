@@ -17,6 +17,10 @@ constexpr float kFarthest_m = 1e6f;
 // sorted into blocks, so results do not depend on it.
 constexpr float kTypicalDistance_m = 0.3f;
 
+// Edges of one run: 64 bytes each, so that a run stays in the second-level cache while a batch of
+// pictures goes through it.
+constexpr std::size_t kRunEdges = 2048;
+
 struct Plane {
   Eigen::Vector3f n = Eigen::Vector3f::Zero();
   float d = 0.0f;
@@ -72,20 +76,12 @@ void cluster(std::span<RunEdge> edges) {
   cluster(edges.subspan(middle));
 }
 
-struct RunPlan {
-  std::vector<RunEdge> edges;
-  int weight = 1;
-  bool always = false;
-};
-
-void append_run(Part& part, RunPlan plan) {
-  if (plan.edges.empty()) return;
-  cluster(plan.edges);
+void append_run(Part& part, std::span<const RunEdge> edges, int weight, bool always) {
   EdgeRun run;
-  run.weight = plan.weight;
-  run.always = plan.always;
-  run.edge_count = static_cast<std::int32_t>(plan.edges.size());
-  const std::size_t blocks = (plan.edges.size() + kLanes - 1) / kLanes;
+  run.weight = weight;
+  run.always = always;
+  run.edge_count = static_cast<std::int32_t>(edges.size());
+  const std::size_t blocks = (edges.size() + kLanes - 1) / kLanes;
   const std::size_t groups = (blocks + kLanes - 1) / kLanes;
   run.block_count = static_cast<std::int32_t>(blocks);
   const std::size_t first_block = part.blocks.size();
@@ -98,11 +94,11 @@ void append_run(Part& part, RunPlan plan) {
   }
   for (std::size_t b = 0; b < blocks; ++b) {
     EdgeBlock& block = part.blocks[first_block + b];
-    const std::size_t count = std::min<std::size_t>(kLanes, plan.edges.size() - b * kLanes);
+    const std::size_t count = std::min<std::size_t>(kLanes, edges.size() - b * kLanes);
     Eigen::Vector3d mean_n = Eigen::Vector3d::Zero();
     double mean_d = 0.0;
     for (std::size_t k = 0; k < count; ++k) {
-      const RunEdge& edge = plan.edges[b * kLanes + k];
+      const RunEdge& edge = edges[b * kLanes + k];
       block.left_nx[k] = edge.left.n.x();
       block.left_ny[k] = edge.left.n.y();
       block.left_nz[k] = edge.left.n.z();
@@ -122,7 +118,7 @@ void append_run(Part& part, RunPlan plan) {
     double spread = 0.0;
     double slack = 0.0;
     for (std::size_t k = 0; k < count; ++k) {
-      for (const Plane* plane : {&plan.edges[b * kLanes + k].left, &plan.edges[b * kLanes + k].right}) {
+      for (const Plane* plane : {&edges[b * kLanes + k].left, &edges[b * kLanes + k].right}) {
         spread = std::max(spread, (plane->n.cast<double>() - mean_n).norm());
         slack = std::max(slack, std::abs(static_cast<double>(plane->d) - mean_d));
       }
@@ -138,6 +134,14 @@ void append_run(Part& part, RunPlan plan) {
     bounds.slack[lane] = static_cast<float>(slack) + 1e-6f * part.radius;
   }
   part.runs.push_back(run);
+}
+
+void append_runs(Part& part, std::vector<RunEdge> edges, int weight, bool always) {
+  cluster(edges);
+  for (std::size_t first = 0; first < edges.size(); first += kRunEdges) {
+    append_run(part, std::span(edges).subspan(first, std::min(kRunEdges, edges.size() - first)),
+               weight, always);
+  }
 }
 
 Part prepare(const TriangleMesh& mesh, FaceCulling culling) {
@@ -173,22 +177,22 @@ Part prepare(const TriangleMesh& mesh, FaceCulling culling) {
   // that face away weigh nothing in a closed surface (each pixel they cover has a front as well) and
   // under back-face culling; otherwise they are turned over, weigh as much as fronts, and every
   // contour edge counts twice. An open edge under culling has a neighbour that never faces anyone.
-  RunPlan single, twice{{}, 2, false}, open{{}, 1, true};
+  std::vector<RunEdge> single, twice, open;
   const bool cull = culling == FaceCulling::kBack;
   for (const auto& edge : topology.edges) {
     const bool closed = topology.component_closed[topology.component[edge.left]];
     (closed || cull ? single : twice)
-        .edges.push_back({planes[edge.left], planes[edge.right], part.vertices[edge.from],
+        .push_back({planes[edge.left], planes[edge.right], part.vertices[edge.from],
                           part.vertices[edge.to]});
   }
   for (const auto& edge : topology.open_edges) {
     (cull ? single : open)
-        .edges.push_back({planes[edge.triangle], Plane{Eigen::Vector3f::Zero(), 1.0f},
+        .push_back({planes[edge.triangle], Plane{Eigen::Vector3f::Zero(), 1.0f},
                           part.vertices[edge.from], part.vertices[edge.to]});
   }
-  append_run(part, std::move(single));
-  append_run(part, std::move(twice));
-  append_run(part, std::move(open));
+  append_runs(part, std::move(single), 1, false);
+  append_runs(part, std::move(twice), 2, false);
+  append_runs(part, std::move(open), 1, true);
   // Now that the vectors have stopped moving.
   std::size_t block = 0;
   std::size_t group = 0;

@@ -1,6 +1,7 @@
 #include "contour_scorer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <new>
@@ -20,12 +21,16 @@ using contour::Model;
 using contour::PixelBounds;
 using contour::View;
 
+// Pictures that go through the model together: a run of edges is fetched once for all of them.
+constexpr std::size_t kBatch = 8;
+
 // What one worker needs for itself.
 struct Scratch {
   struct Free {
     void operator()(std::uint8_t* p) const { ::operator delete[](p, std::align_val_t{64}); }
   };
-  std::unique_ptr<std::uint8_t[], Free> deltas;
+  std::unique_ptr<std::uint8_t[], Free> deltas;  // of kBatch pictures
+  std::array<contour::PlacedPart, kBatch> placed; // of one part
   std::vector<std::uint32_t> found;
   std::vector<Eigen::Vector3f> points;
 };
@@ -59,15 +64,14 @@ class ContourScorer final : public SilhouetteScorer {
   ContourScorer(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras,
                 int threads)
       : model_(model), masks_(cameras), kernel_(contour::best_kernel()), pool_(threads) {
-    std::size_t largest = 0;
     for (const auto& intrinsics : cameras) {
       cameras_.emplace_back(intrinsics);
-      largest = std::max(largest, static_cast<std::size_t>(stride(intrinsics)) *
-                                      static_cast<std::size_t>(intrinsics.height + 1));
+      delta_bytes_ = std::max(delta_bytes_, static_cast<std::size_t>(stride(intrinsics)) *
+                                                static_cast<std::size_t>(intrinsics.height + 1));
     }
     scratch_.resize(static_cast<std::size_t>(pool_.threads()));
     for (auto& scratch : scratch_) {
-      scratch.deltas.reset(new (std::align_val_t{64}) std::uint8_t[largest]());
+      scratch.deltas.reset(new (std::align_val_t{64}) std::uint8_t[kBatch * delta_bytes_]());
       scratch.found.resize(model_.max_edges() + contour::kLanes);
       scratch.points.resize(model_.max_vertices());
     }
@@ -83,21 +87,33 @@ class ContourScorer final : public SilhouetteScorer {
     assert(counts.size() % cameras_.size() == 0 && X_CB.size() == counts.size() * parts);
     auto body = [&](int worker, std::size_t begin, std::size_t end) {
       Scratch& scratch = scratch_[static_cast<std::size_t>(worker)];
+      std::array<Picture, kBatch> batch;
+      std::size_t size = 0;
+      const auto flush = [&] {
+        draw(scratch, std::span(batch).first(size));
+        for (const Picture& picture : std::span(batch).first(size)) {
+          *picture.out = {picture.counts.intersection, picture.counts.predicted,
+                          masks_.count(picture.camera)};
+        }
+        size = 0;
+      };
       for (std::size_t i = begin; i < end; ++i) {
         const std::size_t camera = i % cameras_.size();
         counts[i] = {};
         if (((camera_mask >> camera) & 1u) == 0) continue;
-        const auto drawn = draw(scratch, X_CB.subspan(i * parts, parts), camera, nullptr);
-        counts[i] = {drawn.intersection, drawn.predicted, masks_.count(camera)};
+        batch[size++] = {X_CB.data() + i * parts, camera, &counts[i], nullptr, {}};
+        if (size == kBatch) flush();
       }
+      flush();
     };
-    pool_.run(counts.size(), 8, body);
+    pool_.run(counts.size(), kBatch, body);
   }
 
   BinaryMask render(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera) override {
     const auto& k = cameras_.at(camera).intrinsics;
     BinaryMask mask(k.width, k.height);
-    draw(scratch_.front(), X_CB, camera, mask.row(0));
+    std::array<Picture, 1> picture{Picture{X_CB.data(), camera, nullptr, mask.row(0), {}}};
+    draw(scratch_.front(), picture);
     return mask;
   }
 
@@ -109,32 +125,52 @@ class ContourScorer final : public SilhouetteScorer {
  private:
   static std::int32_t stride(const PinholeIntrinsics& k) { return (k.width + 63) / 64 * 64; }
 
-  contour::Counts draw(Scratch& scratch, std::span<const Eigen::Isometry3f> X_CB,
-                       std::size_t camera_index, std::uint64_t* rendered) const {
-    const Camera& camera = cameras_[camera_index];
-    const auto& k = camera.intrinsics;
-    const DeltaImage image{scratch.deltas.get(), stride(k), k.width, k.height};
+  struct Picture {
+    const Eigen::Isometry3f* X_CB = nullptr;  // one per part
+    std::size_t camera = 0;
+    SilhouetteCounts* out = nullptr;
+    std::uint64_t* rendered = nullptr;  // words of a mask, or null
+    contour::Counts counts;
+  };
+
+  void draw(Scratch& scratch, std::span<Picture> pictures) const {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
-    PixelBounds bounds{kInfinity, -kInfinity, kInfinity, -kInfinity};
+    std::array<DeltaImage, kBatch> images;
+    std::array<PixelBounds, kBatch> bounds;
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+      const auto& k = cameras_[pictures[i].camera].intrinsics;
+      images[i] = {scratch.deltas.get() + i * delta_bytes_, stride(k), k.width, k.height};
+      bounds[i] = {kInfinity, -kInfinity, kInfinity, -kInfinity};
+    }
     for (std::size_t p = 0; p < model_.parts().size(); ++p) {
       const contour::Part& part = model_.parts()[p];
-      const contour::PlacedPart placed = contour::place(part, camera, X_CB[p]);
-      if (placed.view == View::kInvisible) continue;
-      if (placed.view == View::kCut) {
-        contour::for_each_cut_segment(
-            part, model_.culling(), placed, scratch.points,
-            [&](const contour::Segment& s) { accumulate_segment(s, k, image, bounds); });
-        continue;
+      auto& placed = scratch.placed;
+      for (std::size_t i = 0; i < pictures.size(); ++i) {
+        const Camera& camera = cameras_[pictures[i].camera];
+        placed[i] = contour::place(part, camera, pictures[i].X_CB[p]);
+        if (placed[i].view == View::kCut) {
+          contour::for_each_cut_segment(
+              part, model_.culling(), placed[i], scratch.points, [&](const contour::Segment& s) {
+                accumulate_segment(s, camera.intrinsics, images[i], bounds[i]);
+              });
+        }
       }
       for (const auto& run : part.runs) {
-        const std::int32_t count = kernel_.find(run, placed.camera_B, scratch.found.data());
-        kernel_.accumulate(run, scratch.found.data(), count, placed.P, image, bounds);
+        for (std::size_t i = 0; i < pictures.size(); ++i) {
+          if (placed[i].view != View::kInFront) continue;
+          const std::int32_t count = kernel_.find(run, placed[i].camera_B, scratch.found.data());
+          kernel_.accumulate(run, scratch.found.data(), count, placed[i].P, images[i], bounds[i]);
+        }
       }
     }
-    const BinaryMask& observed = masks_.observed(camera_index);
-    return kernel_.resolve(image, bounds,
-                           MaskWords{observed.row(0), masks_.valid(camera_index).row(0), rendered,
-                                     observed.words_per_row()});
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+      const std::size_t camera = pictures[i].camera;
+      const BinaryMask& observed = masks_.observed(camera);
+      pictures[i].counts = kernel_.resolve(
+          images[i], bounds[i],
+          MaskWords{observed.row(0), masks_.valid(camera).row(0), pictures[i].rendered,
+                    observed.words_per_row()});
+    }
   }
 
   Model model_;
@@ -143,6 +179,7 @@ class ContourScorer final : public SilhouetteScorer {
   const Kernel& kernel_;
   WorkerPool pool_;
   std::vector<Scratch> scratch_;
+  std::size_t delta_bytes_ = 0;  // of the largest camera
 };
 
 }  // namespace
