@@ -1,8 +1,10 @@
 #include "collada_guard.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -73,9 +75,71 @@ bool is_index_list(std::string_view content) {
   return !after_sign;
 }
 
+/// A whole number of at most nine digits; an absent one is `fallback`, anything else is nothing.
+std::optional<std::uint64_t> count_of(const XmlTag& tag, std::string_view key,
+                                      std::uint64_t fallback) {
+  const std::string_view text = tag.attribute(key);
+  if (text.empty()) return fallback;
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || text.size() > 9) return {};
+  return value;
+}
+
+/// Every accessor of a mesh must stay inside its array; the mesh reader does not look.
+std::string accessor_danger(std::string_view text) {
+  struct Accessor {
+    std::string_view source;
+    std::uint64_t offset, count, stride, params;
+    bool of_mesh;
+  };
+  std::map<std::string_view, std::uint64_t> values_of;  // by id of the array
+  std::vector<Accessor> accessors;
+  bool in_mesh = false;
+  XmlScanner scanner(text);
+  for (XmlTag tag; scanner.next(tag);) {
+    if (tag.kind == XmlTag::Kind::kClose) {
+      if (tag.name == "mesh") in_mesh = false;
+      continue;
+    }
+    if (tag.name == "mesh") {
+      in_mesh = tag.kind == XmlTag::Kind::kOpen;
+    } else if (tag.name == "float_array") {
+      const auto count = count_of(tag, "count", 0);
+      if (!count) return "a <float_array> has no usable count";
+      const auto [at, fresh] = values_of.emplace(tag.attribute("id"), *count);
+      if (!fresh) at->second = std::min(at->second, *count);
+    } else if (tag.name == "accessor") {
+      std::string_view source = tag.attribute("source");
+      if (source.starts_with('#')) source.remove_prefix(1);
+      const auto offset = count_of(tag, "offset", 0), count = count_of(tag, "count", 0),
+                 stride = count_of(tag, "stride", 1);
+      if (!offset || !count || !stride) return "an <accessor> has no usable count";
+      accessors.push_back({source, *offset, *count, *stride, 0, in_mesh});
+    } else if (tag.name == "param" && !accessors.empty()) {
+      ++accessors.back().params;
+    }
+  }
+  for (const auto& accessor : accessors) {
+    const auto array = values_of.find(accessor.source);
+    if (array == values_of.end() && !accessor.of_mesh) continue;  // names, not numbers
+    const std::uint64_t values = array == values_of.end() ? 0 : array->second;
+    const std::uint64_t needed =
+        accessor.count == 0 ? 0
+                            : accessor.offset + (accessor.count - 1) * accessor.stride +
+                                  std::max(accessor.stride, accessor.params);
+    if (needed > values) {
+      return "an <accessor> reaches " + std::to_string(needed) + " values into <float_array> '" +
+             std::string(accessor.source) + "' of " + std::to_string(values);
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 std::string collada_danger(std::string_view text) {
+  if (std::string danger = accessor_danger(text); !danger.empty()) return danger;
   if (const int depth = xml_depth(text); depth > kMaxDepth) {
     return "elements nest " + std::to_string(depth) + " deep, at most " +
            std::to_string(kMaxDepth) + " expected";

@@ -277,6 +277,26 @@ TEST_F(BadInput, ColladaWhoseIndicesAreNotNumbers) {
     EXPECT_THAT(mesh_message("indices.dae", text), HasSubstr("its <p> holds something that is not"));
   }
 }
+TEST_F(BadInput, ColladaArraysShorterThanTheirAccessor) {
+  const std::string good = dae_text(test_box({0, 0, 0}, {1, 1, 1}), "1", "Z_UP", "", "");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    const auto at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+  };
+  for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
+           {"id=\"pa\" count=\"24\"", "id=\"pa\""},
+           {"id=\"pa\" count=\"24\"", "id=\"pa\" count=\"23\""},
+           {"id=\"pa\" count=\"24\"", "id=\"pa\" count=\"-1\""},
+           {"id=\"pa\" count=\"24\"", "id=\"pb\" count=\"24\""},
+           {"count=\"8\" stride=\"3\"", "count=\"900000000\" stride=\"3\""},
+           {"count=\"8\" stride=\"3\"", "count=\"8\" stride=\"999999999\""},
+           {"count=\"8\" stride=\"3\"", "count=\"8\" stride=\"3\" offset=\"1\""}}) {
+    SCOPED_TRACE(to);
+    EXPECT_THAT(mesh_message("short.dae", with(from, to)), HasSubstr("short.dae: mesh cannot be read"));
+  }
+}
 TEST_F(BadInput, UnknownNamesNameTheNearest) {
   const auto urdf = folder_.write("good.urdf", one_part_urdf(""));
   const auto model = RobotModel::load({urdf, {}, {}});
