@@ -264,6 +264,7 @@ std::string range_text(const std::string& kind, double min, double max) {
     return std::string(text);
   };
   if (std::isinf(min) && std::isinf(max)) return kind;
+  if (min == max) return show(min);
   if (std::isinf(max)) return kind + " of at least " + show(min);
   if (std::isinf(min)) return kind + " of at most " + show(max);
   return kind + " from " + show(min) + " to " + show(max);
@@ -376,14 +377,22 @@ Configuration Configuration::load(const fs::path& file, const std::vector<std::s
     }
     merge_into(document->root, std::move(top));
   }
-  return {document, ""};
+  Configuration configuration{document, ""};
+  configuration.check_version();
+  return configuration;
 }
 
 Configuration Configuration::parse(std::string_view yaml, const fs::path& directory) {
   Reader reader;
   auto document = std::make_shared<Document>();
   document->root = reader.read_text(std::string(yaml), directory / "configuration.yaml");
-  return {document, ""};
+  Configuration configuration{document, ""};
+  configuration.check_version();
+  return configuration;
+}
+
+void Configuration::check_version() const {
+  if (has("version")) (void)integer("version", kVersion, kVersion);
 }
 
 Configuration Configuration::section(const std::string& key) const {

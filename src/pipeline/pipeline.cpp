@@ -45,8 +45,13 @@ void Pipeline::finish_learning() {
 }
 
 Estimate Pipeline::process(Observation& observation) {
+  segment(observation);
+  return estimate(observation);
+}
+
+bool Pipeline::segment(Observation& observation) {
   const auto start = std::chrono::steady_clock::now();
-  bool learning = false;
+  learning_ = false;
   const bool predict = tracking_ || vision_.method == SegmentationMethod::kStatistics;
   for (std::size_t c = 0; c < eyes_.size(); ++c) {
     if (!observation.cameras[c]) continue;
@@ -56,17 +61,21 @@ Estimate Pipeline::process(Observation& observation) {
     if (predict) predicted = estimator_.predicted_silhouette(observation, c, true);
     eyes_[c].segmenter.segment(seen.image, seen.mask, seen.valid, seen.coverage,
                                predict ? &predicted : nullptr);
-    learning = learning || !eyes_[c].segmenter.ready();
+    learning_ = learning_ || !eyes_[c].segmenter.ready();
   }
-  segmentation_ms_ =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-  if (learning) {
+  if (learning_) {
     for (auto& seen : observation.cameras) {
       if (seen) seen->mask = BinaryMask();
     }
   }
+  segmentation_ms_ =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return !learning_;
+}
+
+Estimate Pipeline::estimate(const Observation& observation) {
   Estimate estimate = estimator_.step(observation);
-  if (learning) estimate.state = EstimatorState::kLearningBackground;
+  if (learning_) estimate.state = EstimatorState::kLearningBackground;
   tracking_ = estimate.state == EstimatorState::kConverged;
   return estimate;
 }

@@ -85,6 +85,12 @@ TEST(Configuration, WrongTypeAndRangeSayWhatWasExpected) {
   EXPECT_THAT(error_of([&] { (void)a.number("gone"); }), HasSubstr("'a.gone' is missing"));
 }
 
+TEST(Configuration, AnotherVersionIsRefused) {
+  EXPECT_NO_THROW(Configuration::parse("version: 1\n").reject_unknown_keys());
+  EXPECT_THAT(error_of([] { Configuration::parse("version: 2\n"); }),
+              AllOf(HasSubstr("'version' is '2'"), HasSubstr("expected 1")));
+}
+
 TEST(Configuration, DuplicateKeysAndBrokenYamlAreErrorsWithLines) {
   EXPECT_THAT(error_of([] { Configuration::parse("a: 1\nb: 2\na: 3\n"); }),
               AllOf(HasSubstr(":3"), HasSubstr("given twice")));

@@ -42,8 +42,8 @@ TEST_F(InstallationTest, IsEmptyWhereThereIsNone) {
 
 TEST_F(InstallationTest, FilesAreLookedForHereFirstThenInTheDataFolder) {
   setenv("BODYSCHEMA_SHARE", (root_ / "sources").c_str(), 1);
-  std::ofstream(root_ / "sources/config/estimator.yaml") << "version: 1\n";
-  EXPECT_EQ(find_data_file("config/estimator.yaml"), root_ / "sources/config/estimator.yaml");
+  std::ofstream(root_ / "sources/config/only_installed.yaml") << "version: 1\n";
+  EXPECT_EQ(find_data_file("config/only_installed.yaml"), root_ / "sources/config/only_installed.yaml");
   EXPECT_EQ(find_data_file(root_ / "sources/config"), root_ / "sources/config");
   EXPECT_EQ(find_data_file("config/no_such_file.yaml"), "config/no_such_file.yaml");
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -26,6 +27,9 @@ namespace bodyschema {
 /// Copies share one document. Not thread-safe; configurations are read at start-up.
 class Configuration {
  public:
+  /// The layout of configuration files this software reads; a file may state its own as `version`.
+  static constexpr std::int64_t kVersion = 1;
+
   /// Throws ConfigurationError when the file is missing, is not YAML, or includes itself.
   static Configuration load(const std::filesystem::path& file,
                             const std::vector<std::string>& overrides = {});
@@ -74,6 +78,7 @@ class Configuration {
   static constexpr double kInf = std::numeric_limits<double>::infinity();
   struct Document;
   Configuration(std::shared_ptr<Document> document, std::string prefix);
+  void check_version() const;
   std::shared_ptr<Document> document_;
   std::string prefix_;
 };

@@ -27,8 +27,12 @@ class Pipeline {
   /// A fresh decoder and synchroniser for this robot and rig.
   [[nodiscard]] ObservationStream make_stream() const;
 
-  /// Fills in the observation's masks and takes one step of the estimator.
+  /// Fills in the observation's masks and takes one step of the estimator: segment(), estimate().
   Estimate process(Observation& observation);
+  /// Straightens the pictures and fills in the masks. False while the background is being learned.
+  bool segment(Observation& observation);
+  /// One step of the estimator on an observation that has its masks.
+  Estimate estimate(const Observation& observation);
   /// Starts over; a learned background is kept.
   void reset() { estimator_.reset(); }
 
@@ -64,6 +68,7 @@ class Pipeline {
   std::vector<Eye> eyes_;
   Estimator estimator_;
   std::string configuration_hash_;
+  bool learning_ = false;
   bool tracking_ = false;  ///< the estimate is good enough to predict where the robot is
   double segmentation_ms_ = 0.0;
 };

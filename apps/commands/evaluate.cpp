@@ -1,0 +1,52 @@
+#include "bodyschema/evaluation/evaluate.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+
+#include "../common_options.hpp"
+#include "bodyschema/core/installation.hpp"
+#include "commands.hpp"
+
+namespace bodyschema::apps {
+
+void add_evaluate(CLI::App& app) {
+  struct Arguments {
+    CommonOptions common;
+    EvaluationOptions options;
+    std::string out;
+  };
+  auto a = std::make_shared<Arguments>();
+  a->common.config = "config/icub_right/evaluation.yaml";
+  a->common.log_level = "warn";
+  CLI::App* command = app.add_subcommand("evaluate", "Run the paper's experiments and print their figures");
+  std::string footer = "Experiments:\n";
+  for (const auto& [name, meaning] : experiment_names()) footer += "  " + name + ": " + meaning + '\n';
+  footer += "\nExample:\n  bodyschema evaluate paper --trials 10 --seed 1 --out out/paper";
+  command->footer(footer);
+  command->add_option("experiment", a->options.experiment, "Which experiment")->required();
+  command->add_option("--trials", a->options.trials, "Seeded trials of each experiment")
+      ->check(CLI::Range(1, 100000));
+  command->add_option("--seed", a->options.seed, "Seed of the first trial");
+  command->add_option("--threads", a->options.threads, "Trials side by side; 0: one per core")
+      ->check(CLI::Range(0, 1024));
+  command->add_option("-o,--out", a->out, "Folder for summary.json")->required();
+  a->common.add_to(*command);
+  command->get_option("--config")->required(false);
+  command->callback([a] {
+    const Configuration configuration = a->common.load();
+    if (a->common.print_config) {
+      std::fputs(configuration.print().c_str(), stdout);
+      return;
+    }
+    a->options.out = a->out;
+    const char* data = std::getenv("BODYSCHEMA_DATA");
+    if (data != nullptr) a->options.data = data;
+    const auto recorded = find_data_file("config");
+    if (a->options.data.empty()) a->options.data = recorded / "../../shared/data";
+    std::fputs(evaluate(configuration, recorded, a->options).c_str(), stdout);
+    std::printf("\nresults in %s/summary.json\n", a->out.c_str());
+  });
+}
+
+}  // namespace bodyschema::apps

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bodyschema/core/configuration.hpp"
+#include "bodyschema/estimator/estimator.hpp"
+#include "bodyschema/simulator/simulator.hpp"
+
+namespace bodyschema {
+
+/// One way of estimating, run beside others on the same simulated pictures.
+struct Contestant {
+  std::string name;             ///< "best.stereo", "paper.mono", ...
+  EstimatorOptions options;
+  bool mono = false;            ///< left camera only
+};
+
+/// What one contestant did with one frame.
+struct FrameRecord {
+  EstimatorState state = EstimatorState::kHandNotInView;
+  /// Errors in the left and right camera; negative where that camera gave no picture.
+  std::array<double, 2> position_mm{-1, -1};
+  std::array<double, 2> rotation_deg{-1, -1};
+  std::array<double, 2> nominal_mm{-1, -1};
+  double hand_sd_mm = 0.0;
+  Eigen::VectorXd offset_deg;
+  Eigen::MatrixXd covariance_deg2;
+  double likelihood = 0.0;
+  double total_ms = 0.0;
+};
+
+struct ContestantRecord {
+  std::vector<FrameRecord> frames;  ///< of the motion proper
+  WeakestDirection weakest;
+};
+
+/// One simulated run watched by several contestants.
+struct TrialRecord {
+  std::uint64_t seed = 0;
+  Eigen::VectorXd true_offset_deg;  ///< of the estimated joints
+  std::vector<ContestantRecord> contestants;
+};
+
+/// The robot, rig, segmentation and simulator settings shared by the trials of one experiment.
+struct TrialSetting {
+  Configuration estimator;                ///< complete estimator configuration
+  simulator::SimulatorSettings simulator;
+  simulator::SimulationPlan plan;         ///< its seed is replaced by the trial's
+};
+
+/// Simulates one run in memory, segments its pictures once (background learned from the noisy
+/// frames before the arm comes in), and lets every contestant estimate. Truth is only used for the
+/// errors. Contestant seeds derive from `seed`.
+TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>& contestants,
+                      std::uint64_t seed);
+
+}  // namespace bodyschema

@@ -1,0 +1,61 @@
+#include "bodyschema/evaluation/evaluate.hpp"
+
+#include <fstream>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/core/nearest_name.hpp"
+#include "experiments.hpp"
+
+namespace bodyschema {
+
+const std::vector<std::pair<std::string, std::string>>& experiment_names() {
+  static const std::vector<std::pair<std::string, std::string>> names = {
+      {"paper", "experiment 1 with the published filter, stereo and mono (Table I)"},
+      {"experiment1", "offsets in the arm, both modes, stereo and mono (Table I, Fig. 6)"},
+      {"clutter", "experiment 1 before a cluttered background"},
+      {"mismatch", "camera, mesh size and fingers differ a little from the model"},
+      {"experiment2", "offsets in arm and head (Fig. 8)"},
+      {"offsets", "the offsets themselves and their intervals after 60 s of babbling"},
+      {"slip", "a joint slips by 5 degrees in mid-run"},
+      {"reach", "hand to target with the nominal and with the corrected model"},
+      {"recording", "the public recording, exact and nominal robot (needs BODYSCHEMA_DATA)"},
+      {"all", "everything"}};
+  return names;
+}
+
+std::string evaluate(const Configuration& simulated, const std::filesystem::path& recorded,
+                     const EvaluationOptions& options) {
+  std::vector<std::string> names;
+  for (const auto& [name, meaning] : experiment_names()) names.push_back(name);
+  if (std::find(names.begin(), names.end(), options.experiment) == names.end()) {
+    throw ConfigurationError("experiment '" + options.experiment + "' is not known; did you mean '" +
+                             nearest_name(options.experiment, names) + "'?");
+  }
+  std::error_code error;
+  std::filesystem::create_directories(options.out, error);
+  std::ofstream file(options.out / "summary.json");
+  if (!file) throw FileError(options.out.string() + ": cannot write summary.json there");
+
+  Json summary;
+  std::string table;
+  ExperimentContext context{simulated, recorded, options, summary, table};
+  const auto wanted = [&](const char* name) {
+    return options.experiment == name || options.experiment == "all";
+  };
+  if (options.experiment == "paper") run_experiment1(context, true);
+  if (wanted("experiment1")) run_experiment1(context, false);
+  if (wanted("clutter")) run_clutter(context);
+  if (wanted("mismatch")) run_mismatch(context);
+  if (wanted("experiment2")) run_experiment2(context);
+  if (wanted("offsets")) run_offsets(context);
+  if (wanted("slip")) run_slip(context);
+  if (wanted("reach")) run_reach(context);
+  if (wanted("recording")) run_recording(context);
+  summary["trials"] = options.trials;
+  summary["seed"] = options.seed;
+  file << summary.dump(2) << '\n';
+  if (!file.flush()) throw FileError((options.out / "summary.json").string() + ": cannot be written");
+  return table;
+}
+
+}  // namespace bodyschema

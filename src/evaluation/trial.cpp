@@ -1,0 +1,81 @@
+#include "bodyschema/evaluation/trial.hpp"
+
+#include <deque>
+
+#include "bodyschema/pipeline/hand_errors.hpp"
+#include "bodyschema/pipeline/pipeline.hpp"
+
+namespace bodyschema {
+namespace {
+
+FrameRecord record_of(const Estimate& estimate, const simulator::SimulatedFrame& frame) {
+  FrameRecord record;
+  record.state = estimate.state;
+  record.hand_sd_mm = 1e3 * estimate.hand_sd_m;
+  record.offset_deg = estimate.offset_rad * (180.0 / kPi);
+  record.covariance_deg2 = estimate.covariance_rad2 * (180.0 / kPi) * (180.0 / kPi);
+  record.likelihood = estimate.best_likelihood;
+  record.total_ms = estimate.times.total_ms;
+  for (std::size_t c = 0; c < estimate.X_CP.size() && c < 2; ++c) {
+    if (!frame.cameras[c]) continue;
+    const Pose& truth = frame.truth[c].X_CP;
+    record.position_mm[c] = 1e3 * (estimate.X_CP[c].translation() - truth.translation()).norm();
+    record.rotation_deg[c] = degrees(rotation_distance(truth.linear(), estimate.X_CP[c].linear()));
+    record.nominal_mm[c] =
+        1e3 * (estimate.X_CP_nominal[c].translation() - truth.translation()).norm();
+  }
+  return record;
+}
+
+}  // namespace
+
+TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>& contestants,
+                      std::uint64_t seed) {
+  Pipeline pipeline(setting.estimator);
+  std::vector<Estimator> estimators;
+  for (const auto& contestant : contestants) {
+    EstimatorOptions options = contestant.options;
+    options.filter.seed = seed * 1000003u + 17u;
+    options.silhouette.threads = 1;
+    estimators.emplace_back(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(), options);
+  }
+  simulator::SimulationPlan plan = setting.plan;
+  plan.seed = seed;
+  simulator::Simulator simulator(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(),
+                                 setting.simulator, plan);
+  TrialRecord trial;
+  trial.seed = seed;
+  trial.contestants.resize(contestants.size());
+  trial.true_offset_deg = Eigen::VectorXd::Zero(
+      static_cast<Eigen::Index>(pipeline.setup().estimated_joints.size()));
+  for (std::size_t k = 0; k < pipeline.setup().estimated_joints.size(); ++k) {
+    const auto found = plan.offsets_deg.find(pipeline.setup().estimated_joints[k]);
+    if (found != plan.offsets_deg.end()) {
+      trial.true_offset_deg(static_cast<Eigen::Index>(k)) = found->second;
+    }
+  }
+
+  std::vector<JointSample> history;
+  while (auto frame = simulator.next()) {
+    history.insert(history.end(), frame->encoders.begin(), frame->encoders.end());
+    if (history.size() > 400) history.erase(history.begin(), history.end() - 200);
+    Observation observation = simulator::to_observation(*frame, history);
+    const bool ready = pipeline.segment(observation);
+    if (frame->phase != simulator::Phase::kMotion || !ready) continue;
+    for (std::size_t i = 0; i < contestants.size(); ++i) {
+      Estimate estimate;
+      if (contestants[i].mono) {
+        Observation left = observation;
+        left.cameras[1].reset();
+        estimate = estimators[i].step(left);
+      } else {
+        estimate = estimators[i].step(observation);
+      }
+      trial.contestants[i].frames.push_back(record_of(estimate, *frame));
+      trial.contestants[i].weakest = estimate.weakest;
+    }
+  }
+  return trial;
+}
+
+}  // namespace bodyschema
