@@ -58,8 +58,8 @@ struct Scene {
   }
 };
 
-/// Whether the content of an element, which starts here, is whole numbers between blanks and nothing
-/// else. The mesh reader never gets past a character that it cannot read as part of one.
+/// Whether the content of an element, which starts here, is whole numbers between blanks and
+/// nothing else. The mesh reader never gets past a character that it cannot read as part of one.
 bool is_index_list(std::string_view content) {
   const auto end = std::min(content.find('<'), content.size());
   if (content.substr(end).starts_with("<![CDATA[")) return false;

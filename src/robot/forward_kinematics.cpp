@@ -82,7 +82,8 @@ void ForwardKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q, std:
   for (std::size_t n = 0; n < impl_->nodes.size(); ++n) {
     const TreeNode& node = impl_->nodes[n];
     const KDL::Frame X_PN = node.segment.pose(node.joint_value(q));
-    impl_->X_WN[n] = node.parent < 0 ? X_PN : impl_->X_WN[static_cast<std::size_t>(node.parent)] * X_PN;
+    impl_->X_WN[n] =
+        node.parent < 0 ? X_PN : impl_->X_WN[static_cast<std::size_t>(node.parent)] * X_PN;
   }
   for (std::size_t l = 0; l < X_WB.size(); ++l) {
     const KDL::Frame& X = impl_->X_WN[static_cast<std::size_t>(impl_->node_of_link[l])];

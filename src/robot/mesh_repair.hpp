@@ -23,8 +23,8 @@ struct MeshReport {
   [[nodiscard]] std::string text() const;
 };
 
-/// Makes vertices at most `tolerance_m` apart one, drops triangles that degenerate and vertices that
-/// no triangle uses. The default is rounding of a float at arm's length; files hold finer detail
+/// Makes vertices at most `tolerance_m` apart one, drops triangles that degenerate and vertices
+/// that no triangle uses. The default is rounding of a float at arm's length; files hold finer detail
 /// than a micrometre on purpose.
 void weld(TriangleMesh& mesh, double tolerance_m = 1e-7);
 

@@ -198,7 +198,9 @@ TriangleMesh visual_mesh(const urdf::Visual& visual, const std::string& where,
     }
     case urdf::Geometry::SPHERE: {
       const auto& shape = static_cast<const urdf::Sphere&>(*visual.geometry);
-      if (!all_positive({shape.radius})) throw FileError(where + ": sphere radius must be positive");
+      if (!all_positive({shape.radius})) {
+        throw FileError(where + ": sphere radius must be positive");
+      }
       mesh = sphere_mesh(shape.radius);
       mesh.name = "sphere";
       break;

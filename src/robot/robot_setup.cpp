@@ -21,7 +21,9 @@ void require(bool known, const std::string& key, const std::string& name,
 RobotSetup RobotSetup::from(const Configuration& robot) {
   RobotSetup setup;
   setup.model.urdf = robot.path("urdf");
-  if (robot.has("mesh_search_roots")) setup.model.mesh_search_roots = robot.paths("mesh_search_roots");
+  if (robot.has("mesh_search_roots")) {
+    setup.model.mesh_search_roots = robot.paths("mesh_search_roots");
+  }
   setup.model.rendered_links = robot.texts("rendered_links");
   setup.culling = robot.choice_or("face_culling", "none", {"none", "back"}) == "back"
                       ? FaceCulling::kBack

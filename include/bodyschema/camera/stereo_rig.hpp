@@ -17,7 +17,7 @@ struct CameraModel {
   std::string name;                       ///< "left", "right"
   std::string link;                       ///< URDF link with OpenCV axes
   PinholeIntrinsics intrinsics;           ///< px
-  std::array<double, 5> distortion{};     ///< k1 k2 p1 p2 k3, OpenCV's Brown-Conrady order; all zero: none
+  std::array<double, 5> distortion{};     ///< k1 k2 p1 p2 k3 as OpenCV; all zero: none
   [[nodiscard]] bool has_distortion() const;
 };
 

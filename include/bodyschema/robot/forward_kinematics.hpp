@@ -33,7 +33,7 @@ class ForwardKinematics {
     Eigen::Vector3d point_W;
   };
   [[nodiscard]] Axis joint_axis(Eigen::Index joint) const;
-  /// Whether the joint (or a mimic of it) moves the link at position `link` of the constructor's list.
+  /// Whether the joint (or a mimic of it) moves link number `link` of the constructor's list.
   [[nodiscard]] bool moves(Eigen::Index joint, std::size_t link) const;
 
  private:

@@ -18,11 +18,12 @@ class GravityTorques {
   GravityTorques(GravityTorques&&) noexcept;
 
   /// @param q  joint vector, radians
-  /// @param gravity_W  acceleration of gravity in the root frame, m/s^2 (0 0 -9.81 for an upright robot)
+  /// @param gravity_W  acceleration of gravity in the root frame, m/s^2 (upright robot: 0 0 -9.81)
   /// @return torque of gravity on each joint about its axis, Nm, RobotModel order. Positive torque
   ///         pushes the joint towards larger angles (minus the holding torque of the motor); N for
   ///         prismatic joints. Valid until the next call.
-  const Eigen::VectorXd& compute(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Vector3d& gravity_W);
+  const Eigen::VectorXd& compute(const Eigen::Ref<const Eigen::VectorXd>& q,
+                                 const Eigen::Vector3d& gravity_W);
 
  private:
   struct Impl;

@@ -28,7 +28,7 @@ struct LinkMesh {
   std::string link;
   TriangleMesh mesh;
   bool closed = true;              ///< every edge has two triangles
-  bool consistent_winding = true;  ///< neighbours agree, and outward is outside of closed components
+  bool consistent_winding = true;  ///< neighbours agree; closed components face outward
 };
 
 struct RobotModelOptions {
@@ -65,8 +65,8 @@ class RobotModel {
   [[nodiscard]] const std::string& root_link() const;
   /// In the order of RobotModelOptions::rendered_links.
   [[nodiscard]] std::span<const LinkMesh> meshes() const;
-  /// One line per part that is not closed or was not consistently wound, naming link and file; empty
-  /// when all is well.
+  /// One line per part that is not closed or was not consistently wound, naming link and file;
+  /// empty when all is well.
   [[nodiscard]] std::span<const std::string> warnings() const;
   /// Whether the URDF gives any link a mass (gravity torques are meaningless otherwise).
   [[nodiscard]] bool has_masses() const;

@@ -29,8 +29,8 @@ struct RobotSetup {
   /// The robot, with every link and joint named above known to exist. Throws FileError for URDF and
   /// meshes, ConfigurationError naming key, name and nearest name otherwise.
   [[nodiscard]] std::shared_ptr<const RobotModel> load() const;
-  /// A joint vector in `robot`'s order with the fixed joints at their values and all others at zero,
-  /// moved into their limits.
+  /// A joint vector in `robot`'s order with the fixed joints at their values and all others at
+  /// zero, moved into their limits.
   [[nodiscard]] Eigen::VectorXd default_joints(const RobotModel& robot) const;
 };
 
