@@ -154,7 +154,7 @@ TEST_P(Engine, TinyPicture) {
 
 TEST_P(Engine, OneAndAThousandParticles) {
   const auto model = synthetic::hand(500);
-  const std::vector cameras{synthetic::camera(80, 60), synthetic::camera(80, 60)};
+  const std::vector cameras{synthetic::camera(64, 48), synthetic::camera(64, 48)};
   const auto scorer = make(model, cameras);
   const auto observed = observe(model, cameras, 7);
   for (const std::size_t particles : {1u, 1000u, 3u}) {
@@ -243,14 +243,14 @@ TEST_P(Engine, PartsBehindAndAcrossTheNearPlane) {
   for (const auto culling : {FaceCulling::kNone, FaceCulling::kBack}) {
     SilhouetteModel model;
     model.culling = culling;
-    model.parts.push_back(synthetic::lumpy_tube("across", 0.30f, 0.03f, 0.03f, 800));
+    model.parts.push_back(synthetic::lumpy_tube("across", 0.30f, 0.03f, 0.03f, 400));
     model.parts.push_back(synthetic::lumpy_tube("behind", 0.10f, 0.03f, 0.03f, 300));
     model.parts.push_back(synthetic::lumpy_tube("front", 0.05f, 0.02f, 0.02f, 300));
-    const std::vector cameras{synthetic::camera(320, 240)};
+    const std::vector cameras{synthetic::camera(160, 120)};
     std::mt19937 random(11);
     std::normal_distribution<float> normal;
     std::vector<Eigen::Isometry3f> X_CB;
-    for (int i = 0; i < 20; ++i) {
+    for (int i = 0; i < 12; ++i) {
       // Starts behind the camera and reaches forward past it, or the other way round.
       Eigen::Isometry3f across(Eigen::Translation3f(0.05f * normal(random), 0.05f * normal(random), -0.1f));
       across.rotate(Eigen::AngleAxisf(-1.4f + 0.2f * normal(random), Eigen::Vector3f::UnitY()));
@@ -261,9 +261,9 @@ TEST_P(Engine, PartsBehindAndAcrossTheNearPlane) {
           Eigen::Translation3f(0.1f * normal(random), 0.1f * normal(random), 0.5f)));
     }
     std::vector<ObservedSilhouette> observed(1);
-    observed[0].mask = BinaryMask(320, 240);
-    for (int v = 50; v < 150; ++v) {
-      for (int u = 100; u < 200; ++u) observed[0].mask.set(u, v);
+    observed[0].mask = BinaryMask(160, 120);
+    for (int v = 25; v < 75; ++v) {
+      for (int u = 50; u < 100; ++u) observed[0].mask.set(u, v);
     }
     const auto scorer = make(model, cameras);
     expect_scores(*scorer, model, cameras, observed, X_CB);
