@@ -1,6 +1,6 @@
 #include "bodyschema/estimator/body_pose_model.hpp"
 
-#include <algorithm>
+#include "bodyschema/effects/effect.hpp"
 
 namespace bodyschema {
 namespace {
@@ -14,22 +14,6 @@ std::vector<std::string> evaluated_links(const RobotSetup& setup, const StereoRi
   return links;
 }
 
-/// Joints that move a fingertip but not the hand base.
-std::vector<Eigen::Index> find_finger_joints(const RobotModel& robot, const ForwardKinematics& fk,
-                                             std::size_t hand, std::size_t fingertip_count) {
-  std::vector<Eigen::Index> joints;
-  for (Eigen::Index j = 0; j < robot.joint_count(); ++j) {
-    if (fk.moves(j, hand)) continue;
-    for (std::size_t tip = 0; tip < fingertip_count; ++tip) {
-      if (fk.moves(j, hand + 1 + tip)) {
-        joints.push_back(j);
-        break;
-      }
-    }
-  }
-  return joints;
-}
-
 }  // namespace
 
 BodyPoseModel::BodyPoseModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
@@ -39,8 +23,7 @@ BodyPoseModel::BodyPoseModel(std::shared_ptr<const RobotModel> robot, const Robo
       fingertip_count_(setup.fingertip_links.size()),
       kinematics_(robot_, evaluated_links(setup, rig)),
       X_WB_(rig.cameras.size() + 1 + fingertip_count_ + part_count_) {
-  finger_joints_ =
-      find_finger_joints(*robot_, kinematics_, rig_.cameras.size(), fingertip_count_);
+  finger_joints_ = JointRoles::of(robot_, setup).fingers;
   q_true_.resize(robot_->joint_count());
 }
 
@@ -64,7 +47,7 @@ void BodyPoseModel::evaluate(const Eigen::VectorXd& q, const Eigen::VectorXd& x,
   q_true_ = q;
   double vergence = 0.0;
   double focal_scale = 0.0;
-  double principal_difference_px = 0.0;
+  Eigen::Vector2d principal_difference_px = Eigen::Vector2d::Zero();
   part_scale_ = 1.0;
   for (std::size_t k = 0; k < parameters_.size(); ++k) {
     const Parameter& parameter = parameters_[k];
@@ -76,7 +59,8 @@ void BodyPoseModel::evaluate(const Eigen::VectorXd& q, const Eigen::VectorXd& x,
         break;
       case ParameterKind::kVergence: vergence = value; break;
       case ParameterKind::kFocalScale: focal_scale = value; break;
-      case ParameterKind::kPrincipalDifference: principal_difference_px = value; break;
+      case ParameterKind::kPrincipalDifferenceX: principal_difference_px.x() = value; break;
+      case ParameterKind::kPrincipalDifferenceY: principal_difference_px.y() = value; break;
       case ParameterKind::kMeshScale: part_scale_ = 1.0 + value; break;
       case ParameterKind::kDilation: break;
     }
@@ -89,7 +73,9 @@ void BodyPoseModel::evaluate(const Eigen::VectorXd& q, const Eigen::VectorXd& x,
   image_warp_.setIdentity();
   image_warp_(0, 0) = image_warp_(1, 1) = 1.0 + focal_scale;
   const double sign = camera == 0 ? -0.5 : 0.5;
-  image_warp_(0, 2) = sign * principal_difference_px / rig_.cameras[camera].intrinsics.fx;
+  const PinholeIntrinsics& intrinsics = rig_.cameras[camera].intrinsics;
+  image_warp_(0, 2) = sign * principal_difference_px.x() / intrinsics.fx;
+  image_warp_(1, 2) = sign * principal_difference_px.y() / intrinsics.fy;
 }
 
 void BodyPoseModel::compute(const Eigen::VectorXd& q, const Eigen::VectorXd& x,

@@ -71,9 +71,8 @@ std::optional<double> nearest_edge(const CoverageSampler& coverage, const Eigen:
 
 double step_for(ParameterKind kind) {
   switch (kind) {
-    case ParameterKind::kPrincipalDifference: return 0.5;
-    case ParameterKind::kFocalScale:
-    case ParameterKind::kMeshScale: return 2e-3;
+    case ParameterKind::kPrincipalDifferenceX:
+    case ParameterKind::kPrincipalDifferenceY: return 0.5;
     default: return 2e-3;
   }
 }

@@ -43,7 +43,9 @@ std::vector<Parameter> make_parameters(const RobotModel& robot, const RobotSetup
   add("finger_curl", ParameterKind::kFingerCurl, priors.finger_curl_rad);
   if (rig.cameras.size() > 1) {
     add("vergence", ParameterKind::kVergence, priors.vergence_rad);
-    add("principal_difference", ParameterKind::kPrincipalDifference,
+    add("principal_difference_x", ParameterKind::kPrincipalDifferenceX,
+        priors.principal_difference_px);
+    add("principal_difference_y", ParameterKind::kPrincipalDifferenceY,
         priors.principal_difference_px);
   }
   add("focal_scale", ParameterKind::kFocalScale, priors.focal_scale);
@@ -64,6 +66,14 @@ Eigen::VectorXd prior_sds(const std::vector<Parameter>& parameters) {
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     sd(static_cast<Eigen::Index>(k)) = parameters[k].prior_sd;
   }
+  return sd;
+}
+
+/// Encoder errors of one frame: those of the arm's joints.
+Eigen::VectorXd encoder_sds(const std::vector<Parameter>& parameters, std::size_t arm_joints,
+                            double sd_rad) {
+  Eigen::VectorXd sd = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
+  sd.head(static_cast<Eigen::Index>(arm_joints)).setConstant(sd_rad);
   return sd;
 }
 
@@ -95,11 +105,13 @@ struct Estimator::Impl {
         body(robot_model, setup, rig, parameters),
         alignment(body, silhouettes, intrinsics, options.contour),
         filter(static_cast<Eigen::Index>(setup.estimated_joints.size()), options.filter),
-        fusion(prior_sds(parameters)),
-        first_look(prior_sds(parameters)) {
+        fusion(prior_sds(parameters),
+               encoder_sds(parameters, setup.estimated_joints.size(), options.encoder_sd_rad)),
+        first_look(fusion) {
     scorer = make_silhouette_scorer(silhouettes, intrinsics, options.silhouette, &engine_reason);
     joints = static_cast<Eigen::Index>(setup.estimated_joints.size());
     state = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
+    frame_state = fusion.frame_state();
     const std::size_t batch = options.filter.particles;
     X_CB.resize(batch * rig.cameras.size() * body.part_count());
     counts.resize(batch * rig.cameras.size());
@@ -119,6 +131,8 @@ struct Estimator::Impl {
 
     const bool in_view = prepare(observation);
     if (!in_view) {
+      frame_state = fusion.frame_state();
+      if (options.mode == EstimatorMode::kPaper || fusion.frames() < 0.5) frame_state.x = state;
       current = EstimatorState::kHandNotInView;
       best_likelihood = 0.0;
     } else {
@@ -205,6 +219,7 @@ struct Estimator::Impl {
     best_likelihood = weights(filter.estimate_index());
     effective_size = filter.effective_sample_size();
     cloud_covariance = filter.covariance();
+    frame_state = {state, cloud_covariance};
     filter.resample_and_spread();
     current = EstimatorState::kConverging;
     if (filter.spread_rad() <= options.filter.spread_min_rad) current = EstimatorState::kConverged;
@@ -247,22 +262,23 @@ struct Estimator::Impl {
     const double variance = options.residual_sd_px * options.residual_sd_px;
     Candidate best;
     bool accepted = false;
+    double gain = 0.0;  // what this frame could still win against the memory, chi-square
     if (fusion.frames() > 0.5) {
       best.x = fusion.mean();
       static constexpr double kNear_px[] = {8.0, 4.0};
       refine(observation, fusion, kNear_px, best);
       const Eigen::VectorXd alone =
           first_look.solve_with(best.evidence, best.x, variance) - best.x;
-      const double gain =
-          (best.evidence.cost - predicted_cost(best.evidence, alone)) / variance;
-      surprise = gain;
-      accepted = fits(best.evidence);
-      if (accepted && gain > kSurprise) accepted = false;
+      gain = (best.evidence.cost - predicted_cost(best.evidence, alone)) / variance;
+      accepted = fits(best.evidence) && gain < kSurprise;
     }
     if (accepted) {
       surprised_frames = 0;
-      fusion.fade(std::exp(-1.0 / options.memory_frames));
-      fusion.add(best.evidence, best.x, variance);
+      // What no constant offset explains (an error that is not in the model) shows as frames that
+      // keep pulling away; then only recent ones are worth remembering.
+      const double pull = std::max(1.0, gain / kUsualPull);
+      fusion.fade(std::exp(-pull / options.memory_frames));
+      fusion.add(best.evidence, best.x, variance, 1.0 / options.correlated_frames);
     } else {
       // Nothing known yet, or what is known no longer fits: look again from the best particles.
       Candidate found = search(observation);
@@ -277,12 +293,13 @@ struct Estimator::Impl {
       best = std::move(found);
       if (good) {
         fusion.forget_all();
-        fusion.add(best.evidence, best.x, variance);
+        fusion.add(best.evidence, best.x, variance, 1.0 / options.correlated_frames);
       }
     }
     state = fusion.frames() > 0.5 ? fusion.mean() : best.x;
+    frame_state = fusion.frame_state(best.evidence, best.x, variance);
     contour_rms_px = best.evidence.rms_px();
-    place(observation, state, 0);
+    place(observation, frame_state.x, 0);
     const Eigen::Index first = 0;
     score_slots(1);
     best_likelihood = 1.0 - distance(first);
@@ -364,7 +381,6 @@ struct Estimator::Impl {
       }
       estimate.nuisance = state.tail(state.size() - joints);
     }
-    Microseconds utime = observation.utime;
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
       const CameraObservation* seen = nullptr;
       if (c < observation.cameras.size() && observation.cameras[c]) {
@@ -375,12 +391,11 @@ struct Estimator::Impl {
         }
       }
       if (seen == nullptr) continue;
-      (void)utime;
-      estimate.X_CP.push_back(body.hand_pose(seen->joints.q, state, c));
+      estimate.X_CP.push_back(body.hand_pose(seen->joints.q, frame_state.x, c));
       zero = Eigen::VectorXd::Zero(state.size());
       estimate.X_CP_nominal.push_back(body.hand_pose(seen->joints.q, zero, c));
       if (c == 0 || estimate.hand_sd_m == 0.0) {
-        estimate.hand_sd_m = hand_sd(seen->joints.q, c, estimate.covariance_rad2);
+        estimate.hand_sd_m = hand_sd(seen->joints.q, c);
       }
     }
     estimate.weakest = weakest(estimate.covariance_rad2);
@@ -391,18 +406,21 @@ struct Estimator::Impl {
     estimate.state = current;
   }
 
-  double hand_sd(const Eigen::VectorXd& q, std::size_t camera, const Eigen::MatrixXd& covariance) {
+  /// One sigma of the hand's position in a camera, from the covariance of this frame's state.
+  double hand_sd(const Eigen::VectorXd& q, std::size_t camera) {
     constexpr double kStep = 1e-4;
-    Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, joints);
-    Eigen::VectorXd x = state;
-    for (Eigen::Index k = 0; k < joints; ++k) {
-      x(k) = state(k) + kStep;
+    const Eigen::Index n = std::min<Eigen::Index>(state.size(), frame_state.covariance.rows());
+    Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, n);
+    Eigen::VectorXd x = frame_state.x;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double value = x(k);
+      x(k) = value + kStep;
       const Eigen::Vector3d plus = body.hand_pose(q, x, camera).translation();
-      x(k) = state(k) - kStep;
+      x(k) = value - kStep;
       J.col(k) = (plus - body.hand_pose(q, x, camera).translation()) / (2.0 * kStep);
-      x(k) = state(k);
+      x(k) = value;
     }
-    return std::sqrt(std::max(0.0, (J * covariance * J.transpose()).trace()));
+    return std::sqrt(std::max(0.0, (J * frame_state.covariance * J.transpose()).trace()));
   }
 
   WeakestDirection weakest(const Eigen::MatrixXd& covariance) const {
@@ -433,6 +451,7 @@ struct Estimator::Impl {
     filter = ParticleFilter(joints, options.filter);
     fusion.forget_all();
     state.setZero();
+    frame_state = fusion.frame_state();
     current = EstimatorState::kHandNotInView;
     cloud_covariance.resize(0, 0);
     best_likelihood = effective_size = contour_rms_px = 0.0;
@@ -441,6 +460,7 @@ struct Estimator::Impl {
 
   static constexpr double kMaxStep_rad = 0.2;
   static constexpr double kSearchSpread_rad = 0.0349066;  ///< 2 deg
+  static constexpr double kUsualPull = 20.0;  ///< chi-square of a frame that agrees with the memory
   static constexpr double kSurprise = 400.0;  ///< chi-square of a frame that contradicts the memory
 
   EstimatorOptions options;
@@ -458,13 +478,13 @@ struct Estimator::Impl {
   std::string engine_reason;
 
   Eigen::Index joints = 0;
-  Eigen::VectorXd state;  ///< one value per parameter
+  Eigen::VectorXd state;  ///< one value per parameter, fused over frames
+  OffsetFusion::FrameState frame_state;  ///< the same with the last frame's own encoder error
   Eigen::VectorXd zero;
   EstimatorState current = EstimatorState::kHandNotInView;
   double best_likelihood = 0.0;
   double effective_size = 0.0;
   double contour_rms_px = 0.0;
-  double surprise = 0.0;
   int surprised_frames = 0;
   Eigen::MatrixXd cloud_covariance;
   StageTimes times;

@@ -31,6 +31,8 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
   o.contour.spacing_px = static_cast<float>(best.number_or("contour_spacing_px", 3.0, 0.5, 100.0));
   o.contour.huber_px = best.number_or("huber_px", 1.0, 1e-3, 100.0);
   o.residual_sd_px = best.number_or("residual_sd_px", o.residual_sd_px, 1e-3, 100.0);
+  o.encoder_sd_rad = radians(best.number_or("encoder_sd_deg", 0.035, 1e-6, 10.0));
+  o.correlated_frames = best.number_or("correlated_frames", o.correlated_frames, 1.0, 1e6);
   o.memory_frames = best.number_or("memory_frames", o.memory_frames, 1.0, 1e9);
   o.lock_distance = best.number_or("lock_distance", o.lock_distance, 0.0, 1.0);
   o.lock_rms_px = best.number_or("lock_rms_px", o.lock_rms_px, 0.0, 1e3);

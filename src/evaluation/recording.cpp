@@ -116,13 +116,15 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
 }  // namespace
 
 void run_recording(ExperimentContext& context) {
-  const fs::path recording = context.options.data / "eyehand-sim";
-  if (context.options.data.empty() || !fs::exists(recording / "truth.json")) {
+  const fs::path data =
+      context.options.data.empty() ? fs::path() : fs::weakly_canonical(context.options.data);
+  const fs::path recording = data / "eyehand-sim";
+  if (data.empty() || !fs::exists(recording / "truth.json")) {
     context.table += "\nrecording: skipped, no eyehand-sim/truth.json in '" +
-                     context.options.data.string() + "' (BODYSCHEMA_DATA)\n";
+                     data.string() + "' (BODYSCHEMA_DATA)\n";
     return;
   }
-  setenv("BODYSCHEMA_DATA", context.options.data.c_str(), 1);  // the robot's files refer to it
+  setenv("BODYSCHEMA_DATA", data.c_str(), 1);  // the robot's files refer to it
   const Truth truth = Truth::load(recording / "truth.json");
   const Configuration import = Configuration::load(context.recorded / "icub_unity/import.yaml");
   const ScratchFile log("recording.log");

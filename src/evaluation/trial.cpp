@@ -1,7 +1,5 @@
 #include "bodyschema/evaluation/trial.hpp"
 
-#include <deque>
-
 #include "bodyschema/pipeline/hand_errors.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 
@@ -56,12 +54,14 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
   }
 
   std::vector<JointSample> history;
+  Eigen::VectorXd last_q;
   while (auto frame = simulator.next()) {
     history.insert(history.end(), frame->encoders.begin(), frame->encoders.end());
     if (history.size() > 400) history.erase(history.begin(), history.end() - 200);
     Observation observation = simulator::to_observation(*frame, history);
     const bool ready = pipeline.segment(observation);
     if (frame->phase != simulator::Phase::kMotion || !ready) continue;
+    if (observation.cameras[0]) last_q = observation.cameras[0]->joints.q;
     for (std::size_t i = 0; i < contestants.size(); ++i) {
       Estimate estimate;
       if (contestants[i].mono) {
@@ -73,6 +73,11 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
       }
       trial.contestants[i].frames.push_back(record_of(estimate, *frame));
       trial.contestants[i].weakest = estimate.weakest;
+    }
+  }
+  if (setting.on_end && last_q.size() > 0) {
+    for (std::size_t i = 0; i < contestants.size(); ++i) {
+      setting.on_end(estimators[i], pipeline.robot(), last_q, trial, i);
     }
   }
   return trial;

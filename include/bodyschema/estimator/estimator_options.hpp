@@ -35,6 +35,8 @@ struct EstimatorOptions {
   NuisancePriors priors;
   double temperature = 0.02;         ///< best: weight = exp(-(d - d_min) / temperature)
   double residual_sd_px = 0.5;       ///< best: sd of one outline residual, correlation included
+  double encoder_sd_rad = 0.0006;    ///< best: one encoder reading's noise and rounding
+  double correlated_frames = 6.0;    ///< best: neighbouring frames that err alike count as one
   double memory_frames = 300.0;      ///< best: frames after which a picture counts 1/e
   double lock_distance = 0.15;       ///< best: Hammoude distance below which frames are fused
   double lock_rms_px = 1.5;          ///< best: outline residual below which frames are fused

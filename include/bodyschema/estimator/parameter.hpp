@@ -10,13 +10,14 @@ namespace bodyschema {
 /// when the robot is as its model says. Joint offsets follow the paper's sign: encoder = true +
 /// offset, so q_true = q_encoder - offset. All others are true minus nominal.
 enum class ParameterKind {
-  kJointOffset,        ///< rad, one joint
-  kFingerCurl,         ///< rad, added to every finger joint
-  kVergence,           ///< rad, right camera turned about its y axis (towards the left one: positive)
-  kFocalScale,         ///< relative change of both focal lengths
-  kPrincipalDifference,///< px, right minus left principal point along x, half to each camera
-  kMeshScale,          ///< relative change of size of every part about its own link origin
-  kDilation,           ///< px, silhouettes larger than the model says (blur, threshold, paint)
+  kJointOffset,           ///< rad, one joint
+  kFingerCurl,            ///< rad, added to every joint that curls a finger
+  kVergence,              ///< rad, right camera turned about its y axis (towards the left one: positive)
+  kFocalScale,            ///< relative change of both focal lengths
+  kPrincipalDifferenceX,  ///< px, right minus left principal point, half to each camera
+  kPrincipalDifferenceY,  ///< px, the same along y
+  kMeshScale,             ///< relative change of size of every part about its own link origin
+  kDilation,              ///< px, silhouettes larger than the model says (blur, threshold, paint)
 };
 
 /// One number of the state with what is believed about it before any picture.

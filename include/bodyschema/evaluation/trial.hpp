@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -35,6 +36,7 @@ struct FrameRecord {
 struct ContestantRecord {
   std::vector<FrameRecord> frames;  ///< of the motion proper
   WeakestDirection weakest;
+  double reach_miss_mm = 0.0;  ///< see TrialSetting::on_end
 };
 
 /// One simulated run watched by several contestants.
@@ -49,6 +51,11 @@ struct TrialSetting {
   Configuration estimator;                ///< complete estimator configuration
   simulator::SimulatorSettings simulator;
   simulator::SimulationPlan plan;         ///< its seed is replaced by the trial's
+  /// Called with each contestant when its last frame is done: what a robot would do with the result.
+  /// @param q  encoder readings of the left camera's last picture
+  std::function<void(Estimator& estimator, const RobotModel& robot, const Eigen::VectorXd& q,
+                     TrialRecord& trial, std::size_t contestant)>
+      on_end;
 };
 
 /// Simulates one run in memory, segments its pictures once (background learned from the noisy
