@@ -7,7 +7,8 @@
 namespace bodyschema {
 namespace {
 
-// Half the side of the square over which robot colour is averaged at first, px.
+// Where the robot is too thin to look inside, its colour is the mean over a square with this half
+// side, px.
 constexpr int kRadius = 5;
 // Weights of pixels at least two, at least one and zero steps inside the robot: the mean is that
 // of the surest kind there is nearby.
@@ -16,12 +17,20 @@ constexpr int kInsideWeight = 64;
 constexpr int kAnyWeight = 1;
 // Depths inside the outline at which the robot's colour is read, px: the first is just beyond the
 // blur of the outline, the second shows how colour changes.
-constexpr float kNearDepth = 1.4f;
-constexpr float kFarDepth = 2.6f;
+constexpr float kNearDepth = 1.5f;
+constexpr float kFarDepth = 3.1f;
 // Mean depth of the robot's part in a pixel on the outline, px.
 constexpr float kEdgeDepth = 0.35f;
 // Farther than this from the outline a pixel is all robot or all background, px.
 constexpr float kReach = 1.75f;
+
+// How far beyond the outline pixels can differ from the background by their blur, px.
+constexpr float kRoughMargin = 0.9f;
+// The smoothed coverage has no direction where it is flatter than this, per px.
+constexpr float kLeastSlope = 0.1f;
+// Robot colour is read where the smoothed coverage is at least this. Less would mix background in;
+// more would pick, by their noise, pixels that differ most from the background.
+constexpr float kInside = 0.8f;
 
 template <typename Function>
 void for_each_set(const BinaryMask& mask, const PixelBox& box, Function&& function) {
@@ -53,73 +62,53 @@ void CoverageEstimator::collect_band(const Image& image, const BinaryMask& detec
   stride_ = box_.width() + 2;
   const auto window = static_cast<std::size_t>(stride_) * static_cast<std::size_t>(box_.height() + 2);
   share_.assign(window, 0.0f);
+  smooth_.assign(window, 0.0f);
   band_.clear();
   for_each_set(outer_, box_, [&](int u, int v) {
     const auto local = static_cast<std::size_t>(v - box_.v0 + 1) * static_cast<std::size_t>(stride_) +
                        static_cast<std::size_t>(u - box_.u0 + 1);
     if (inner_.at(u, v)) {
       share_[local] = 1.0f;
+      smooth_[local] = 1.0f;
     } else {
-      band_.push_back({u, v, local, {}, 0.0f, false});
+      BandPixel pixel{};
+      pixel.u = u;
+      pixel.v = v;
+      pixel.local = local;
+      pixel.share = sure.at(u, v) ? 1.0f : 0.0f;
+      share_[local] = pixel.share;
+      band_.push_back(pixel);
     }
   });
 }
 
-void CoverageEstimator::average_robot(const Image& image, const BinaryMask& sure) {
+void CoverageEstimator::average_nearby(const Image& image, const BinaryMask& sure,
+                                       BandPixel& pixel) const {
   const auto channels = static_cast<std::size_t>(image.channels);
-  const auto width = static_cast<std::size_t>(box_.width());
-  const auto height = static_cast<std::size_t>(box_.height());
-  for (std::size_t c = 0; c <= channels; ++c) {
-    sums_[c].resize(width * height);
-    columns_[c].assign(width, 0);
-  }
-  for (int v = box_.v0; v <= box_.v1; ++v) {
-    std::array<int, 4> running{};
-    const auto accumulate = [&](int u, int sign) {
-      if (u < box_.u0 || u > box_.u1 || !sure.at(u, v)) return;
-      const int weight = sign * (core_.at(u, v)   ? kCoreWeight
-                                 : weak_.at(u, v) ? kInsideWeight
-                                                  : kAnyWeight);
-      const auto* pixel = image.pixel(u, v);
-      for (std::size_t c = 0; c < channels; ++c) running[c] += weight * pixel[c];
-      running[channels] += weight;
-    };
-    auto index = static_cast<std::size_t>(v - box_.v0) * width;
-    for (int u = box_.u0; u < box_.u0 + kRadius; ++u) accumulate(u, 1);
-    for (int u = box_.u0; u <= box_.u1; ++u, ++index) {
-      accumulate(u + kRadius, 1);
-      for (std::size_t c = 0; c <= channels; ++c) sums_[c][index] = running[c];
-      accumulate(u - kRadius, -1);
+  std::array<int, 3> sum{};
+  int weights = 0;
+  for (int v = std::max(pixel.v - kRadius, box_.v0); v <= std::min(pixel.v + kRadius, box_.v1); ++v) {
+    for (int u = std::max(pixel.u - kRadius, box_.u0); u <= std::min(pixel.u + kRadius, box_.u1);
+         ++u) {
+      if (!sure.at(u, v)) continue;
+      const int weight = core_.at(u, v) ? kCoreWeight : (weak_.at(u, v) ? kInsideWeight : kAnyWeight);
+      const auto* colour = image.pixel(u, v);
+      for (std::size_t c = 0; c < channels; ++c) sum[c] += weight * colour[c];
+      weights += weight;
     }
   }
-  const auto add_row = [&](int v, int sign) {
-    if (v < box_.v0 || v > box_.v1) return;
-    for (std::size_t c = 0; c <= channels; ++c) {
-      const int* row = sums_[c].data() + static_cast<std::size_t>(v - box_.v0) * width;
-      int* column = columns_[c].data();
-      for (std::size_t u = 0; u < width; ++u) column[u] += sign * row[u];
-    }
-  };
-  for (int v = box_.v0; v < box_.v0 + kRadius; ++v) add_row(v, 1);
-  int summed_for = box_.v0 - 1;
-  for (auto& pixel : band_) {
-    for (; summed_for < pixel.v; ++summed_for) {  // the band is in row order
-      add_row(summed_for + 1 + kRadius, 1);
-      add_row(summed_for - kRadius, -1);
-    }
-    const auto u = static_cast<std::size_t>(pixel.u - box_.u0);
-    const int weight = columns_[channels][u];
-    for (std::size_t c = 0; c < channels; ++c) {
-      pixel.robot[c] = weight > 0 ? static_cast<float>(columns_[c][u]) / static_cast<float>(weight)
-                                  : static_cast<float>(image.pixel(pixel.u, pixel.v)[c]);
-    }
+  if (weights == 0) return;
+  for (std::size_t c = 0; c < channels; ++c) {
+    pixel.robot[c] = static_cast<float>(sum[c]) / static_cast<float>(weights);
   }
+  pixel.robot_known = true;
 }
 
 void CoverageEstimator::project(const Image& image, const BackgroundModel& background,
                                 float least_contrast_sigma) {
   const auto channels = static_cast<std::size_t>(image.channels);
   for (auto& pixel : band_) {
+    if (!pixel.robot_known) continue;
     const auto i = static_cast<std::size_t>(pixel.v) * static_cast<std::size_t>(image.width) +
                    static_cast<std::size_t>(pixel.u);
     const auto* colour = image.pixel(pixel.u, pixel.v);
@@ -127,7 +116,7 @@ void CoverageEstimator::project(const Image& image, const BackgroundModel& backg
     float contrast = 0.0f;    // |F - B|^2
     float along = 0.0f;       // (I - B).(F - B)
     for (std::size_t c = 0; c < channels; ++c) {
-      const float b = background.mean[c][i];
+      const float b = background.mean[i * channels + c];
       const float d = static_cast<float>(colour[c]) - b;
       const float f = pixel.robot[c] - b;
       difference += d * d;
@@ -136,7 +125,7 @@ void CoverageEstimator::project(const Image& image, const BackgroundModel& backg
     }
     const float precision = background.precision[i];
     const float least = least_contrast_sigma * least_contrast_sigma;
-    pixel.known = contrast * precision >= least && precision > 0.0f;
+    pixel.contrast = contrast * precision >= least && precision > 0.0f;
     pixel.share = contrast > 1e-6f ? along / contrast : 0.0f;
     // A colour that no mixture of F and B explains is that of another part of the robot.
     const float across = difference - pixel.share * along;
@@ -148,7 +137,23 @@ void CoverageEstimator::project(const Image& image, const BackgroundModel& backg
   for (const auto& pixel : band_) share_[pixel.local] = pixel.share;
 }
 
-void CoverageEstimator::place_outline(const Image& image, const BackgroundModel& background) {
+void CoverageEstimator::smooth() {
+  const auto s = static_cast<std::ptrdiff_t>(stride_);
+  for (auto& pixel : band_) {
+    const float* a = share_.data() + pixel.local;
+    const float left = a[-s - 1] + 2.0f * a[-1] + a[s - 1];
+    const float right = a[-s + 1] + 2.0f * a[1] + a[s + 1];
+    const float top = a[-s - 1] + 2.0f * a[-s] + a[-s + 1];
+    const float bottom = a[s - 1] + 2.0f * a[s] + a[s + 1];
+    pixel.smooth = (left + right + 2.0f * (a[-s] + 2.0f * a[0] + a[s])) / 16.0f;
+    pixel.slope_u = (left - right) / 8.0f;
+    pixel.slope_v = (top - bottom) / 8.0f;
+    smooth_[pixel.local] = pixel.smooth;
+  }
+}
+
+void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& background,
+                                    const BinaryMask& sure, bool rough) {
   const auto channels = static_cast<std::size_t>(image.channels);
   const auto s = static_cast<std::ptrdiff_t>(stride_);
   const auto width = static_cast<float>(image.width - 1);
@@ -165,9 +170,9 @@ void CoverageEstimator::place_outline(const Image& image, const BackgroundModel&
                        static_cast<std::size_t>(iu - box_.u0 + 1);
     const float w00 = (1.0f - fu) * (1.0f - fv), w10 = fu * (1.0f - fv), w01 = (1.0f - fu) * fv,
                 w11 = fu * fv;
-    const auto* share = share_.data() + local;
+    const auto* share = smooth_.data() + local;
     const float inside = w00 * share[0] + w10 * share[1] + w01 * share[s] + w11 * share[s + 1];
-    if (inside < 0.9f) return false;
+    if (inside < kInside) return false;
     const auto* p = image.pixel(iu, iv);
     const auto* below = p + static_cast<std::ptrdiff_t>(image.width) * image.channels;
     for (std::size_t c = 0; c < channels; ++c) {
@@ -176,28 +181,21 @@ void CoverageEstimator::place_outline(const Image& image, const BackgroundModel&
     return true;
   };
   for (auto& pixel : band_) {
-    const float* a = share_.data() + pixel.local;
-    const float left = a[-s - 1] + 2.0f * a[-1] + a[s - 1];
-    const float right = a[-s + 1] + 2.0f * a[1] + a[s + 1];
-    const float top = a[-s - 1] + 2.0f * a[-s] + a[-s + 1];
-    const float bottom = a[s - 1] + 2.0f * a[s] + a[s + 1];
-    const float smooth = (left + right + 2.0f * (a[-s] + 2.0f * a[0] + a[s])) / 16.0f;
-    const float gu = (left - right) / 8.0f;  // towards the background
-    const float gv = (top - bottom) / 8.0f;
-    const float steepness = std::sqrt(gu * gu + gv * gv);
-    if (steepness < 0.04f) continue;
-    const float nu = gu / steepness;
-    const float nv = gv / steepness;
-    const float depth = std::clamp((smooth - 0.5f) * 2.5f, -kReach, kReach);  // inside: positive
+    const float steepness = std::hypot(pixel.slope_u, pixel.slope_v);
+    if (steepness < kLeastSlope) continue;
+    const float nu = pixel.slope_u / steepness;
+    const float nv = pixel.slope_v / steepness;
+    const float depth = std::clamp((pixel.smooth - 0.5f) * 2.5f, -kReach, kReach) -
+                        (rough ? kRoughMargin : 0.0f);
     const auto u = static_cast<float>(pixel.u) + nu * depth;
     const auto v = static_cast<float>(pixel.v) + nv * depth;
 
-    // The mean of three places side by side, at two depths.
+    // The mean of three places side by side, at two depths; one place is enough at first.
     std::array<float, 3> near{};
     std::array<float, 3> far{};
     int near_count = 0;
     int far_count = 0;
-    for (int side = -1; side <= 1; ++side) {
+    for (int side = rough ? 0 : -1; side <= (rough ? 0 : 1); ++side) {
       const float su = u - nv * static_cast<float>(side);
       const float sv = v + nu * static_cast<float>(side);
       std::array<float, 3> colour{};
@@ -210,7 +208,10 @@ void CoverageEstimator::place_outline(const Image& image, const BackgroundModel&
         for (std::size_t c = 0; c < channels; ++c) far[c] += colour[c];
       }
     }
-    if (near_count == 0) continue;
+    if (near_count == 0) {
+      if (!pixel.robot_known) average_nearby(image, sure, pixel);
+      continue;
+    }
     const auto i = static_cast<std::size_t>(pixel.v) * static_cast<std::size_t>(image.width) +
                    static_cast<std::size_t>(pixel.u);
     static const float kGain = (std::sqrt(kNearDepth) - std::sqrt(kEdgeDepth)) /
@@ -221,7 +222,7 @@ void CoverageEstimator::place_outline(const Image& image, const BackgroundModel&
     for (std::size_t c = 0; c < channels; ++c) {
       near[c] /= static_cast<float>(near_count);
       step[c] = far_count == 0 ? 0.0f : kGain * (near[c] - far[c] / static_cast<float>(far_count));
-      const float f = near[c] - background.mean[c][i];
+      const float f = near[c] - background.mean[i * channels + c];
       change += step[c] * step[c];
       contrast += f * f;
     }
@@ -231,6 +232,7 @@ void CoverageEstimator::place_outline(const Image& image, const BackgroundModel&
     for (std::size_t c = 0; c < channels; ++c) {
       pixel.robot[c] = std::clamp(near[c] + scale * step[c], 0.0f, 255.0f);
     }
+    pixel.robot_known = true;
   }
 }
 
@@ -244,10 +246,9 @@ void CoverageEstimator::estimate(const Image& image, const BackgroundModel& back
   uncertain.fill(false);
   collect_band(image, detected, sure);
   if (box_.empty()) return;
-  average_robot(image, sure);
-  project(image, background, least_contrast_sigma);
   for (int round = 0; round < 2; ++round) {
-    place_outline(image, background);
+    smooth();
+    look_inside(image, background, sure, round == 0);
     project(image, background, least_contrast_sigma);
   }
 
@@ -258,7 +259,7 @@ void CoverageEstimator::estimate(const Image& image, const BackgroundModel& back
   mask = inner_;
   for (const auto& pixel : band_) {
     float share = pixel.share;
-    if (!pixel.known) {
+    if (pixel.robot_known && !pixel.contrast) {
       uncertain.set(pixel.u, pixel.v);
       share = sure.at(pixel.u, pixel.v) ? 1.0f : 0.0f;
     }

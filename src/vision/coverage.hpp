@@ -13,11 +13,11 @@ namespace bodyschema {
 
 /// Share of each pixel covered by the robot along a blurred outline, from a rough detection.
 ///
-/// Matting with a known background: I = (1-a) B + a F. B comes from the background model; F is
-/// found in two steps: first the mean colour of sure robot pixels nearby, which places the outline
-/// roughly; then, along the outline's normal, the colour just inside it, extrapolated to the
-/// outline itself with the law that shading follows on a smooth surface that turns away from the
-/// camera (its normal, and with it the light, changes with the square root of the depth).
+/// Matting with a known background: I = (1-a) B + a F. B comes from the background model. F is
+/// the colour along the outline's normal just inside the outline, extrapolated to the outline
+/// itself with the law that shading follows on a smooth surface that turns away from the camera
+/// (its normal, and with it the light, changes with the square root of the depth). The outline in
+/// turn is where a is one half: two rounds, from the outline of the pixels that differ.
 class CoverageEstimator {
  public:
   /// @param detected  pixels where a robot may be: all of it and at most ~2 px around it
@@ -36,11 +36,18 @@ class CoverageEstimator {
     std::size_t local;         ///< in the padded window
     std::array<float, 3> robot;  ///< F
     float share = 0.0f;        ///< a, not clamped
-    bool known = false;        ///< F and B differ enough
+    float smooth = 0.0f;       ///< a, smoothed over 3x3 pixels
+    float slope_u = 0.0f;      ///< of a, towards the background
+    float slope_v = 0.0f;
+    bool robot_known = false;  ///< F has been found; only pixels near the outline need it
+    bool contrast = false;     ///< F and B differ enough
   };
   void collect_band(const Image& image, const BinaryMask& detected, const BinaryMask& sure);
-  void average_robot(const Image& image, const BinaryMask& sure);
-  void place_outline(const Image& image, const BackgroundModel& background);
+  void smooth();
+  /// Finds F for pixels near the outline. `rough`: the outline may lie too far out.
+  void look_inside(const Image& image, const BackgroundModel& background, const BinaryMask& sure,
+                   bool rough);
+  void average_nearby(const Image& image, const BinaryMask& sure, BandPixel& pixel) const;
   void project(const Image& image, const BackgroundModel& background, float least_contrast_sigma);
 
   PixelBox box_;
@@ -49,8 +56,7 @@ class CoverageEstimator {
   BinaryMask inner_, outer_, core_, weak_;
   std::vector<BandPixel> band_;
   std::vector<float> share_;   ///< a over the window
-  std::array<std::vector<int>, 4> sums_;    ///< weight and weighted colours, summed along rows
-  std::array<std::vector<int>, 4> columns_; ///< the same summed over a window of rows
+  std::vector<float> smooth_;  ///< a over the window, smoothed
 };
 
 }  // namespace bodyschema

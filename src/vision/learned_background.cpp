@@ -114,7 +114,7 @@ void LearnedBackground::start(const Image& frame) {
   support_.assign(n, 0);
   variance_.assign(n, 0.0f);
   rival_support_.assign(n, 0);
-  for (std::size_t c = 0; c < static_cast<std::size_t>(frame.channels); ++c) rival_[c].assign(n, 0.0f);
+  rival_.assign(n * static_cast<std::size_t>(frame.channels), 0.0f);
 }
 
 void LearnedBackground::set_precision(std::size_t i) {
@@ -264,7 +264,7 @@ void LearnedBackground::average_row(std::span<const Image> frames, int v,
     float shift = 0.0f;
     for (std::size_t c = 0; c < kChannels; ++c) {
       const float mean_shift = count > 0.0f ? sum[c] / count : 0.0f;
-      model_.mean[c][i] = middle[c] + mean_shift;
+      model_.mean[i * kChannels + c] = middle[c] + mean_shift;
       shift += mean_shift * mean_shift;
     }
     variance_[i] =
@@ -325,13 +325,13 @@ void LearnedBackground::update_row(const Image& frame, int v, const BinaryMask* 
     std::array<float, kChannels> d;
     float distance = 0.0f;
     for (std::size_t c = 0; c < kChannels; ++c) {
-      d[c] = static_cast<float>(pixel[c]) - model_.mean[c][i];
+      d[c] = static_cast<float>(pixel[c]) - model_.mean[i * kChannels + c];
       distance += d[c] * d[c];
     }
     const float variance = model_.precision[i] > 0.0f ? 1.0f / model_.precision[i] : noise;
     if (n > 0.0f && distance <= gate * (variance + noise / n)) {
       const float rate = 1.0f / (n + 1.0f);
-      for (std::size_t c = 0; c < kChannels; ++c) model_.mean[c][i] += rate * d[c];
+      for (std::size_t c = 0; c < kChannels; ++c) model_.mean[i * kChannels + c] += rate * d[c];
       const float innovation = distance / (kChannels * (1.0f + 1.0f / n));
       variance_[i] += (innovation - variance_[i]) * std::max(1.0f / n, 0.02f);
       sum += innovation;
@@ -341,23 +341,23 @@ void LearnedBackground::update_row(const Image& frame, int v, const BinaryMask* 
     } else {
       float rival_distance = 0.0f;
       for (std::size_t c = 0; c < kChannels; ++c) {
-        const float r = static_cast<float>(pixel[c]) - rival_[c][i];
+        const float r = static_cast<float>(pixel[c]) - rival_[i * kChannels + c];
         rival_distance += r * r;
       }
       if (rival_support_[i] == 0) {
-        for (std::size_t c = 0; c < kChannels; ++c) rival_[c][i] = pixel[c];
+        for (std::size_t c = 0; c < kChannels; ++c) rival_[i * kChannels + c] = pixel[c];
         rival_support_[i] = 1;
       } else if (rival_distance <= gate * 2.0f * noise) {
         ++rival_support_[i];
         const float rate = 1.0f / static_cast<float>(rival_support_[i]);
         for (std::size_t c = 0; c < kChannels; ++c) {
-          rival_[c][i] += rate * (static_cast<float>(pixel[c]) - rival_[c][i]);
+          rival_[i * kChannels + c] += rate * (static_cast<float>(pixel[c]) - rival_[i * kChannels + c]);
         }
       } else {
         --rival_support_[i];
       }
       if (rival_support_[i] > support_[i]) {
-        for (std::size_t c = 0; c < kChannels; ++c) std::swap(rival_[c][i], model_.mean[c][i]);
+        for (std::size_t c = 0; c < kChannels; ++c) std::swap(rival_[i * kChannels + c], model_.mean[i * kChannels + c]);
         std::swap(rival_support_[i], support_[i]);
         variance_[i] = noise;
       }

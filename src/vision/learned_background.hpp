@@ -91,7 +91,7 @@ class LearnedBackground {
   Image first_;                        // until the second frame gives the noise
   std::vector<std::uint16_t> support_; // sightings of the background
   std::vector<float> variance_;        // of one channel around the background
-  std::array<std::vector<float>, 3> rival_;
+  std::vector<float> rival_;            // another colour, channels interleaved
   std::vector<std::uint16_t> rival_support_;
   int upkeep_row_ = 0;
   double innovation_sum_ = 0.0;        // of one frame's inliers, for the noise

@@ -1,7 +1,10 @@
 #include "bodyschema/vision/segmenter.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <optional>
 
 #include "bodyschema/core/error.hpp"
@@ -23,14 +26,29 @@ float noise_against(const Image& frame, const BackgroundModel& background) {
   std::array<std::size_t, 256> histogram{};
   for (std::size_t i = 0; i < background.pixels(); ++i) {
     if (background.precision[i] <= 0.0f) continue;
-    for (std::size_t c = 0; c < static_cast<std::size_t>(background.channels); ++c) {
-      const float d = std::abs(
-          static_cast<float>(frame.data[i * static_cast<std::size_t>(frame.channels) + c]) -
-          background.mean[c][i]);
+    const auto channels = static_cast<std::size_t>(background.channels);
+    for (std::size_t k = i * channels; k < (i + 1) * channels; ++k) {
+      const float d = std::abs(static_cast<float>(frame.data[k]) - background.mean[k]);
       ++histogram[static_cast<std::size_t>(std::min(d + 0.5f, 255.0f))];
     }
   }
   return noise_from_differences(histogram);
+}
+
+static_assert(std::endian::native == std::endian::little, "pack_bits reads eight bytes at once");
+
+/// Packs bytes of 0 or 1 into bits; `bytes` is readable, and zero, up to a whole word.
+void pack_bits(const std::uint8_t* bytes, std::size_t count, std::uint64_t* words) {
+  for (std::size_t u = 0; u < count; u += 64) {
+    std::uint64_t word = 0;
+    for (std::size_t k = 0; k < 8; ++k) {
+      std::uint64_t eight = 0;
+      std::memcpy(&eight, bytes + u + 8 * k, sizeof eight);
+      // Bit b of the top byte gathers byte b.
+      word |= ((eight * 0x0102040810204080u) >> 56) << (8 * k);
+    }
+    *words++ = word;
+  }
 }
 
 BackgroundModel load_background(const VisionSetup& setup, const std::string& camera, int width,
@@ -50,10 +68,10 @@ BackgroundModel load_background(const VisionSetup& setup, const std::string& cam
   model.noise_sd = std::max(static_cast<float>(setup.noise_levels), kLeastNoiseSd);
   for (std::size_t i = 0; i < model.pixels(); ++i) {
     int sum = 0;
-    for (std::size_t c = 0; c < static_cast<std::size_t>(picture.channels); ++c) {
-      const auto level = picture.data[i * static_cast<std::size_t>(picture.channels) + c];
-      model.mean[c][i] = level;
-      sum += level;
+    const auto channels = static_cast<std::size_t>(picture.channels);
+    for (std::size_t k = i * channels; k < (i + 1) * channels; ++k) {
+      model.mean[k] = picture.data[k];
+      sum += picture.data[k];
     }
     const bool known = !setup.black_is_unknown || sum > 0;
     model.precision[i] = known ? 1.0f / (model.noise_sd * model.noise_sd) : 0.0f;
@@ -66,13 +84,14 @@ BackgroundModel load_background(const VisionSetup& setup, const std::string& cam
 struct Segmenter::Impl {
   Impl(const VisionSetup& s, std::string name, int w, int h)
       : setup(s), camera(std::move(name)), width(w), height(h), single_colour(s, w, h),
-        learned(s, w, h), detected(w, h), sure(w, h), uncertain(w, h), robot(w, h) {}
+        learned(s, w, h), detected(w, h), sure(w, h), uncertain(w, h), robot(w, h),
+        hits((static_cast<std::size_t>(w) + 63) / 64 * 64, 0) {}
 
   void check(const Image& image);
   [[nodiscard]] const BackgroundModel& background() const;
   void detect(const Image& image, const BackgroundModel& model);
   void detect_hard(const Image& image, const BackgroundModel& model);
-  void mark_valid(const BackgroundModel& model, BinaryMask& valid) const;
+  void mark_valid(const BackgroundModel& model, BinaryMask& valid);
 
   VisionSetup setup;
   std::string camera;
@@ -92,7 +111,8 @@ struct Segmenter::Impl {
   ComponentFilter components;
   MaskMorphology morphology;
   BinaryMask detected, sure, uncertain, robot;
-  std::vector<float> rows;  // see detect()
+  std::vector<float> rows;         // see detect()
+  std::vector<std::uint8_t> hits;  // of one row, 0 or 1, padded to whole words
 };
 
 void Segmenter::Impl::check(const Image& image) {
@@ -129,69 +149,59 @@ const BackgroundModel& Segmenter::Impl::background() const {
 void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model) {
   const auto w = static_cast<std::size_t>(width);
   const auto n = static_cast<std::size_t>(channels);
-  // Per channel three rows of differences summed over three columns, then one row of plain
-  // differences; at the end two rows of scores.
-  rows.resize(w * (4 * n + 2));
-  const auto summed = [&](std::size_t c, int v) {
-    return rows.data() + w * (4 * c + static_cast<std::size_t>(v % 3));
-  };
-  float* pixel_score = rows.data() + w * 4 * n;
-  float* square_score = pixel_score + w;
+  const std::size_t row_size = w * n;
+  // Plain differences with one pixel of padding on both sides; their squares; three rows of
+  // differences summed over three columns; the score of each pixel.
+  rows.resize((row_size + 2 * n) + row_size + 3 * row_size + w);
+  float* plain = rows.data() + n;
+  float* squares = plain + row_size + n;
+  float* summed = squares + row_size;
+  float* score = summed + 3 * row_size;
 
   const auto sigma = static_cast<float>(setup.threshold_sigma);
   const auto levels = static_cast<float>(setup.threshold_levels);
-  const float pixel_limit = sigma * sigma;
-  // The sum of nine has nine times the variance of one; expressed in units of one pixel's.
-  const float square_limit = 9.0f * sigma * sigma;
-  const float square_levels = 81.0f * levels * levels;
-  const float pixel_levels = levels * levels;
-
-  const auto sum_rows = [&](int v) {
-    for (std::size_t c = 0; c < n; ++c) {
-      float* plain = rows.data() + w * (4 * c + 3);
-      float* out = summed(c, v);
-      const std::uint8_t* in = image.pixel(0, v) + c;
-      const float* mean = model.mean[c].data() + static_cast<std::size_t>(v) * w;
-      for (std::size_t u = 0; u < w; ++u) plain[u] = static_cast<float>(in[u * n]) - mean[u];
-      for (std::size_t u = 1; u + 1 < w; ++u) out[u] = plain[u - 1] + plain[u] + plain[u + 1];
-      out[0] = 2.0f * plain[0] + plain[w > 1 ? 1 : 0];
-      out[w - 1] = 2.0f * plain[w - 1] + plain[w > 1 ? w - 2 : 0];
+  // The sum of nine has nine times the variance of one pixel, 81 times its square.
+  const auto pack = [&](int v, float variances, float limit, std::uint64_t* out) {
+    if (n == 3) {
       for (std::size_t u = 0; u < w; ++u) {
-        pixel_score[u] = (c == 0 ? 0.0f : pixel_score[u]) + plain[u] * plain[u];
+        score[u] = squares[3 * u] + squares[3 * u + 1] + squares[3 * u + 2];
       }
+    } else {
+      std::copy_n(squares, w, score);
     }
-  };
-  const auto pack = [&](const float* score, const float* precision, float limit, float least,
-                        std::uint64_t* out) {
-    for (std::size_t u = 0; u < w;) {
-      std::uint64_t word = 0;
-      const std::size_t end = std::min(w, u + 64);
-      for (std::size_t bit = 0; u < end; ++u, ++bit) {
-        const bool set = score[u] * precision[u] > limit && score[u] > least;
-        word |= static_cast<std::uint64_t>(set) << bit;
-      }
-      *out++ = word;
+    const float* precision = model.precision.data() + static_cast<std::size_t>(v) * w;
+    const float least_sigma = variances * sigma * sigma;
+    std::uint8_t* hit = hits.data();
+    for (std::size_t u = 0; u < w; ++u) {
+      hit[u] = static_cast<std::uint8_t>((score[u] * precision[u] > least_sigma) &
+                                         (score[u] > limit));
     }
+    pack_bits(hit, w, out);
   };
   for (int v = 0; v <= height; ++v) {
     if (v < height) {
-      sum_rows(v);
-      pack(pixel_score, model.precision.data() + static_cast<std::size_t>(v) * w, pixel_limit,
-           pixel_levels, sure.row(v));
+      const std::uint8_t* in = image.pixel(0, v);
+      const float* mean = model.mean.data() + static_cast<std::size_t>(v) * row_size;
+      for (std::size_t i = 0; i < row_size; ++i) plain[i] = static_cast<float>(in[i]) - mean[i];
+      std::copy_n(plain, n, plain - n);
+      std::copy_n(plain + row_size - n, n, plain + row_size);
+      float* out = summed + static_cast<std::size_t>(v % 3) * row_size;
+      const float* before = plain - n;
+      const float* after = plain + n;
+      for (std::size_t i = 0; i < row_size; ++i) out[i] = before[i] + plain[i] + after[i];
+      for (std::size_t i = 0; i < row_size; ++i) squares[i] = plain[i] * plain[i];
+      pack(v, 1.0f, levels * levels, sure.row(v));
     }
     if (v == 0) continue;
     const int here = v - 1;
-    for (std::size_t c = 0; c < n; ++c) {
-      const float* a = summed(c, std::max(here - 1, 0));
-      const float* b = summed(c, here);
-      const float* d = summed(c, std::min(here + 1, height - 1));
-      for (std::size_t u = 0; u < w; ++u) {
-        const float sum = a[u] + b[u] + d[u];
-        square_score[u] = (c == 0 ? 0.0f : square_score[u]) + sum * sum;
-      }
+    const float* a = summed + static_cast<std::size_t>(std::max(here - 1, 0) % 3) * row_size;
+    const float* b = summed + static_cast<std::size_t>(here % 3) * row_size;
+    const float* c = summed + static_cast<std::size_t>(std::min(here + 1, height - 1) % 3) * row_size;
+    for (std::size_t i = 0; i < row_size; ++i) {
+      const float sum = a[i] + b[i] + c[i];
+      squares[i] = sum * sum;
     }
-    pack(square_score, model.precision.data() + static_cast<std::size_t>(here) * w, square_limit,
-         square_levels, detected.row(here));
+    pack(here, 9.0f, 81.0f * levels * levels, detected.row(here));
   }
 }
 
@@ -212,7 +222,7 @@ void Segmenter::Impl::detect_hard(const Image& image, const BackgroundModel& mod
       for (int bit = 0; u < end; ++u, ++bit, ++i, in += n) {
         float worst = 0.0f;
         for (std::size_t c = 0; c < n; ++c) {
-          worst = std::max(worst, std::abs(static_cast<float>(in[c]) - model.mean[c][i]));
+          worst = std::max(worst, std::abs(static_cast<float>(in[c]) - model.mean[i * n + c]));
         }
         word |= static_cast<std::uint64_t>(worst > limit && model.precision[i] > 0.0f) << bit;
       }
@@ -221,19 +231,13 @@ void Segmenter::Impl::detect_hard(const Image& image, const BackgroundModel& mod
   }
 }
 
-void Segmenter::Impl::mark_valid(const BackgroundModel& model, BinaryMask& valid) const {
+void Segmenter::Impl::mark_valid(const BackgroundModel& model, BinaryMask& valid) {
+  const auto w = static_cast<std::size_t>(width);
   for (int v = 0; v < height; ++v) {
-    const float* precision =
-        model.precision.data() + static_cast<std::size_t>(v) * static_cast<std::size_t>(width);
-    auto* out = valid.row(v);
-    for (int u = 0; u < width;) {
-      std::uint64_t word = 0;
-      const int end = std::min(width, u + 64);
-      for (int bit = 0; u < end; ++u, ++bit) {
-        word |= static_cast<std::uint64_t>(precision[u] > 0.0f) << bit;
-      }
-      *out++ = word;
-    }
+    const float* precision = model.precision.data() + static_cast<std::size_t>(v) * w;
+    std::uint8_t* hit = hits.data();
+    for (std::size_t u = 0; u < w; ++u) hit[u] = static_cast<std::uint8_t>(precision[u] > 0.0f);
+    pack_bits(hit, w, valid.row(v));
   }
 }
 

@@ -8,10 +8,14 @@
 namespace bodyschema {
 namespace {
 
-// Colours farther than this from the surface never belong to the background, levels.
-constexpr double kWidestGate = 24.0;
+// While the surface is found, block means within this many levels of it belong to it. Narrow, so
+// that a robot of a similar colour stays out; uneven light is taken in as the surface bends to it.
+constexpr double kWidestGate = 6.0;
 // Share of what is known that survives each frame once the surface is found.
 constexpr double kMemory = 0.9;
+// Every frame counts at first, later one in a few: light changes slowly.
+constexpr int kEagerFrames = 20;
+constexpr int kUpkeepFrames = 5;
 
 std::array<double, 6> terms_at(double x, double y) { return {1.0, x, y, x * x, x * y, y * y}; }
 
@@ -141,6 +145,7 @@ void SingleColourBackground::solve(const Moments& moments, std::size_t terms) {
 }
 
 void SingleColourBackground::update(const Image& frame) {
+  if (ready_ && frames_++ >= kEagerFrames && frames_ % kUpkeepFrames != 0) return;
   if (!ready_) model_ = BackgroundModel(frame.width, frame.height, frame.channels);
   measure_blocks(frame);
   const auto inlier_quantile = [&](double gate, bool variance) {
@@ -157,17 +162,16 @@ void SingleColourBackground::update(const Image& frame) {
 
   if (!ready_) {
     find_colour();
-    // Constant, plane, quadratic; the gate closes as the surface settles.
-    double gate = kWidestGate;
-    for (int round = 0; round < 12; ++round) {
-      const std::size_t terms = round < 2 ? 1 : (round < 5 ? 3 : kTerms);
+    // Constant, plane, quadratic, each growing into what it explains; then the gate closes.
+    double gate = 8.0 + kWidestGate;  // the colour is known to half a cell
+    for (int round = 0; round < 20; ++round) {
+      const std::size_t terms = round < 3 ? 1 : (round < 10 ? 3 : kTerms);
       Moments moments;
       accumulate(gate, moments);
       solve(moments, terms);
       history_ = moments;
-      if (round >= 5) {
-        gate = std::clamp(5.0 * inlier_quantile(kWidestGate, false), 1.5, kWidestGate);
-      }
+      gate = round < 16 ? kWidestGate
+                        : std::clamp(5.0 * inlier_quantile(kWidestGate, false), 1.5, kWidestGate);
     }
     ready_ = true;
   } else {
@@ -203,17 +207,19 @@ void SingleColourBackground::render() {
   // Pixel u lies at (u + 1/2) / block in block units, whatever remains beyond the last block.
   const double scale_x = 2.0 / (static_cast<double>(columns_) * std::min(kBlock, model_.width));
   const double scale_y = 2.0 / (static_cast<double>(rows_) * std::min(kBlock, model_.height));
-  for (std::size_t c = 0; c < static_cast<std::size_t>(model_.channels); ++c) {
+  const auto channels = static_cast<std::size_t>(model_.channels);
+  for (std::size_t c = 0; c < channels; ++c) {
     const auto& s = surface_[c];
     for (int v = 0; v < model_.height; ++v) {
       const double y = (v + 0.5) * scale_y - 1.0;
       const auto a = static_cast<float>(s[0] + s[2] * y + s[5] * y * y);
       const auto b = static_cast<float>(s[1] + s[4] * y);
       const auto q = static_cast<float>(s[3]);
-      auto* row = model_.mean[c].data() + static_cast<std::ptrdiff_t>(v) * model_.width;
-      for (int u = 0; u < model_.width; ++u) {
+      float* out = model_.mean.data() +
+                   static_cast<std::size_t>(v) * static_cast<std::size_t>(model_.width) * channels + c;
+      for (int u = 0; u < model_.width; ++u, out += channels) {
         const float x = (static_cast<float>(u) + 0.5f) * static_cast<float>(scale_x) - 1.0f;
-        row[u] = a + x * (b + q * x);
+        *out = a + x * (b + q * x);
       }
     }
   }

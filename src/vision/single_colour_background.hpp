@@ -42,6 +42,7 @@ class SingleColourBackground {
   int columns_ = 0;
   int rows_ = 0;
   bool ready_ = false;
+  int frames_ = 0;
   std::array<std::vector<float>, 3> block_mean_;
   std::vector<float> block_variance_;  // of one channel, mean over channels
   std::vector<float> scratch_;

@@ -116,7 +116,7 @@ TEST_P(Recording, BackgroundIsLearnedFromTheMovingArm) {
     if ((b[0] | b[1] | b[2]) == 0 || model.precision[i] <= 0.0f) continue;
     ++known;
     float worst = 0.0f;
-    for (std::size_t c = 0; c < 3; ++c) worst = std::max(worst, std::abs(model.mean[c][i] - b[c]));
+    for (std::size_t c = 0; c < 3; ++c) worst = std::max(worst, std::abs(model.mean[3 * i + c] - b[c]));
     wrong += worst > 3.0f;
   }
   std::printf("    known %zu, wrong %zu\n", known, wrong);

@@ -41,7 +41,8 @@ struct Scene {
   Texture texture = Texture::kPlain;
   double base[3] = {60, 90, 120};         ///< background colour, levels
   double robot[3] = {200, 190, 180};      ///< robot colour, levels
-  double ambient = 1.0;                   ///< 1: flat; less: darker towards the outline (Lambert)
+  double ambient = 1.0;                   ///< 1: flat; less: Lambert, lit from the lamp
+  double lamp[3] = {0, 0, 1};             ///< unit vector towards it: right, down, to the camera
   double blur_px = 0.4;
   double noise_levels = 2.5;
   int channels = 3;
@@ -75,12 +76,24 @@ struct Scene {
   }
   void robot_colour(double u, double v, double* colour) const {
     // The shape on top is the one whose axis is nearest in units of its radius.
+    const Capsule* top = nullptr;
     double depth = 1.0;
     for (const auto& shape : shapes) {
-      depth = std::min(depth, std::max(0.0, shape.distance(u, v) / shape.radius + 1.0));
+      const double d = std::max(0.0, shape.distance(u, v) / shape.radius + 1.0);
+      if (d < depth) {
+        depth = d;
+        top = &shape;
+      }
     }
-    const double facing = std::sqrt(std::max(0.0, 1.0 - depth * depth));
-    const double light = ambient + (1.0 - ambient) * facing;
+    double facing = lamp[2];
+    if (top != nullptr) {
+      constexpr double kStep = 1e-3;  // the slope of the distance is the normal's direction
+      const double nu = (top->distance(u + kStep, v) - top->distance(u - kStep, v)) / (2 * kStep);
+      const double nv = (top->distance(u, v + kStep) - top->distance(u, v - kStep)) / (2 * kStep);
+      facing = lamp[0] * nu * depth + lamp[1] * nv * depth +
+               lamp[2] * std::sqrt(std::max(0.0, 1.0 - depth * depth));
+    }
+    const double light = ambient + (1.0 - ambient) * std::max(0.0, facing);
     for (int c = 0; c < 3; ++c) colour[c] = robot[c] * light;
   }
 

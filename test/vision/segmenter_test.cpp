@@ -165,7 +165,7 @@ TEST(Segmenter, LearnsBehindAMovingRobotOffline) {
       ++known;
       float worst = 0;
       for (int c = 0; c < 3; ++c) {
-        worst = std::max(worst, std::abs(model.mean[static_cast<std::size_t>(c)][i] -
+        worst = std::max(worst, std::abs(model.mean[3 * i + static_cast<std::size_t>(c)] -
                                          truth.at<cv::Vec3f>(v, u)[c]));
       }
       wrong += worst > 5.0f;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -8,12 +7,12 @@ namespace bodyschema {
 
 /// What every pixel looks like without the robot, and how far noise carries it from there.
 ///
-/// Planes in row order, one per channel. Levels, 0 to 255.
+/// Row order, levels of 0 to 255.
 struct BackgroundModel {
   int width = 0;
   int height = 0;
   int channels = 0;
-  std::array<std::vector<float>, 3> mean;
+  std::vector<float> mean;  ///< channels interleaved, as in Image
   /// 1 / variance of one channel, levels^-2, the mean's own uncertainty included; 0: unknown pixel.
   std::vector<float> precision;
   /// Typical standard deviation of the noise of one channel, levels.
@@ -22,7 +21,7 @@ struct BackgroundModel {
   BackgroundModel() = default;
   BackgroundModel(int w, int h, int c) : width(w), height(h), channels(c) {
     const auto n = static_cast<std::size_t>(w) * static_cast<std::size_t>(h);
-    for (int i = 0; i < c; ++i) mean[static_cast<std::size_t>(i)].assign(n, 0.0f);
+    mean.assign(n * static_cast<std::size_t>(c), 0.0f);
     precision.assign(n, 0.0f);
   }
   [[nodiscard]] std::size_t pixels() const { return precision.size(); }
