@@ -32,6 +32,31 @@ constexpr float kLeastSlope = 0.1f;
 // more would pick, by their noise, pixels that differ most from the background.
 constexpr float kInside = 0.8f;
 
+/// The largest squared difference between a pixel's background and its neighbours': on a sharp
+/// border in the background the uncovered part of a pixel need not have the pixel's mean colour.
+float background_change(const BackgroundModel& background, int u, int v) {
+  const auto channels = static_cast<std::size_t>(background.channels);
+  const auto at = [&](int a, int b) {
+    return background.mean.data() +
+           (static_cast<std::size_t>(b) * static_cast<std::size_t>(background.width) +
+            static_cast<std::size_t>(a)) * channels;
+  };
+  const float* here = at(u, v);
+  float largest = 0.0f;
+  const auto compare = [&](int a, int b) {
+    if (a < 0 || b < 0 || a >= background.width || b >= background.height) return;
+    const float* there = at(a, b);
+    float sum = 0.0f;
+    for (std::size_t c = 0; c < channels; ++c) sum += (there[c] - here[c]) * (there[c] - here[c]);
+    largest = std::max(largest, sum);
+  };
+  compare(u - 1, v);
+  compare(u + 1, v);
+  compare(u, v - 1);
+  compare(u, v + 1);
+  return largest;
+}
+
 template <typename Function>
 void for_each_set(const BinaryMask& mask, const PixelBox& box, Function&& function) {
   for (int v = box.v0; v <= box.v1; ++v) {
@@ -129,7 +154,8 @@ void CoverageEstimator::project(const Image& image, const BackgroundModel& backg
     pixel.share = contrast > 1e-6f ? along / contrast : 0.0f;
     // A colour that no mixture of F and B explains is that of another part of the robot.
     const float across = difference - pixel.share * along;
-    if (pixel.share < 0.5f && across * precision > std::max(25.0f, 0.25f * difference * precision)) {
+    if (pixel.share < 0.5f && across * precision > std::max(25.0f, 0.25f * difference * precision) &&
+        across > background_change(background, pixel.u, pixel.v)) {
       pixel.share = 1.0f;
     }
     pixel.share = std::clamp(pixel.share, -0.25f, 1.25f);

@@ -46,7 +46,7 @@ struct Scene {
   double blur_px = 0.4;
   double noise_levels = 2.5;
   int channels = 3;
-  int supersampling = 8;                  ///< per pixel and axis
+  int supersampling = 6;                  ///< per pixel and axis
   std::vector<Capsule> shapes;
 
   double distance(double u, double v) const {

@@ -34,18 +34,23 @@ VisionSetup setup_for(SegmentationMethod method) {
   return setup;
 }
 
+/// Pictures of one scene that differ by noise.
+std::vector<Image> pictures(const Scene& scene, int count, std::mt19937& random) {
+  const auto ideal = scene.ideal();
+  std::vector<Image> result;
+  for (int i = 0; i < count; ++i) result.push_back(scene.picture(ideal, random));
+  return result;
+}
+
 /// Pictures without the robot, then the outline's error over a few places of the hand.
 test::EdgeStatistics measure(Scene scene, const VisionSetup& setup, unsigned seed) {
   std::mt19937 random(seed);
   Segmenter segmenter(setup, "left", scene.width, scene.height);
   if (setup.method == SegmentationMethod::kLearnedBackground) {
-    const auto empty = scene.without_robot();
-    const auto ideal = empty.ideal();
-    for (int i = 0; i < 30; ++i) segmenter.learn_from(empty.picture(ideal, random));
-    segmenter.finish_learning();
+    segmenter.learn(pictures(scene.without_robot(), 20, random));
   }
   test::EdgeStatistics total;
-  constexpr int kPlaces = 4;
+  constexpr int kPlaces = 3;
   Output out;
   for (int k = 0; k < kPlaces; ++k) {
     scene.shapes = test::hand(78.0 + 1.37 * k, 62.0 + 0.71 * k);
@@ -82,6 +87,42 @@ TEST(Segmenter, OutlineOnPlainBackgroundIsExactToAFractionOfAPixel) {
   }
 }
 
+TEST(Segmenter, ShadingUpToTheOutlineDoesNotMoveIt) {
+  // Lambert shading falls steeply towards the outline: the robot's colour there is neither that of
+  // its middle nor seen unmixed anywhere.
+  for (const bool from_the_side : {false, true}) {
+    for (const double behind : {50.0, 220.0}) {
+      Scene scene;
+      scene.ambient = 0.5;
+      for (int c = 0; c < 3; ++c) {
+        scene.base[c] = behind + 5 * c;
+        scene.robot[c] = (behind < 100.0 ? 220.0 : 160.0) - 5 * c;
+      }
+      if (from_the_side) {
+        scene.lamp[0] = scene.lamp[1] = -0.6;
+        scene.lamp[2] = 0.53;
+      }
+      const auto edge = measure(scene, setup_for(SegmentationMethod::kSingleColour), 12);
+      EXPECT_LT(std::abs(edge.bias), 0.05) << "side " << from_the_side << ", behind " << behind;
+      EXPECT_LT(edge.sd, 0.12);
+      EXPECT_GT(edge.found, 0.99);
+    }
+  }
+}
+
+TEST(Segmenter, FaintRobotOnASingleColour) {
+  // Nine standard deviations of the noise; the colours once counted as one.
+  Scene scene;
+  for (int c = 0; c < 3; ++c) {
+    scene.base[c] = 150 + 10 * c;
+    scene.robot[c] = 170 - 5 * c;
+  }
+  const auto edge = measure(scene, setup_for(SegmentationMethod::kSingleColour), 13);
+  EXPECT_LT(std::abs(edge.bias), 0.08);
+  EXPECT_LT(edge.sd, 0.25);
+  EXPECT_GT(edge.found, 0.97);
+}
+
 TEST(Segmenter, LightMayVarySlowlyOverASingleColour) {
   Scene scene;
   scene.texture = Texture::kGradient;
@@ -98,9 +139,11 @@ TEST(Segmenter, OutlineOnClutterLearnedFromNoisyFrames) {
       for (int c = 0; c < 3; ++c) scene.robot[c] = 40 + 5 * c;
     }
     const auto edge = measure(scene, setup_for(SegmentationMethod::kLearnedBackground), 3);
-    EXPECT_LT(std::abs(edge.bias), 0.1) << "bright " << bright;
-    EXPECT_LT(edge.sd, 0.2);
-    EXPECT_GT(edge.found, 0.9);
+    // Borders in the background that run through the outline's pixels once threw it by a pixel.
+    EXPECT_LT(std::abs(edge.bias), 0.05) << "bright " << bright;
+    EXPECT_LT(edge.sd, 0.12);
+    EXPECT_LT(edge.worst, 0.8);
+    EXPECT_GT(edge.found, 0.98);
   }
 }
 
@@ -199,9 +242,9 @@ TEST(Segmenter, LearnsLiveBeforeTheRobotComes) {
     segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
     EXPECT_GT(iou(out.mask, scene.true_mask()), 0.97) << "frame " << i;
   }
-  const auto resting = scene.ideal();
-  for (int i = 0; i < 700; ++i) {
-    segmenter.segment(scene.picture(resting, random), out.mask, out.valid, out.coverage);
+  const auto resting = pictures(scene, 7, random);
+  for (std::size_t i = 0; i < 700; ++i) {
+    segmenter.segment(resting[i % resting.size()], out.mask, out.valid, out.coverage);
   }
   EXPECT_GT(iou(out.mask, scene.true_mask()), 0.97);
 }
@@ -219,12 +262,12 @@ TEST(Segmenter, WhatMovedInTheBackgroundIsLearnedAnewOutsideThePrediction) {
   }
   Scene with_object = scene;
   with_object.shapes = {{30, 30, 30, 30, 10}};
-  const auto ideal = with_object.ideal();
+  const auto frames = pictures(with_object, 7, random);
   const BinaryMask prediction(scene.width, scene.height);  // the robot is elsewhere
-  segmenter.segment(scene.picture(ideal, random), out.mask, out.valid, out.coverage, &prediction);
+  segmenter.segment(frames[0], out.mask, out.valid, out.coverage, &prediction);
   EXPECT_GT(out.mask.count(), 250u);
-  for (int i = 0; i < 600; ++i) {
-    segmenter.segment(scene.picture(ideal, random), out.mask, out.valid, out.coverage, &prediction);
+  for (std::size_t i = 0; i < 600; ++i) {
+    segmenter.segment(frames[i % frames.size()], out.mask, out.valid, out.coverage, &prediction);
   }
   EXPECT_EQ(out.mask.count(), 0u);
 }
