@@ -95,6 +95,19 @@ const char* to_string(EstimatorState state) {
   return "unknown";
 }
 
+const char* unit_of(ParameterKind kind) {
+  switch (kind) {
+    case ParameterKind::kJointOffset:
+    case ParameterKind::kFingerCurl:
+    case ParameterKind::kVergence: return "rad";
+    case ParameterKind::kPrincipalDifference:
+    case ParameterKind::kDilation: return "px";
+    case ParameterKind::kFocalScale:
+    case ParameterKind::kMeshScale: return "1";
+  }
+  return "1";
+}
+
 struct Estimator::Impl {
   Impl(std::shared_ptr<const RobotModel> robot_model, const RobotSetup& robot_setup,
        const StereoRig& stereo_rig, const EstimatorOptions& estimator_options)
@@ -378,8 +391,10 @@ struct Estimator::Impl {
       estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
       for (std::size_t k = static_cast<std::size_t>(joints); k < parameters.size(); ++k) {
         estimate.nuisance_names.push_back(parameters[k].name);
+        estimate.nuisance_units.push_back(unit_of(parameters[k].kind));
       }
       estimate.nuisance = state.tail(state.size() - joints);
+      estimate.nuisance_sd = covariance.diagonal().tail(state.size() - joints).cwiseMax(0.0).cwiseSqrt();
     }
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
       const CameraObservation* seen = nullptr;

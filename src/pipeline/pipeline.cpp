@@ -1,10 +1,43 @@
 #include "bodyschema/pipeline/pipeline.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <chrono>
+#include <fstream>
+#include <iterator>
 
 #include "bodyschema/bus/yarp_import.hpp"
 
 namespace bodyschema {
+namespace {
+
+/// FNV-1a, 64 bit: names a model, protects nothing.
+class Digest {
+ public:
+  void add(const void* data, std::size_t bytes) {
+    const auto* byte = static_cast<const unsigned char*>(data);
+    for (std::size_t i = 0; i < bytes; ++i) state_ = (state_ ^ byte[i]) * 0x100000001b3ull;
+  }
+  [[nodiscard]] std::string text() const { return fmt::format("{:016x}", state_); }
+
+ private:
+  std::uint64_t state_ = 0xcbf29ce484222325ull;
+};
+
+std::string digest_of(const RobotSetup& setup, const RobotModel& robot) {
+  Digest digest;
+  std::ifstream file(setup.model.urdf, std::ios::binary);
+  const std::string urdf((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  digest.add(urdf.data(), urdf.size());
+  for (const auto& part : robot.meshes()) {
+    digest.add(part.link.data(), part.link.size());
+    digest.add(part.mesh.vertices.data(), part.mesh.vertices.size() * sizeof(part.mesh.vertices[0]));
+    digest.add(part.mesh.triangles.data(), part.mesh.triangles.size() * sizeof(part.mesh.triangles[0]));
+  }
+  return digest.text();
+}
+
+}  // namespace
 
 Pipeline::Pipeline(const Configuration& configuration)
     : setup_(RobotSetup::from(configuration.section("robot"))),
@@ -14,7 +47,8 @@ Pipeline::Pipeline(const Configuration& configuration)
       options_(EstimatorOptions::from(configuration)),
       robot_(setup_.load()),
       estimator_(robot_, setup_, rig_, options_),
-      configuration_hash_(configuration.hash()) {
+      configuration_hash_(configuration.hash()),
+      model_hash_(digest_of(setup_, *robot_)) {
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
   for (const auto& camera : rig_.cameras) {

@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <fstream>
-#include <nlohmann/json.hpp>
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
@@ -15,43 +14,12 @@
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/pipeline/truth.hpp"
 #include "bodyschema/vision/mask_picture.hpp"
+#include "estimate_json.hpp"
 
 namespace bodyschema {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json matrix_json(const Pose& X) {
-  Json rows = Json::array();
-  for (int r = 0; r < 4; ++r) {
-    Json row = Json::array();
-    for (int c = 0; c < 4; ++c) row.push_back(X.matrix()(r, c));
-    rows.push_back(std::move(row));
-  }
-  return rows;
-}
-
-Json estimate_json(const Estimate& e, const StereoRig& rig) {
-  Json json;
-  json["utime"] = e.utime;
-  json["state"] = to_string(e.state);
-  for (std::size_t k = 0; k < e.joint_names.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    json["offset_deg"][e.joint_names[k]] = degrees(e.offset_rad(i));
-    json["stddev_deg"][e.joint_names[k]] = degrees(std::sqrt(std::max(0.0, e.covariance_rad2(i, i))));
-  }
-  for (std::size_t k = 0; k < e.nuisance_names.size(); ++k) {
-    json["nuisance"][e.nuisance_names[k]] = e.nuisance(static_cast<Eigen::Index>(k));
-  }
-  for (std::size_t c = 0; c < e.X_CP.size(); ++c) {
-    json["hand_pose_" + rig.cameras[c].name + "_camera"] = matrix_json(e.X_CP[c]);
-  }
-  json["likelihood"] = e.best_likelihood;
-  json["effective_sample_size"] = e.effective_sample_size;
-  json["contour_rms_px"] = e.contour_rms_px;
-  json["hand_sd_mm"] = 1e3 * e.hand_sd_m;
-  return json;
-}
 
 /// Mean over frames of one quantity, before and after correction.
 struct BeforeAfter {
@@ -239,6 +207,7 @@ class Replay {
     }
     summary["engine"] = pipeline_.estimator().engine_description();
     summary["configuration_hash"] = pipeline_.configuration_hash();
+    summary["model_hash"] = pipeline_.model_hash();
     summary["estimate"] = estimate_json(last_, pipeline_.rig());
     summary["weakest_direction"] = last_.weakest.text;
 

@@ -47,7 +47,9 @@ struct Estimate {
   Eigen::VectorXd offset_rad;            ///< one per name
   Eigen::MatrixXd covariance_rad2;
   std::vector<std::string> nuisance_names;  ///< head offsets, camera and size parameters, if any
-  Eigen::VectorXd nuisance;                 ///< rad, px or relative, see Parameter
+  std::vector<std::string> nuisance_units;  ///< "rad", "px" or "1" (relative), one per name
+  Eigen::VectorXd nuisance;                 ///< in that unit
+  Eigen::VectorXd nuisance_sd;              ///< in that unit
   double effective_sample_size = 0.0;       ///< particles
   double best_likelihood = 0.0;             ///< 1 - Hammoude distance of the estimate, both images
   double contour_rms_px = 0.0;              ///< outline residual, 0 when not computed

@@ -20,6 +20,9 @@ enum class ParameterKind {
   kDilation,              ///< px, silhouettes larger than the model says (blur, threshold, paint)
 };
 
+/// "rad", "px" or "1" (relative).
+const char* unit_of(ParameterKind kind);
+
 /// One number of the state with what is believed about it before any picture.
 struct Parameter {
   std::string name;  ///< joint name, or "finger_curl", "vergence", ...

@@ -51,6 +51,8 @@ class Pipeline {
   /// Time spent on masks in the last `process`, ms.
   [[nodiscard]] double segmentation_ms() const { return segmentation_ms_; }
   [[nodiscard]] const std::string& configuration_hash() const { return configuration_hash_; }
+  /// A short hexadecimal digest of the URDF file and of the meshes in use.
+  [[nodiscard]] const std::string& model_hash() const { return model_hash_; }
 
  private:
   struct Eye {
@@ -68,6 +70,7 @@ class Pipeline {
   std::vector<Eye> eyes_;
   Estimator estimator_;
   std::string configuration_hash_;
+  std::string model_hash_;
   bool learning_ = false;
   bool tracking_ = false;  ///< the estimate is good enough to predict where the robot is
   double segmentation_ms_ = 0.0;

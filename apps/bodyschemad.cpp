@@ -1,0 +1,98 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "bodyschema/bus/lcm_link.hpp"
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/service/daemon.hpp"
+#include "bodyschema/service/start_up_checks.hpp"
+#include "common_options.hpp"
+
+namespace {
+
+using namespace bodyschema;
+
+/// Status 2: the command line, the configuration or a file it names is wrong, and starting again
+/// would not help; the systemd unit knows it.
+constexpr int kWrongInput = 2;
+constexpr int kFailure = 1;
+
+void check_configuration(const apps::CommonOptions& common, const std::string& lcm_url) {
+  const Configuration configuration = common.load();
+  Pipeline pipeline(configuration);
+  configuration.reject_unknown_keys();
+  const Channels channels = pipeline.bus().channels();
+  std::printf("%s: good\nrobot: %s, %zu joints, offsets of %zu estimated\ncameras: %zu\n"
+              "silhouettes: %s\nchannels: %s and %s in, %s and %s out\n",
+              common.config.c_str(), pipeline.robot().name().c_str(), pipeline.robot().joints().size(),
+              pipeline.setup().estimated_joints.size(), pipeline.rig().cameras.size(),
+              pipeline.estimator().engine_description().c_str(), channels.joint_state.c_str(),
+              channels.cameras.c_str(), channels.joint_offsets.c_str(), channels.offsets_status.c_str());
+  for (const auto& complaint : check_network(lcm_url)) std::printf("network: %s\n", complaint.c_str());
+}
+
+void print_configuration(const apps::CommonOptions& common) {
+  const Configuration configuration = common.load();
+  const Pipeline pipeline(configuration);  // asks for every key, so that defaults are shown
+  configuration.reject_unknown_keys();
+  std::fputs(configuration.print().c_str(), stdout);
+}
+
+}  // namespace
+
+/// The service: encoders and pictures in over LCM, joint offsets out.
+int main(int argc, char** argv) {
+  CLI::App app{"Body Schema's service: estimates the joint offsets of an arm from encoders and stereo\n"
+               "pictures that come in over LCM, and publishes them with each pair of pictures"};
+  app.set_version_flag("--version", BODYSCHEMA_VERSION);
+  app.footer(
+      "Examples:\n"
+      "  bodyschemad --config config/icub_right/estimator.yaml\n"
+      "  bodyschemad --config config/icub_right/estimator.yaml --record reach.lcmlog\n"
+      "SIGTERM stops, SIGHUP reads the configuration again. Exit status: 0 stopped as asked, 2 wrong\n"
+      "command line, configuration or file, 1 any other failure.");
+  apps::CommonOptions common;
+  DaemonOptions options;
+  options.version = BODYSCHEMA_VERSION;
+  std::string lcm_url;
+  std::string record;
+  std::string estimates;
+  bool check_config = false;
+  common.add_to(app);
+  app.add_option("-l,--lcm-url", lcm_url, "LCM network; default: $LCM_DEFAULT_URL, else this machine only");
+  app.add_option("--record", record, "Record all messages in and out to this log");
+  app.add_option("--estimates", estimates, "Write one JSON line per estimate, as bodyschema replay does");
+  app.add_option("--frames", options.frames, "Stop after so many estimates");
+  app.add_option("--stop-after-idle", options.stop_after_idle_s,
+                 "Stop when nothing has come for so many seconds, once something has")
+      ->check(CLI::Range(0.1, 1e6));
+  app.add_flag("--timings", options.timings, "Print the time of each stage at the end");
+  app.add_flag("--check-config", check_config, "Check configuration, robot and engine, and stop");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : kWrongInput;
+  }
+  try {
+    options.lcm_url = resolve_lcm_url(lcm_url);
+    if (!record.empty()) options.record = record;
+    if (!estimates.empty()) options.estimates = estimates;
+    if (check_config) {
+      check_configuration(common, options.lcm_url);
+    } else if (common.print_config) {
+      print_configuration(common);
+    } else {
+      run_daemon([&common] { return common.load(); }, options);
+    }
+    return 0;
+  } catch (const ConfigurationError& e) {
+    std::fprintf(stderr, "bodyschemad: error: %s\n", e.what());
+    return kWrongInput;
+  } catch (const FileError& e) {
+    std::fprintf(stderr, "bodyschemad: error: %s\n", e.what());
+    return kWrongInput;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "bodyschemad: error: %s\n", e.what());
+    return kFailure;
+  }
+}

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+#include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/estimator/estimate.hpp"
+
+namespace bodyschema {
+
+/// One line of estimates.jsonl, as daemon and replay both write it: a JSON object with `utime`
+/// (us), `state`, `offset_deg` and `stddev_deg` by joint, `hand_pose_<name>_camera` (4x4, metres),
+/// `likelihood`, `effective_sample_size` (particles), `contour_rms_px`, `hand_sd_mm`, and
+/// `nuisance` where the estimator has any. Numbers are written so that they read back exactly.
+/// Without the line's end.
+[[nodiscard]] std::string estimate_line(const Estimate& estimate, const StereoRig& rig);
+
+}  // namespace bodyschema

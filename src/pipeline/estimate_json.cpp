@@ -1,0 +1,51 @@
+#include "estimate_json.hpp"
+
+#include <cmath>
+
+#include "bodyschema/pipeline/estimate_line.hpp"
+
+namespace bodyschema {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json matrix_json(const Pose& X) {
+  Json rows = Json::array();
+  for (int r = 0; r < 4; ++r) {
+    Json row = Json::array();
+    for (int c = 0; c < 4; ++c) row.push_back(X.matrix()(r, c));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+}  // namespace
+
+nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
+  Json json;
+  json["utime"] = e.utime;
+  json["state"] = to_string(e.state);
+  for (std::size_t k = 0; k < e.joint_names.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    json["offset_deg"][e.joint_names[k]] = degrees(e.offset_rad(i));
+    json["stddev_deg"][e.joint_names[k]] = degrees(std::sqrt(std::max(0.0, e.covariance_rad2(i, i))));
+  }
+  for (std::size_t k = 0; k < e.nuisance_names.size(); ++k) {
+    json["nuisance"][e.nuisance_names[k]] = e.nuisance(static_cast<Eigen::Index>(k));
+  }
+  for (std::size_t c = 0; c < e.X_CP.size(); ++c) {
+    json["hand_pose_" + rig.cameras[c].name + "_camera"] = matrix_json(e.X_CP[c]);
+  }
+  json["likelihood"] = e.best_likelihood;
+  json["effective_sample_size"] = e.effective_sample_size;
+  json["contour_rms_px"] = e.contour_rms_px;
+  json["hand_sd_mm"] = 1e3 * e.hand_sd_m;
+  return json;
+}
+
+std::string estimate_line(const Estimate& estimate, const StereoRig& rig) {
+  return estimate_json(estimate, rig)
+      .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,384 @@
+#include "bodyschema/service/daemon.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/pipeline/estimate_line.hpp"
+#include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/service/notifier.hpp"
+#include "bodyschema/service/offsets_message.hpp"
+#include "bodyschema/service/start_up_checks.hpp"
+#include "receiver.hpp"
+#include "signals.hpp"
+#include "status_reporter.hpp"
+
+namespace bodyschema {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kPoll{50};
+constexpr milliseconds kStatusPeriod{1000};
+constexpr std::size_t kTimingsWindow = 100'000;
+
+Microseconds wall_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+double ms_between(std::int64_t from_us, std::int64_t to_us) {
+  return 1e-3 * static_cast<double>(to_us - from_us);
+}
+
+/// Notices a camera that goes on sending one and the same picture.
+class FrozenPictureDetector {
+ public:
+  void look(const CameraObservation& seen, std::int64_t now_us, CameraFacts& facts) {
+    const std::uint64_t digest = digest_of(seen.image);
+    if (digest != digest_ || since_us_ < 0) {
+      digest_ = digest;
+      since_us_ = now_us;
+      q_ = seen.joints.q;
+      moved_rad_ = 0.0;
+    }
+    moved_rad_ = std::max(moved_rad_, (seen.joints.q - q_).cwiseAbs().maxCoeff());
+    facts.unchanged_ms = ms_between(since_us_, now_us);
+    facts.moved_meanwhile_rad = moved_rad_;
+  }
+
+ private:
+  static std::uint64_t digest_of(const Image& image) {
+    std::uint64_t state = 0xcbf29ce484222325ull;
+    std::size_t i = 0;
+    for (; i + sizeof(std::uint64_t) <= image.data.size(); i += sizeof(std::uint64_t)) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, image.data.data() + i, sizeof word);
+      state = (state ^ word) * 0x100000001b3ull;
+    }
+    for (; i < image.data.size(); ++i) state = (state ^ image.data[i]) * 0x100000001b3ull;
+    return state;
+  }
+
+  std::uint64_t digest_ = 0;
+  std::int64_t since_us_ = -1;
+  Eigen::VectorXd q_;
+  double moved_rad_ = 0.0;
+};
+
+double brightness_of(const Image& image) {
+  constexpr std::size_t kStep = 61;  // every channel and column gets its turn
+  std::uint64_t sum = 0;
+  std::uint64_t n = 0;
+  for (std::size_t i = 0; i < image.data.size(); i += kStep, ++n) sum += image.data[i];
+  return n == 0 ? 0.0 : static_cast<double>(sum) / static_cast<double>(n);
+}
+
+/// Everything that belongs to one load of the configuration.
+struct Session {
+  Session(std::unique_ptr<Pipeline> loaded, const std::string& lcm_url, Recorder* recorder)
+      : pipeline(std::move(loaded)),
+        queue(static_cast<std::size_t>(pipeline->bus().queue_frames)),
+        link(lcm_url),
+        receiver(link, pipeline->make_stream(), queue, recorder),
+        frozen(pipeline->rig().cameras.size()) {}
+
+  std::unique_ptr<Pipeline> pipeline;
+  ObservationQueue queue;
+  LcmLink link;
+  Receiver receiver;
+  std::vector<FrozenPictureDetector> frozen;
+};
+
+class Daemon {
+ public:
+  Daemon(const std::function<Configuration()>& load_configuration, const DaemonOptions& options)
+      : load_configuration_(load_configuration),
+        options_(options),
+        lcm_url_(with_receive_buffer(options.lcm_url)),
+        all_stages_(options.timings ? kTimingsWindow : 1) {}
+
+  void run() {
+    const Signals signals;
+    auto pipeline = load(load_configuration_);
+    open_files();
+    for (const auto& complaint : check_network(options_.lcm_url)) spdlog::warn("{}", complaint);
+    start_session(std::move(pipeline));
+    spdlog::info("waiting for encoders and pictures on {} and {} ({})",
+                 channels().joint_state, channels().cameras, options_.lcm_url);
+    {
+      const std::jthread reporter([this](const std::stop_token& stop) { report_every_second(stop); });
+      loop(signals);
+    }
+    notifier_.stopping();
+    session_->receiver.stop();
+    report();  // the last word, with the final counts
+    finish_files();
+    const auto facts = received();
+    spdlog::info("stopped after {} estimates; {} pictures came in, {} were dropped, {} frames shed",
+                 progress_.estimated, facts.bus.synchroniser.images,
+                 facts.bus.synchroniser.total_dropped(), progress_.shed);
+    if (options_.timings) std::fputs(all_stages_.table().c_str(), stdout);
+  }
+
+ private:
+  // --- setting up -----------------------------------------------------------------------------
+
+  static std::unique_ptr<Pipeline> load(const std::function<Configuration()>& load_configuration) {
+    const Configuration configuration = load_configuration();
+    auto pipeline = std::make_unique<Pipeline>(configuration);
+    configuration.reject_unknown_keys();
+    return pipeline;
+  }
+
+  void open_files() {
+    if (options_.record) recorder_ = std::make_unique<Recorder>(*options_.record);
+    if (!options_.estimates) return;
+    estimates_.open(*options_.estimates);
+    if (!estimates_) throw FileError(options_.estimates->string() + ": cannot be written");
+  }
+
+  void finish_files() {
+    recorder_.reset();
+    if (!options_.estimates) return;
+    estimates_.flush();
+    if (!estimates_) throw FileError(options_.estimates->string() + ": cut short, is the disk full?");
+  }
+
+  /// Puts a loaded pipeline to work in place of the present one.
+  void start_session(std::unique_ptr<Pipeline> pipeline) {
+    const std::lock_guard lock(session_mutex_);
+    if (session_) {
+      session_->receiver.stop();
+      add_counts(earlier_bus_, session_->receiver.facts().bus);
+      earlier_shed_ += session_->queue.shed();
+      session_.reset();
+    }
+    session_ = std::make_unique<Session>(std::move(pipeline), lcm_url_, recorder_.get());
+    Pipeline& loaded = *session_->pipeline;
+    const std::string engine = loaded.estimator().engine_description();
+    spdlog::info("silhouettes: {}", engine);
+    reporter_.set_identity({options_.version, engine, loaded.model_hash(), loaded.configuration_hash(),
+                            channels().cameras, channels().joint_state,
+                            static_cast<int>(loaded.options().filter.particles),
+                            loaded.rig().cameras.size()});
+    const std::lock_guard progress_lock(progress_mutex_);
+    progress_.estimate = {};
+    progress_.last_estimate_us = -1;
+    progress_.cameras.clear();
+    for (const auto& camera : loaded.rig().cameras) progress_.cameras.push_back({.name = camera.name});
+    progress_.camera_seen_us.assign(progress_.cameras.size(), -1);
+  }
+
+  [[nodiscard]] Channels channels() const { return session_->pipeline->bus().channels(); }
+
+  // --- the estimating thread ------------------------------------------------------------------
+
+  void loop(const Signals& signals) {
+    while (!signals.stop_requested() && !done()) {
+      notifier_.alive();
+      if (signals.take_reload_request()) begin_reload();
+      finish_reload();
+      if (auto arrived = session_->queue.pop(kPoll)) estimate(*arrived);
+    }
+  }
+
+  bool done() {
+    if (const std::string failure = session_->receiver.facts().failure; !failure.empty()) {
+      throw DeviceError(failure);
+    }
+    if (options_.frames > 0 && progress_.estimated >= options_.frames) return true;
+    if (options_.stop_after_idle_s <= 0.0) return false;
+    const std::int64_t newest = session_->receiver.newest_arrival_us();
+    if (newest < 0 || 1e-3 * ms_between(newest, monotonic_us()) < options_.stop_after_idle_s) return false;
+    // The end of what was played: the last pictures may still wait for a partner or for us.
+    session_->receiver.finish();
+    while (auto arrived = session_->queue.pop(milliseconds(0))) estimate(*arrived);
+    return true;
+  }
+
+  void estimate(ArrivedObservation& arrived) {
+    const std::int64_t begin = monotonic_us();
+    {
+      const std::lock_guard lock(progress_mutex_);
+      progress_.busy_since_us = begin;
+      progress_.shed = earlier_shed_ + session_->queue.shed();
+    }
+    Observation& observation = arrived.observation;
+    Pipeline& pipeline = *session_->pipeline;
+    const Estimate estimate = pipeline.process(observation);
+    const std::int64_t published = publish(estimate, arrived.arrival_us);
+    if (estimates_.is_open()) estimates_ << estimate_line(estimate, pipeline.rig()) << std::endl;
+
+    const StageTimes& t = estimate.times;
+    const double latency_ms = ms_between(arrived.arrival_us, published);
+    const StageDurations::Frame stages = {
+        ms_between(arrived.arrival_us, begin), pipeline.segmentation_ms(), t.kinematics_ms, t.scoring_ms,
+        t.filter_ms, t.refinement_ms,
+        ms_between(begin, published) - pipeline.segmentation_ms() - t.total_ms, latency_ms};
+    if (options_.timings) all_stages_.add(stages);
+    {
+      const std::lock_guard lock(progress_mutex_);
+      progress_.busy_since_us = -1;
+      progress_.last_estimate_us = published;
+      ++progress_.estimated;
+      progress_.estimate = estimate;
+      progress_.latency.add(latency_ms);
+      progress_.latency_last_second.add(latency_ms);
+      progress_.stages.add(stages);
+      note_cameras(observation, published);
+    }
+    if (!ready_) {
+      ready_ = true;
+      notifier_.ready();
+      spdlog::info("ready: the first pictures and encoders came together");
+    }
+  }
+
+  /// monotonic_us() when the message was out.
+  std::int64_t publish(const Estimate& estimate, std::int64_t arrival_us) {
+    const Pipeline& pipeline = *session_->pipeline;
+    joint_offsets_t message = to_message(estimate, pipeline.rig());
+    message.sequence = sequence_++;
+    message.num_particles = static_cast<std::int32_t>(pipeline.options().filter.particles);
+    message.model_hash = pipeline.model_hash();
+    message.config_hash = pipeline.configuration_hash();
+    message.latency_ms = ms_between(arrival_us, monotonic_us());
+    send(channels().joint_offsets, encode(message));
+    return monotonic_us();
+  }
+
+  void note_cameras(const Observation& observation, std::int64_t now) {
+    for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
+      if (!observation.cameras[c]) continue;
+      const CameraObservation& seen = *observation.cameras[c];
+      CameraFacts& facts = progress_.cameras[c];
+      progress_.camera_seen_us[c] = now;
+      facts.mask_px = seen.mask.empty() ? 0 : seen.mask.count();
+      facts.brightness = brightness_of(seen.image);
+      session_->frozen[c].look(seen, now, facts);
+    }
+  }
+
+  // --- reloading: the new robot is loaded by a thread of its own while the old one works on -------
+
+  void begin_reload() {
+    if (reloading_.valid()) return;
+    spdlog::info("reloading the configuration");
+    if (ready_) notifier_.reloading();
+    reloading_ = std::async(std::launch::async, &Daemon::load, load_configuration_);
+  }
+
+  void finish_reload() {
+    if (!reloading_.valid() || reloading_.wait_for(milliseconds(0)) != std::future_status::ready) return;
+    std::string failure;
+    try {
+      start_session(reloading_.get());
+      spdlog::info("configuration reloaded; estimating starts anew");
+    } catch (const Error& e) {
+      if (!session_) throw;
+      failure = e.what();
+      spdlog::error("reload refused, going on as before: {}", failure);
+    }
+    {
+      const std::lock_guard lock(progress_mutex_);
+      progress_.reload_failure = failure;
+    }
+    if (ready_) notifier_.ready();
+  }
+
+  // --- messages out, from both threads ----------------------------------------------------------
+
+  void send(const std::string& channel, const std::vector<std::uint8_t>& message) {
+    const Microseconds now = wall_us();
+    if (recorder_) recorder_->record(channel, now, message);
+    try {
+      session_->link.publish(channel, now, message);
+    } catch (const Error& e) {
+      const std::lock_guard lock(progress_mutex_);
+      if (progress_.publishing_failures++ % 100 == 0) spdlog::error("{}", e.what());
+    }
+  }
+
+  // --- the reporting thread ---------------------------------------------------------------------
+
+  void report_every_second(const std::stop_token& stop) {
+    auto next = std::chrono::steady_clock::now() + kStatusPeriod;
+    while (!stop.stop_requested()) {
+      std::this_thread::sleep_for(std::min<std::chrono::steady_clock::duration>(
+          kPoll, next - std::chrono::steady_clock::now()));
+      if (std::chrono::steady_clock::now() < next) continue;
+      next += kStatusPeriod;
+      report();
+    }
+  }
+
+  void report() {
+    const std::lock_guard lock(session_mutex_);
+    if (!session_) return;
+    const Receiver::Facts facts = received();
+    Progress progress;
+    {
+      const std::lock_guard progress_lock(progress_mutex_);
+      progress_.shed = earlier_shed_ + session_->queue.shed();
+      progress = progress_;
+      progress_.latency_last_second.clear();
+    }
+    const offsets_status_t status = reporter_.report(facts, progress, recorder_.get());
+    send(channels().offsets_status, encode(status));
+    const auto level = static_cast<HealthLevel>(status.level);
+    notifier_.status(std::string(to_string(level)) + ": " + status.sentence);
+    if (level != logged_level_) {
+      logged_level_ = level;
+      spdlog::log(level == HealthLevel::kOk ? spdlog::level::info : spdlog::level::warn, "{}: {}",
+                  to_string(level), status.sentence);
+    }
+  }
+
+  /// Of all sessions so far. Needs session_mutex_ off the estimating thread.
+  [[nodiscard]] Receiver::Facts received() const {
+    Receiver::Facts facts = session_->receiver.facts();
+    add_counts(facts.bus, earlier_bus_);
+    return facts;
+  }
+
+  const std::function<Configuration()> load_configuration_;
+  const DaemonOptions options_;
+  const std::string lcm_url_;
+  Notifier notifier_;
+  std::unique_ptr<Recorder> recorder_;
+  std::ofstream estimates_;
+
+  std::mutex session_mutex_;  ///< held to replace the session, and by the reporter to use it
+  std::unique_ptr<Session> session_;
+  BusStatistics earlier_bus_;  ///< of sessions before a reload
+  std::uint64_t earlier_shed_ = 0;
+
+  std::mutex progress_mutex_;  ///< taken after session_mutex_ where both are
+  Progress progress_;
+
+  StatusReporter reporter_{{}};
+  HealthLevel logged_level_ = HealthLevel::kOk;
+  StageDurations all_stages_;
+  std::int64_t sequence_ = 0;
+  bool ready_ = false;
+  std::future<std::unique_ptr<Pipeline>> reloading_;
+};
+
+}  // namespace
+
+void run_daemon(const std::function<Configuration()>& load_configuration, const DaemonOptions& options) {
+  Daemon(load_configuration, options).run();
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,196 @@
+#include "bodyschema/service/health.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "bodyschema/geometry/pose.hpp"
+
+namespace bodyschema {
+namespace {
+
+constexpr double kStale_ms = 1000.0;         // nothing for longer: stale
+constexpr double kStuck_ms = 2000.0;         // one frame for longer: the estimator is stuck
+constexpr double kCameraDead_ms = 1000.0;    // one camera silent while the other goes on
+constexpr double kFrozen_ms = 1000.0;        // the same picture for longer ...
+constexpr double kFrozenMotion_rad = 0.035;  // ... while a joint moved by more than this (2 deg)
+constexpr double kDark = 4.0;                // mean brightness below: no light
+constexpr double kLateEncoders_ms = 60.0;
+
+std::string age(double ms) {
+  return ms < 10'000.0 ? fmt::format("{:.1f} s", 1e-3 * ms)
+         : ms < 120'000.0 ? fmt::format("{:.0f} s", 1e-3 * ms)
+                          : fmt::format("{:.0f} min", ms / 60'000.0);
+}
+
+std::string silence(const std::string& what, const std::string& channel, double age_ms) {
+  return age_ms < 0.0 ? fmt::format("no {} yet on {}", what, channel)
+                      : fmt::format("no {} on {} for {}", what, channel, age(age_ms));
+}
+
+std::string list(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size() && i < 3; ++i) text += (i == 0 ? "" : ", ") + names[i];
+  if (names.size() > 3) text += fmt::format(" and {} more", names.size() - 3);
+  return text;
+}
+
+std::optional<std::string> stale(const HealthFacts& f) {
+  const bool pictures = f.picture_age_ms >= 0.0 && f.picture_age_ms < kStale_ms;
+  const bool joints = f.joints_age_ms >= 0.0 && f.joints_age_ms < kStale_ms;
+  const std::string no_pictures = silence("pictures", f.cameras_channel, f.picture_age_ms);
+  const std::string no_joints = silence("encoder readings", f.joints_channel, f.joints_age_ms);
+  if (!pictures && !joints) return no_pictures + "; " + no_joints;
+  if (!pictures) return no_pictures;
+  if (!joints) return no_joints;
+  return std::nullopt;
+}
+
+/// What is wrong with messages and pictures of the last second that were refused, in plain words.
+const char* explain(MessageFault fault) {
+  switch (fault) {
+    case MessageFault::kWrongType: return "another message type than bot_core's";
+    case MessageFault::kTruncated: return "messages are cut short";
+    case MessageFault::kTrailingBytes: return "messages are longer than they say";
+    case MessageFault::kBadCount: return "a count in them is negative";
+    case MessageFault::kTooLarge: return "they are larger than the configuration allows";
+    case MessageFault::kBadText: return "a name in them is not text";
+    case MessageFault::kBadStamp: return "their time stamp cannot be one";
+    case MessageFault::kNotFinite: return "an encoder reports NaN or infinity";
+    case MessageFault::kWrongSize: return "a picture has not the size that is configured";
+    case MessageFault::kUnsupportedFormat: return "the pixel format is not gray, RGB or JPEG";
+    case MessageFault::kBrokenPicture: return "a JPEG picture is broken";
+    case MessageFault::kNone: break;
+  }
+  return "unknown";
+}
+
+std::optional<std::string> refused(const HealthFacts& f) {
+  const auto& faults = f.since_last.faults;
+  const auto most = std::max_element(faults.begin(), faults.end());
+  if (*most == 0) return std::nullopt;
+  const auto fault = static_cast<MessageFault>(most - faults.begin());
+  return fmt::format("{} messages or pictures refused in the last second: {}", *most, explain(fault));
+}
+
+/// Why pictures of the last second did not become estimates.
+std::optional<std::string> dropped(const HealthFacts& f) {
+  const auto& drops = f.since_last.synchroniser.images_dropped;
+  const auto most = std::max_element(drops.begin(), drops.end());
+  if (*most == 0) return std::nullopt;
+  const std::string pictures = fmt::format("{} pictures of the last second not used: ", *most);
+  switch (static_cast<DropReason>(most - drops.begin())) {
+    case DropReason::kUnpaired: return pictures + "no partner from the other camera";
+    case DropReason::kNoEncoders:
+      return f.encoder_lag_ms > 0.0 ? fmt::format("encoders late by {:.0f} ms", f.encoder_lag_ms)
+                                    : pictures + "no encoder reading before them";
+    case DropReason::kMissingJoint:
+      if (!f.missing_joints.empty()) {
+        return fmt::format("no reading of {}: publish it or set robot.fixed_joints_deg", list(f.missing_joints));
+      }
+      return fmt::format("readings of {} have stopped", f.blocking_joint.empty() ? "a joint" : f.blocking_joint);
+    case DropReason::kEncoderGap: return pictures + "encoders were silent around them";
+    case DropReason::kEncoderJump:
+      return f.blocking_joint.empty() ? pictures + "encoders jumped"
+                                      : pictures + "the encoder of " + f.blocking_joint + " jumped";
+    case DropReason::kClockStep: return std::string("the clock of the time stamps stepped back; started anew");
+    case DropReason::kOverload: return pictures + "they come faster than they are worked on";
+    case DropReason::kOutOfOrder:
+    case DropReason::kDuplicate:
+      return fmt::format("{} pictures came twice or out of order in the last second: is there a second publisher on {}?",
+                         *most, f.cameras_channel);
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> error(const HealthFacts& f) {
+  if (f.busy_ms > kStuck_ms) {
+    return fmt::format("the estimator has been at work on one frame for {}", age(f.busy_ms));
+  }
+  if (f.estimated_since_last == 0 && !(f.estimate_age_ms >= 0.0 && f.estimate_age_ms < kStale_ms)) {
+    if (const auto why = refused(f)) return why;
+    if (const auto why = dropped(f)) return why;
+    if (!f.missing_joints.empty()) {
+      return fmt::format("no reading of {}: publish it or set robot.fixed_joints_deg", list(f.missing_joints));
+    }
+    if (f.encoder_lag_ms > kLateEncoders_ms) return fmt::format("encoders late by {:.0f} ms", f.encoder_lag_ms);
+    return std::string("pictures and encoders arrive but do not come together yet");
+  }
+  for (const auto& camera : f.cameras) {
+    if (camera.age_ms >= 0.0 && camera.age_ms < kStale_ms && camera.brightness < kDark) {
+      return fmt::format("the {} camera's picture is black: is the light on, the lens free?", camera.name);
+    }
+  }
+  if (f.estimate.state == EstimatorState::kDiverged) {
+    return fmt::format("diverged: the best prediction does not fit the pictures (likelihood {:.2f}); searching again",
+                       f.estimate.best_likelihood);
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> camera_warning(const HealthFacts& f) {
+  for (const auto& camera : f.cameras) {
+    if (camera.age_ms < 0.0 || camera.age_ms > kCameraDead_ms) {
+      return camera.age_ms < 0.0
+                 ? fmt::format("nothing yet from the {} camera; working with the other", camera.name)
+                 : fmt::format("nothing from the {} camera for {}; working with the other", camera.name,
+                               age(camera.age_ms));
+    }
+    if (camera.unchanged_ms > kFrozen_ms && camera.moved_meanwhile_rad > kFrozenMotion_rad) {
+      return fmt::format("the {} camera has shown the same picture for {} while the arm moved by {:.0f} deg",
+                         camera.name, age(camera.unchanged_ms), degrees(camera.moved_meanwhile_rad));
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> warning(const HealthFacts& f) {
+  if (const auto camera = camera_warning(f)) return camera;
+  if (f.estimate.state == EstimatorState::kLearningBackground) {
+    return std::string("learning the background: keep the arm out of view or moving");
+  }
+  if (f.estimate.state == EstimatorState::kHandNotInView) return std::string("hand not in view");
+  for (const auto& camera : f.cameras) {
+    if (camera.mask_px == 0) return fmt::format("mask empty in the {} camera", camera.name);
+  }
+  if (f.encoder_lag_ms > kLateEncoders_ms) return fmt::format("encoders late by {:.0f} ms", f.encoder_lag_ms);
+  const std::uint64_t shed = f.shed_since_last + f.since_last.synchroniser.dropped(DropReason::kOverload);
+  if (shed > 0) {
+    return fmt::format("{} frames of the last second shed: they come faster than they are worked on", shed);
+  }
+  if (const auto text = refused(f)) return text;
+  if (const auto text = dropped(f)) return text;
+  if (!f.reload_failure.empty()) return "reload refused, going on as before: " + f.reload_failure;
+  if (!f.recording_failure.empty()) return "recording has ended: " + f.recording_failure;
+  if (f.recording_lost > 0) {
+    return fmt::format("{} messages missing in the recording: the disk is too slow", f.recording_lost);
+  }
+  if (f.estimate.state == EstimatorState::kConverging) {
+    return fmt::format("converging: hand known to {:.1f} mm so far; weakest {}", 1e3 * f.estimate.hand_sd_m,
+                       f.estimate.weakest.text);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+const char* to_string(HealthLevel level) {
+  switch (level) {
+    case HealthLevel::kOk: return "OK";
+    case HealthLevel::kWarn: return "WARN";
+    case HealthLevel::kError: return "ERROR";
+    case HealthLevel::kStale: return "STALE";
+  }
+  return "ERROR";
+}
+
+Health assess(const HealthFacts& facts) {
+  if (auto text = stale(facts)) return {HealthLevel::kStale, std::move(*text)};
+  if (auto text = error(facts)) return {HealthLevel::kError, std::move(*text)};
+  if (auto text = warning(facts)) return {HealthLevel::kWarn, std::move(*text)};
+  return {HealthLevel::kOk, fmt::format("converged: hand known to {:.1f} mm; weakest {}",
+                                        1e3 * facts.estimate.hand_sd_m, facts.estimate.weakest.text)};
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,49 @@
+#include "bodyschema/service/offsets_message.hpp"
+
+#include <Eigen/Geometry>
+
+namespace bodyschema {
+
+joint_offsets_t to_message(const Estimate& estimate, const StereoRig& rig) {
+  joint_offsets_t m;
+  m.utime = estimate.utime;
+  m.sequence = 0;
+  m.latency_ms = 0.0;
+  m.state = to_string(estimate.state);
+  const auto n = static_cast<Eigen::Index>(estimate.joint_names.size());
+  m.num_joints = static_cast<std::int32_t>(n);
+  m.joint_name = estimate.joint_names;
+  m.mean_rad.assign(estimate.offset_rad.data(), estimate.offset_rad.data() + n);
+  for (Eigen::Index r = 0; r < n; ++r) {
+    auto& row = m.covariance_rad2.emplace_back();
+    for (Eigen::Index c = 0; c < n; ++c) row.push_back(estimate.covariance_rad2(r, c));
+  }
+  m.num_particles = 0;
+  m.effective_sample_size = estimate.effective_sample_size;
+  m.best_likelihood = estimate.best_likelihood;
+
+  const std::size_t cameras = std::min(rig.cameras.size(), estimate.X_CP.size());
+  m.num_cameras = static_cast<std::int32_t>(cameras);
+  for (std::size_t c = 0; c < cameras; ++c) {
+    m.camera_name.push_back(rig.cameras[c].name);
+    const Eigen::Vector3d p = estimate.X_CP[c].translation();
+    Eigen::Quaterniond q(estimate.X_CP[c].rotation());
+    q.normalize();
+    pose_t pose;
+    for (int i = 0; i < 3; ++i) pose.position_m[i] = p(i);
+    pose.quaternion_wxyz[0] = q.w();
+    pose.quaternion_wxyz[1] = q.x();
+    pose.quaternion_wxyz[2] = q.y();
+    pose.quaternion_wxyz[3] = q.z();
+    m.hand_pose_in_camera.push_back(pose);
+  }
+
+  m.num_parameters = static_cast<std::int32_t>(estimate.nuisance_names.size());
+  m.parameter_name = estimate.nuisance_names;
+  m.parameter_unit = estimate.nuisance_units;
+  m.parameter_value.assign(estimate.nuisance.data(), estimate.nuisance.data() + estimate.nuisance.size());
+  m.parameter_stddev.assign(estimate.nuisance_sd.data(), estimate.nuisance_sd.data() + estimate.nuisance_sd.size());
+  return m;
+}
+
+}  // namespace bodyschema

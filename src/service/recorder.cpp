@@ -1,0 +1,66 @@
+#include "bodyschema/service/recorder.hpp"
+
+#include <spdlog/spdlog.h>
+
+namespace bodyschema {
+
+Recorder::Recorder(const std::filesystem::path& file, std::size_t max_waiting_bytes)
+    : writer_(file), max_waiting_bytes_(max_waiting_bytes), thread_([this] { work(); }) {}
+
+Recorder::~Recorder() {
+  {
+    const std::lock_guard lock(mutex_);
+    closing_ = true;
+  }
+  filled_.notify_all();
+  thread_.join();
+}
+
+void Recorder::record(const std::string& channel, Microseconds time_us, Bytes message) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!state_.failure.empty() || waiting_bytes_ + message.size() > max_waiting_bytes_) {
+      ++state_.lost;
+      return;
+    }
+    waiting_.push_back({channel, time_us, {message.begin(), message.end()}});
+    waiting_bytes_ += message.size();
+  }
+  filled_.notify_one();
+}
+
+Recorder::State Recorder::state() const {
+  const std::lock_guard lock(mutex_);
+  return state_;
+}
+
+void Recorder::work() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    filled_.wait(lock, [this] { return closing_ || !waiting_.empty(); });
+    if (waiting_.empty()) return;
+    const Message message = std::move(waiting_.front());
+    waiting_.pop_front();
+    lock.unlock();
+    std::string failure;
+    try {
+      writer_.publish(message.channel, message.time_us, message.data);
+    } catch (const std::exception& e) {
+      failure = e.what();
+      spdlog::error("recording has ended: {}", failure);
+    }
+    lock.lock();
+    waiting_bytes_ -= message.data.size();
+    if (failure.empty()) {
+      ++state_.written;
+    } else {
+      // What was written stays readable; nothing more is tried.
+      state_.failure = failure;
+      state_.lost += 1 + waiting_.size();
+      waiting_.clear();
+      waiting_bytes_ = 0;
+    }
+  }
+}
+
+}  // namespace bodyschema

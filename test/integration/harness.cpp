@@ -1,0 +1,267 @@
+#include "harness.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+
+#include "bodyschema/bus/bus_options.hpp"
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema::integration {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+std::string contents(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::stringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+bool eventually(const std::function<bool()>& condition, Seconds limit) {
+  const auto end = Clock::now() + limit;
+  while (!condition()) {
+    if (Clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return true;
+}
+
+}  // namespace
+
+// --- Process -------------------------------------------------------------------------------------
+
+Process::Process(std::vector<std::string> arguments, const fs::path& scratch,
+                 const std::map<std::string, std::string>& environment) {
+  const fs::path built = fs::path(BODYSCHEMA_BINARY_DIR) / "bin" / arguments.front();
+  if (fs::exists(built)) arguments.front() = built.string();
+  static int count = 0;
+  const std::string name = std::to_string(++count) + "-" + fs::path(arguments.front()).filename().string();
+  out_ = scratch / (name + ".out");
+  err_ = scratch / (name + ".err");
+  std::vector<char*> argv;
+  for (auto& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  pid_ = fork();
+  if (pid_ < 0) throw std::runtime_error("fork failed");
+  if (pid_ == 0) {
+    for (const auto& [key, value] : environment) setenv(key.c_str(), value.c_str(), 1);
+    const int in = open("/dev/null", O_RDONLY);
+    const int out = open(out_.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0644);
+    const int err = open(err_.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0644);
+    dup2(in, 0);
+    dup2(out, 1);
+    dup2(err, 2);
+    execvp(argv[0], argv.data());
+    _exit(127);
+  }
+}
+
+Process::~Process() {
+  if (!status_ && running()) {
+    signal(SIGKILL);
+    wait(Seconds(5));
+  }
+  if (testing::Test::HasFailure()) std::fprintf(stderr, "--- %s\n%s", err_.filename().c_str(), err().c_str());
+}
+
+void Process::signal(int number) const {
+  if (!status_) kill(pid_, number);
+}
+
+std::optional<int> Process::wait(Seconds limit) {
+  eventually([this] { return !running(); }, limit);
+  return status_;
+}
+
+bool Process::running() {
+  if (status_) return false;
+  int status = 0;
+  if (waitpid(pid_, &status, WNOHANG) != pid_) return true;
+  status_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  return false;
+}
+
+std::string Process::out() const { return contents(out_); }
+std::string Process::err() const { return contents(err_); }
+
+bool Process::said(const std::string& words, Seconds limit) {
+  return eventually([&] { return err().find(words) != std::string::npos || !running(); }, limit) &&
+         err().find(words) != std::string::npos;
+}
+
+// --- Scratch ---------------------------------------------------------------------------------------
+
+Scratch::Scratch() {
+  std::string pattern = (fs::temp_directory_path() / "bodyschema-test-XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no scratch folder can be made");
+  folder_ = pattern;
+}
+
+Scratch::~Scratch() {
+  if (testing::Test::HasFailure()) {
+    std::fprintf(stderr, "files are kept in %s\n", folder_.c_str());
+    return;
+  }
+  std::error_code ignored;
+  fs::remove_all(folder_, ignored);
+}
+
+// --- network ---------------------------------------------------------------------------------------
+
+std::string private_lcm_url() {
+  static int count = 0;
+  const int port = 20'000 + (getpid() * 7 + ++count) % 12'000;
+  return "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
+}
+
+std::string why_no_lcm() {
+  try {
+    LcmLink link(private_lcm_url());
+    bool heard = false;
+    link.subscribe("PROBE", 8, [&](const std::string&, Bytes, std::int64_t) { heard = true; });
+    const std::vector<std::uint8_t> message(10, 1);
+    for (int i = 0; i < 20 && !heard; ++i) {
+      link.publish("PROBE", 0, message);
+      link.handle(50);
+    }
+    return heard ? "" : "no multicast packet comes back on this machine; scripts/multicast adds the route";
+  } catch (const Error& e) {
+    return e.what();
+  }
+}
+
+Listener::Listener(const std::string& lcm_url) : link_(lcm_url) {
+  const Channels channels = Channels::with_prefix("ICUB");
+  link_.subscribe(channels.joint_offsets, 1000, [this](const std::string&, Bytes message, std::int64_t) {
+    joint_offsets_t decoded;
+    if (!decode(message, decoded).ok()) return;
+    const std::lock_guard lock(mutex_);
+    offsets_.push_back(std::move(decoded));
+    arrived_.notify_all();
+  });
+  link_.subscribe(channels.offsets_status, 1000, [this](const std::string&, Bytes message, std::int64_t) {
+    offsets_status_t decoded;
+    if (!decode(message, decoded).ok()) return;
+    const std::lock_guard lock(mutex_);
+    statuses_.push_back(std::move(decoded));
+    arrived_.notify_all();
+  });
+  thread_ = std::jthread([this](const std::stop_token& stop) {
+    while (!stop.stop_requested()) link_.handle(20);
+  });
+}
+
+Listener::~Listener() = default;
+
+std::vector<joint_offsets_t> Listener::offsets() const {
+  const std::lock_guard lock(mutex_);
+  return offsets_;
+}
+
+std::vector<offsets_status_t> Listener::statuses() const {
+  const std::lock_guard lock(mutex_);
+  return statuses_;
+}
+
+std::optional<offsets_status_t> Listener::wait_status(
+    const std::function<bool(const offsets_status_t&)>& wanted, Seconds limit) {
+  std::unique_lock lock(mutex_);
+  std::size_t next = statuses_.size();
+  std::optional<offsets_status_t> found;
+  arrived_.wait_for(lock, limit, [&] {
+    for (; next < statuses_.size(); ++next) {
+      if (!wanted(statuses_[next])) continue;
+      found = statuses_[next];
+      return true;
+    }
+    return false;
+  });
+  return found;
+}
+
+bool Listener::wait_offsets(std::size_t count, Seconds limit) {
+  std::unique_lock lock(mutex_);
+  return arrived_.wait_for(lock, limit, [&] { return offsets_.size() >= count; });
+}
+
+Player::Player(const std::string& lcm_url, fs::path log, double speed, Change change)
+    : link_(lcm_url), log_(std::move(log)), speed_(speed), change_(std::move(change)),
+      thread_([this](const std::stop_token& stop) { work(stop); }) {}
+
+Player::~Player() = default;
+
+void Player::wait() {
+  if (thread_.joinable()) thread_.join();
+}
+
+void Player::work(const std::stop_token& stop) {
+  LogReader log(log_);
+  LogEvent event;
+  const auto start = Clock::now();
+  Microseconds first = -1;
+  while (!stop.stop_requested() && log.next(event)) {
+    if (first < 0) first = event.time_us;
+    std::this_thread::sleep_until(
+        start + std::chrono::duration_cast<Clock::duration>(Seconds(seconds(event.time_us - first) / speed_)));
+    if (change_ && !change_(event, link_)) continue;
+    link_.publish(event.channel, event.time_us, event.data);
+  }
+}
+
+// --- logs ------------------------------------------------------------------------------------------
+
+std::string reach_configuration() {
+  return (fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml").string();
+}
+
+fs::path reach_log() {
+  const fs::path file = fs::path(BODYSCHEMA_BINARY_DIR) / "test-logs" / "reach.lcmlog";
+  if (fs::exists(file)) return file;
+  fs::create_directories(file.parent_path());
+  // Tests run side by side: each writes under a name of its own, the last rename wins.
+  const fs::path mine = file.string() + "." + std::to_string(getpid());
+  const fs::path simulator = fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/simulator.yaml";
+  {
+    Scratch scratch;
+    Process sim({"bodyschema-sim", "--config", simulator.string(), "--frames", "60", "--seed", "7", "--log",
+                 mine.string()},
+                scratch.folder());
+    const auto status = sim.wait(Seconds(120));
+    if (status != 0) throw std::runtime_error("bodyschema-sim failed: " + sim.err());
+  }
+  fs::rename(mine, file);
+  return file;
+}
+
+std::map<Microseconds, std::string> estimates_by_utime(const fs::path& file) {
+  std::map<Microseconds, std::string> lines;
+  std::ifstream stream(file);
+  for (std::string line; std::getline(stream, line);) {
+    lines[nlohmann::json::parse(line).at("utime").get<Microseconds>()] = line;
+  }
+  return lines;
+}
+
+std::map<Microseconds, std::string> replay_estimates(const fs::path& log, const fs::path& out,
+                                                     const std::vector<std::string>& more) {
+  fs::create_directories(out);
+  std::vector<std::string> command = {"bodyschema", "replay", log.string(), "--config", reach_configuration(),
+                                      "--overlays", "0", "--out", out.string()};
+  command.insert(command.end(), more.begin(), more.end());
+  Process replay(command, out);
+  const auto status = replay.wait(Seconds(200));
+  if (status != 0) throw std::runtime_error("bodyschema replay failed: " + replay.err());
+  return estimates_by_utime(out / "estimates.jsonl");
+}
+
+}  // namespace bodyschema::integration

@@ -1,0 +1,128 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "bodyschema/bus/lcm_link.hpp"
+#include "bodyschema/bus/log.hpp"
+#include "bodyschema/bus/messages.hpp"
+
+/// Starts the built programs, talks to them over LCM, and waits for what they say.
+namespace bodyschema::integration {
+
+using Seconds = std::chrono::duration<double>;
+
+/// A program started by the test; killed when the test is done with it.
+class Process {
+ public:
+  /// @param arguments  program first: a name in build/bin, or one on the path
+  /// @param environment  added to this process's
+  Process(std::vector<std::string> arguments, const std::filesystem::path& scratch,
+          const std::map<std::string, std::string>& environment = {});
+  ~Process();
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  void signal(int number) const;
+  /// Exit status, 128 + signal when killed; nothing when it still runs after `limit`.
+  std::optional<int> wait(Seconds limit);
+  [[nodiscard]] bool running();
+  [[nodiscard]] std::string out() const;
+  [[nodiscard]] std::string err() const;
+  /// Whether `words` were written to standard error in time.
+  [[nodiscard]] bool said(const std::string& words, Seconds limit);
+  [[nodiscard]] pid_t pid() const { return pid_; }
+
+ private:
+  std::filesystem::path out_, err_;
+  pid_t pid_ = -1;
+  std::optional<int> status_;
+};
+
+/// A folder of the test's own, removed at its end unless the test failed.
+class Scratch {
+ public:
+  Scratch();
+  ~Scratch();
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return folder_ / name; }
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+/// A network of this test's own: a port nobody else uses, packets that stay on this machine.
+std::string private_lcm_url();
+/// Why LCM cannot be used here; empty when it can.
+std::string why_no_lcm();
+
+/// Everything that is published on the service's two channels, as it comes.
+class Listener {
+ public:
+  explicit Listener(const std::string& lcm_url);
+  ~Listener();
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+
+  [[nodiscard]] std::vector<joint_offsets_t> offsets() const;
+  [[nodiscard]] std::vector<offsets_status_t> statuses() const;
+  /// The first status, among those that arrive from now on, that `wanted` accepts.
+  std::optional<offsets_status_t> wait_status(const std::function<bool(const offsets_status_t&)>& wanted,
+                                              Seconds limit);
+  bool wait_offsets(std::size_t count, Seconds limit);
+
+ private:
+  LcmLink link_;
+  mutable std::mutex mutex_;
+  std::condition_variable arrived_;
+  std::vector<joint_offsets_t> offsets_;
+  std::vector<offsets_status_t> statuses_;
+  std::jthread thread_;
+};
+
+/// Plays a log in real time (or faster), from a thread of its own. `change` sees every message
+/// before it goes out and may alter it, drop it (false), or publish more through the link.
+class Player {
+ public:
+  using Change = std::function<bool(LogEvent& event, LcmLink& link)>;
+  Player(const std::string& lcm_url, std::filesystem::path log, double speed = 1.0, Change change = {});
+  ~Player();
+  Player(const Player&) = delete;
+  Player& operator=(const Player&) = delete;
+  void wait();
+
+ private:
+  void work(const std::stop_token& stop);
+  LcmLink link_;
+  std::filesystem::path log_;
+  double speed_;
+  Change change_;
+  std::jthread thread_;
+};
+
+/// A reach of our own simulated robot, made once per build folder: stereo at 30 Hz, encoders at
+/// 100 Hz, empty frames first for the background.
+std::filesystem::path reach_log();
+/// The configuration that goes with it.
+std::string reach_configuration();
+
+/// Lines of estimates.jsonl by utime.
+std::map<Microseconds, std::string> estimates_by_utime(const std::filesystem::path& file);
+/// Runs `bodyschema replay` and returns its estimates.
+std::map<Microseconds, std::string> replay_estimates(const std::filesystem::path& log,
+                                                     const std::filesystem::path& out,
+                                                     const std::vector<std::string>& more = {});
+
+}  // namespace bodyschema::integration

@@ -1,0 +1,328 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstddef>
+#include <cstring>
+#include <fstream>
+
+#include "bodyschema/service/health.hpp"
+#include "harness.hpp"
+
+/// The daemon as a user runs it: a process, fed over LCM.
+namespace bodyschema::integration {
+namespace {
+
+using testing::HasSubstr;
+
+class Service : public testing::Test {
+ protected:
+  void SetUp() override {
+    static const std::string reason = why_no_lcm();
+    if (!reason.empty()) GTEST_SKIP() << reason;
+  }
+
+  std::vector<std::string> daemon(std::vector<std::string> more = {}) const {
+    std::vector<std::string> command = {"bodyschemad", "--config", reach_configuration(), "-l", url_};
+    command.insert(command.end(), more.begin(), more.end());
+    return command;
+  }
+
+  const std::string url_ = private_lcm_url();
+  Scratch scratch_;
+};
+
+constexpr Seconds kStart{60};  // loading the robot, on a busy machine
+
+/// Pictures and encoders as fast as the daemon keeps up: the next picture goes out once the
+/// estimate for one three frames earlier is back, so that nothing is shed on any machine.
+Player::Change in_step_with(const Listener& listener) {
+  return [&listener, sent = std::size_t{0}](LogEvent& event, LcmLink&) mutable {
+    if (event.channel != "ICUB_CAMERAS") return true;
+    ++sent;
+    for (int i = 0; i < 500 && listener.offsets().size() + 3 < sent; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return true;
+  };
+}
+
+TEST_F(Service, AgreesWithReplayBitForBit) {
+  const auto log = reach_log();
+  Listener listener(url_);
+  const auto file = scratch_ / "estimates.jsonl";
+  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", "3"}), scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  Player player(url_, log, 1000.0, in_step_with(listener));
+  player.wait();
+  ASSERT_EQ(service.wait(Seconds(60)), 0);
+
+  const auto statuses = listener.statuses();
+  ASSERT_FALSE(statuses.empty());
+  EXPECT_EQ(statuses.back().frames_dropped, 0);
+  EXPECT_EQ(statuses.back().frames_in, statuses.back().frames_estimated);
+
+  const auto live = estimates_by_utime(file);
+  EXPECT_GT(live.size(), 40u);
+  EXPECT_EQ(live, replay_estimates(log, scratch_ / "replay"));
+
+  // What went over the network is what was written.
+  const auto published = listener.offsets();
+  ASSERT_EQ(published.size(), live.size());
+  for (std::size_t i = 0; i < published.size(); ++i) {
+    EXPECT_EQ(published[i].sequence, static_cast<std::int64_t>(i));
+    EXPECT_TRUE(live.contains(published[i].utime));
+    EXPECT_GE(published[i].latency_ms, 0.0);
+  }
+}
+
+TEST_F(Service, AgreesWithReplayOverLcmLogplayer) {
+  if (std::system("command -v lcm-logplayer >/dev/null") != 0) GTEST_SKIP() << "lcm-logplayer is not installed";
+  const auto log = reach_log();
+  const auto expected = replay_estimates(log, scratch_ / "replay");
+  // Real time where the machine keeps up, slower where it does not: the promise holds without drops.
+  for (const char* speed : {"1", "0.25", "0.08"}) {
+    const std::string url = private_lcm_url();
+    Listener listener(url);
+    const auto file = scratch_ / (std::string("estimates-") + speed + ".jsonl");
+    Process service({"bodyschemad", "--config", reach_configuration(), "-l", url, "--estimates", file.string(),
+                     "--stop-after-idle", "3"},
+                    scratch_.folder());
+    ASSERT_TRUE(service.said("waiting for", kStart));
+    Process player({"lcm-logplayer", "--speed", speed, "--lcm-url", url, log.string()}, scratch_.folder());
+    ASSERT_EQ(player.wait(Seconds(150)), 0);
+    ASSERT_EQ(service.wait(Seconds(30)), 0);
+    const auto live = estimates_by_utime(file);
+    ASSERT_FALSE(live.empty());
+    if (listener.statuses().back().frames_dropped > 0 || live.size() != expected.size()) continue;
+    EXPECT_EQ(live, expected) << "at speed " << speed;
+    return;
+  }
+  FAIL() << "frames were lost even at a twelfth of real time";
+}
+
+TEST_F(Service, TwoReplaysAreIdentical) {
+  const auto log = reach_log();
+  EXPECT_EQ(replay_estimates(log, scratch_ / "a"), replay_estimates(log, scratch_ / "b", {"--set", "silhouette.threads=1"}));
+}
+
+TEST_F(Service, MalformedMessagesAreCountedAndChangeNothing) {
+  const auto log = reach_log();
+  Listener listener(url_);
+  const auto file = scratch_ / "estimates.jsonl";
+  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", "3"}), scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  auto in_step = in_step_with(listener);
+  int sent = 0;
+  Player player(url_, log, 1000.0, [&](LogEvent& event, LcmLink& link) {
+    const std::vector<std::uint8_t> half(event.data.begin(), event.data.begin() + static_cast<std::ptrdiff_t>(event.data.size() / 2));
+    const std::vector<std::uint8_t> noise(33, 0xA5);
+    if (++sent % 10 == 0) {
+      link.publish(event.channel, 0, half);
+      link.publish(event.channel, 0, noise);
+      link.publish(event.channel, 0, {});
+    }
+    return in_step(event, link);
+  });
+  player.wait();
+  ASSERT_EQ(service.wait(Seconds(60)), 0);
+  EXPECT_EQ(estimates_by_utime(file), replay_estimates(log, scratch_ / "replay"));
+  const auto last = listener.statuses().back();
+  std::map<std::string, std::int64_t> counters;
+  for (std::size_t i = 0; i < last.counter_name.size(); ++i) counters[last.counter_name[i]] = last.counter_value[i];
+  EXPECT_EQ(counters["malformed.truncated"] + counters["malformed.wrong_type"], 3 * (sent / 10));
+  EXPECT_EQ(last.frames_dropped, 0);
+}
+
+TEST_F(Service, StopsWithinASecondIdleAndBusy) {
+  for (const int number : {SIGTERM, SIGINT}) {
+    for (const bool busy : {false, true}) {
+      const std::string url = private_lcm_url();
+      Listener listener(url);
+      Process service({"bodyschemad", "--config", reach_configuration(), "-l", url}, scratch_.folder());
+      ASSERT_TRUE(service.said("waiting for", kStart));
+      Player player(url, reach_log(), 1.0, [busy](LogEvent&, LcmLink&) { return busy; });
+      if (busy) {
+        ASSERT_TRUE(listener.wait_offsets(3, Seconds(20)));
+      }
+      const auto begin = std::chrono::steady_clock::now();
+      service.signal(number);
+      EXPECT_EQ(service.wait(Seconds(20)), 0);
+      const double took_s = Seconds(std::chrono::steady_clock::now() - begin).count();
+      EXPECT_LT(took_s, 1.0) << (busy ? "busy" : "idle");
+      EXPECT_THAT(service.err(), HasSubstr("stopped after"));
+    }
+  }
+}
+
+TEST_F(Service, TellsTheManagerWhenItIsReadyAndAlive) {
+  const std::string name = "@bodyschema-integration-" + std::to_string(getpid());
+  const int manager = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::memcpy(address.sun_path + 1, name.data() + 1, name.size() - 1);
+  ASSERT_EQ(bind(manager, reinterpret_cast<const sockaddr*>(&address),
+                 static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name.size())), 0);
+  std::string heard;
+  const auto hears = [&](const std::string& words, double limit_s) {
+    for (int i = 0; i < limit_s * 100; ++i) {
+      char text[4096];
+      for (ssize_t n; (n = recv(manager, text, sizeof text, 0)) > 0;) heard.append(text, static_cast<std::size_t>(n)).append("\n");
+      if (heard.find(words) != std::string::npos) return true;
+      usleep(10'000);
+    }
+    return false;
+  };
+
+  Process service(daemon(), scratch_.folder(), {{"NOTIFY_SOCKET", name}, {"WATCHDOG_USEC", "2000000"}});
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  EXPECT_TRUE(hears("WATCHDOG=1", 5.0)) << "the watchdog is fed while idle";
+  EXPECT_TRUE(hears("STATUS=STALE: no pictures yet", 5.0));
+  EXPECT_EQ(heard.find("READY=1"), std::string::npos) << "ready before anything came";
+  Player player(url_, reach_log());
+  EXPECT_TRUE(hears("READY=1", 20.0));
+  heard.clear();
+  EXPECT_TRUE(hears("WATCHDOG=1", 5.0)) << "the watchdog is fed while busy";
+  heard.clear();
+  service.signal(SIGHUP);
+  EXPECT_TRUE(hears("RELOADING=1", 5.0));
+  EXPECT_TRUE(hears("READY=1", 60.0));
+  service.signal(SIGTERM);
+  EXPECT_TRUE(hears("STOPPING=1", 5.0));
+  EXPECT_EQ(service.wait(Seconds(10)), 0);
+  close(manager);
+}
+
+TEST_F(Service, ReloadsOnSighupAndRefusesABrokenConfiguration) {
+  const auto config = scratch_ / "estimator.yaml";
+  const auto write = [&](const std::string& more) {
+    std::ofstream(config) << "include: [" << reach_configuration() << "]\n" << more;
+  };
+  write("filter: {particles: 40}\n");
+  Listener listener(url_);
+  Process service({"bodyschemad", "--config", config.string(), "-l", url_}, scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  const auto particles = [](int n) { return [n](const offsets_status_t& s) { return s.num_particles == n; }; };
+  ASSERT_TRUE(listener.wait_status(particles(40), Seconds(5)));
+
+  write("filter: {particel: 60}\n");
+  service.signal(SIGHUP);
+  EXPECT_TRUE(service.said("reload refused, going on as before: ", kStart));
+  EXPECT_THAT(service.err(), HasSubstr("did you mean 'filter.particles'?"));
+  EXPECT_TRUE(listener.wait_status(particles(40), Seconds(5)));
+
+  write("filter: {particles: 60}\n");
+  service.signal(SIGHUP);
+  EXPECT_TRUE(listener.wait_status(particles(60), kStart));
+  Player player(url_, reach_log());
+  EXPECT_TRUE(listener.wait_offsets(1, Seconds(20))) << "the reloaded service works";
+  service.signal(SIGTERM);
+  EXPECT_EQ(service.wait(Seconds(10)), 0);
+}
+
+TEST_F(Service, RecordingIsReadableUpToTheLastMessageWhenKilled) {
+  const auto record = scratch_ / "killed.lcmlog";
+  Listener listener(url_);
+  Process service(daemon({"--record", record.string()}), scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  Player player(url_, reach_log());
+  ASSERT_TRUE(listener.wait_offsets(10, Seconds(30)));
+  service.signal(SIGKILL);
+  EXPECT_EQ(service.wait(Seconds(5)), 128 + SIGKILL);
+  LogReader log(record);
+  LogEvent event;
+  std::map<std::string, int> seen;
+  while (log.next(event)) ++seen[event.channel];
+  EXPECT_EQ(log.damaged_places(), 0u);
+  EXPECT_GE(seen["ICUB_JOINT_OFFSETS"], 8) << "at most what was on its way to the disk is missing";
+  EXPECT_GE(seen["ICUB_CAMERAS"], 8);
+  EXPECT_GE(seen["ICUB_JOINT_STATE"], 8);
+}
+
+TEST_F(Service, StatusFollowsWhatHappens) {
+  Listener listener(url_);
+  Process service(daemon(), scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  const auto says = [](HealthLevel level, const std::string& words) {
+    return [=](const offsets_status_t& s) {
+      return s.level == static_cast<int>(level) && s.sentence.find(words) != std::string::npos;
+    };
+  };
+  EXPECT_TRUE(listener.wait_status(says(HealthLevel::kStale, "no pictures yet on ICUB_CAMERAS"), Seconds(5)));
+  {
+    Player player(url_, reach_log());
+    ASSERT_TRUE(listener.wait_status(says(HealthLevel::kWarn, "hand not in view"), Seconds(10)));
+    // Frames are shed on a slow machine, which the sentence may say instead; the state is there too.
+    const auto tracking = listener.wait_status(
+        [](const offsets_status_t& status) { return status.state == "converged"; }, Seconds(20));
+    ASSERT_TRUE(tracking);
+    EXPECT_LE(tracking->level, offsets_status_t::WARN) << tracking->sentence;
+    EXPECT_GT(tracking->frame_rate_hz, 1.0);
+    EXPECT_GT(tracking->latency_median_ms, 0.0);
+    EXPECT_GT(tracking->resident_bytes, 1'000'000);
+    EXPECT_GT(tracking->best_likelihood, 0.8);
+    EXPECT_EQ(tracking->config_hash.size(), tracking->model_hash.size());
+    player.wait();
+  }
+  const auto silent = listener.wait_status(
+      [](const offsets_status_t& status) {
+        return status.sentence.find("no pictures on ICUB_CAMERAS for") != std::string::npos &&
+               status.frames_in == status.frames_estimated + status.frames_dropped;
+      },
+      Seconds(10));
+  ASSERT_TRUE(silent);
+  std::int64_t estimates = 0;
+  for (const auto count : silent->latency_count) estimates += count;
+  EXPECT_EQ(estimates, silent->frames_estimated);
+  EXPECT_EQ(silent->level, offsets_status_t::STALE);
+}
+
+TEST_F(Service, WrongInputEndsWithOneClearErrorAndStatusTwo) {
+  struct Case {
+    std::vector<std::string> arguments;
+    std::string words;
+  };
+  const std::string good = reach_configuration();
+  std::ofstream(scratch_ / "not.yaml") << "robot: [1, 2\n";
+  std::ofstream(scratch_ / "no_urdf.yaml") << "include: [" << good << "]\nrobot: {urdf: missing.urdf}\n";
+  const std::vector<Case> cases = {
+      {{}, "--config is required"},
+      {{"--config", "missing.yaml"}, "missing.yaml: no such configuration file"},
+      {{"--config", (scratch_ / "not.yaml").string()}, "not.yaml"},
+      {{"--config", (scratch_ / "no_urdf.yaml").string()}, "missing.urdf"},
+      {{"--config", good, "--set", "filter.particel=5"}, "did you mean 'filter.particles'?"},
+      {{"--config", good, "--set", "filter.particles=-5"}, "filter.particles"},
+      {{"--config", good, "--set", "robot.estimated_joints=[r_elbo]"}, "r_elbow"},
+      {{"--config", good, "--engine", "magic"}, "--engine"},
+      {{"--config", good, "--record", "/nowhere/at/all.lcmlog"}, "/nowhere/at/all.lcmlog"},
+      {{"--config", good, "--estimates", "/nowhere/at/all.jsonl"}, "/nowhere/at/all.jsonl"},
+      {{"--config", good, "--stop-after-idle", "soon"}, "--stop-after-idle"},
+  };
+  for (const auto& [arguments, words] : cases) {
+    std::vector<std::string> command = {"bodyschemad", "-l", url_};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    Process service(command, scratch_.folder());
+    EXPECT_EQ(service.wait(kStart), 2) << words;
+    EXPECT_THAT(service.err(), HasSubstr(words));
+    EXPECT_EQ(service.out(), "") << words;
+  }
+  Process service({"bodyschemad", "--config", good, "-l", "nonsense://"}, scratch_.folder());
+  EXPECT_EQ(service.wait(kStart), 1);
+  EXPECT_THAT(service.err(), HasSubstr("LCM cannot use 'nonsense://'"));
+}
+
+TEST_F(Service, ChecksAndPrintsTheConfigurationWithoutTheNetwork) {
+  Process check(daemon({"--check-config"}), scratch_.folder());
+  EXPECT_EQ(check.wait(kStart), 0);
+  EXPECT_THAT(check.out(), HasSubstr("good"));
+  EXPECT_THAT(check.out(), HasSubstr("ICUB_JOINT_STATE and ICUB_CAMERAS in"));
+  Process print(daemon({"--print-config", "--set", "filter.particles=77"}), scratch_.folder());
+  EXPECT_EQ(print.wait(kStart), 0);
+  EXPECT_THAT(print.out(), HasSubstr("particles: 77"));
+}
+
+}  // namespace
+}  // namespace bodyschema::integration
