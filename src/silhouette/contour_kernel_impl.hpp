@@ -48,10 +48,13 @@ inline void store_offsets(std::int32_t* p, Floats row, std::int32_t stride, Floa
   _mm256_store_si256(reinterpret_cast<__m256i*>(p),
                      _mm256_add_epi32(begin, _mm256_cvttps_epi32(column.v)));
 }
-inline unsigned low_bits(const std::uint32_t* found) {
+// Lanes with the sign bit where the low bit of `found` differs from u0 > u1.
+inline Floats directions(const std::uint32_t* found, Floats u0, Floats u1) {
   const __m256i v = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(found));
-  return static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_slli_epi32(v, 31))));
+  return {_mm256_xor_ps(_mm256_castsi256_ps(_mm256_slli_epi32(v, 31)),
+                        _mm256_cmp_ps(u0.v, u1.v, _CMP_GT_OQ))};
 }
+inline unsigned signs(Floats a) { return static_cast<unsigned>(_mm256_movemask_ps(a.v)); }
 // For every set of lanes, their numbers in a row, a byte each.
 struct LaneTable {
   std::uint64_t lanes[256];
@@ -65,8 +68,20 @@ struct LaneTable {
   }
 };
 constexpr LaneTable kLaneTable;
-// Appends first + lane for the lanes set in `edges`, with the bit of `left_front` below. Writes all
-// eight: `out` has room.
+// The lanes of a set, moved to the front. Stores write all eight: there is room.
+struct Packing {
+  __m256i order;
+  explicit Packing(unsigned set)
+      : order(_mm256_cvtepu8_epi32(
+            _mm_cvtsi64_si128(static_cast<long long>(kLaneTable.lanes[set])))) {}
+  void store(float* p, Floats a) const {
+    _mm256_storeu_ps(p, _mm256_permutevar8x32_ps(a.v, order));
+  }
+  void store(std::uint32_t* p, __m256i a) const {
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(p), _mm256_permutevar8x32_epi32(a, order));
+  }
+};
+// Appends first + lane for the lanes set in `edges`, with the bit of `left_front` below.
 inline void append(unsigned edges, unsigned left_front, std::uint32_t first, std::uint32_t*& out) {
   const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
   const __m256i front =
@@ -75,9 +90,7 @@ inline void append(unsigned edges, unsigned left_front, std::uint32_t first, std
   const __m256i number =
       _mm256_add_epi32(lane, _mm256_set1_epi32(static_cast<int>(first)));
   const __m256i entry = _mm256_or_si256(_mm256_slli_epi32(number, 1), front);
-  const __m256i order = _mm256_cvtepu8_epi32(
-      _mm_cvtsi64_si128(static_cast<long long>(kLaneTable.lanes[edges])));
-  _mm256_storeu_si256(reinterpret_cast<__m256i*>(out), _mm256_permutevar8x32_epi32(entry, order));
+  Packing(edges).store(out, entry);
   out += __builtin_popcount(edges);
 }
 // Rows of eight edges (from, to, unused) to columns.
@@ -162,11 +175,23 @@ inline void store_offsets(std::int32_t* p, Floats row, std::int32_t stride, Floa
     p[k] = static_cast<std::int32_t>(row.v[k]) * stride + static_cast<std::int32_t>(column.v[k]);
   }
 }
-inline unsigned low_bits(const std::uint32_t* found) {
+inline Floats directions(const std::uint32_t* found, Floats u0, Floats u1) {
+  return lanewise([&](int k) {
+    return ((found[k] & 1u) != 0) != (u0.v[k] > u1.v[k]) ? -1.0f : 1.0f;
+  });
+}
+inline unsigned signs(Floats a) {
   unsigned bits = 0;
-  for (int k = 0; k < kLanes; ++k) bits |= (found[k] & 1u) << k;
+  for (int k = 0; k < kLanes; ++k) bits |= (a.v[k] < 0.0f ? 1u : 0u) << k;
   return bits;
 }
+struct Packing {
+  unsigned set;
+  explicit Packing(unsigned lanes) : set(lanes) {}
+  void store(float* p, Floats a) const {
+    for (unsigned left = set; left != 0; left &= left - 1) *p++ = a.v[__builtin_ctz(left)];
+  }
+};
 inline void append(unsigned edges, unsigned left_front, std::uint32_t first, std::uint32_t*& out) {
   while (edges != 0) {
     const auto lane = static_cast<unsigned>(__builtin_ctz(edges));
@@ -294,6 +319,64 @@ inline Floats row_times(const float P[4], const Floats p[3]) {
   return fma(splat(P[2]), p[2], fma(splat(P[1]), p[1], fma(splat(P[0]), p[0], splat(P[3]))));
 }
 
+inline Floats clamp(Floats a, float high) { return min(max(a, splat(0.0f)), splat(high)); }
+
+// Projected edges that cross the centre of a column, left end first.
+constexpr std::int32_t kPacked = 256;
+struct PackedEdges {
+  alignas(32) float u0[kPacked + kLanes];
+  alignas(32) float v0[kPacked + kLanes];
+  alignas(32) float u1[kPacked + kLanes];
+  alignas(32) float v1[kPacked + kLanes];
+  alignas(32) float direction[kPacked + kLanes];
+  std::int32_t count = 0;
+
+  void put(Packing packing, Floats left_u, Floats left_v, Floats right_u, Floats right_v,
+           Floats directed) {
+    packing.store(u0 + count, left_u);
+    packing.store(v0 + count, left_v);
+    packing.store(u1 + count, right_u);
+    packing.store(v1 + count, right_v);
+    packing.store(direction + count, directed);
+  }
+};
+
+// Adds the crossings of packed edges, a column of eight edges at a time.
+inline void scatter(PackedEdges& edges, std::int32_t weight, const DeltaImage& image) {
+  const auto width = static_cast<float>(image.width);
+  const auto height = static_cast<float>(image.height);
+  const std::uint8_t step[2] = {static_cast<std::uint8_t>(-weight),
+                                static_cast<std::uint8_t>(weight)};
+  const std::int32_t count = edges.count;
+  edges.put(Packing(0xFFu), splat(0.0f), splat(0.0f), splat(0.0f), splat(0.0f), splat(0.0f));
+  for (std::int32_t first = 0; first < count; first += kLanes) {
+    const Floats u0 = load(edges.u0 + first), v0 = load(edges.v0 + first);
+    const Floats u1 = load(edges.u1 + first), v1 = load(edges.v1 + first);
+    const unsigned positive = signs(load(edges.direction + first));
+    Floats column = ceil(clamp(u0, width));
+    const Floats end = ceil(clamp(u1, width));
+    const Floats slope = (v1 - v0) / (u1 - u0);
+    // Rounding must not carry a crossing beyond the bounds that resolve() clears; an overflow that
+    // made a NaN ends at `low`.
+    const Floats low = clamp(min(v0, v1), height);
+    const Floats high = clamp(max(v0, v1), height);
+    unsigned left = greater(end, column);
+    while (left != 0) {
+      const Floats v = min(max(fma(column - u0, slope, v0), low), high);
+      alignas(32) std::int32_t offset[kLanes];
+      store_offsets(offset, ceil(v), image.stride, column);
+      for (unsigned todo = left; todo != 0; todo &= todo - 1) {
+        const int k = __builtin_ctz(todo);
+        std::uint8_t& delta = image.deltas[offset[k]];
+        delta = static_cast<std::uint8_t>(delta + step[(positive >> k) & 1u]);
+      }
+      column = column + splat(1.0f);
+      left &= greater(end, column);
+    }
+  }
+  edges.count = 0;
+}
+
 void accumulate(const EdgeRun& run, std::uint32_t* found, std::int32_t count, const float P[12],
                 const DeltaImage& image, PixelBounds& pixel_bounds) {
   if (count == 0) return;
@@ -301,9 +384,7 @@ void accumulate(const EdgeRun& run, std::uint32_t* found, std::int32_t count, co
   Floats u_min = splat(pixel_bounds.u_min), u_max = splat(pixel_bounds.u_max);
   Floats v_min = splat(pixel_bounds.v_min), v_max = splat(pixel_bounds.v_max);
   const auto width = static_cast<float>(image.width);
-  const auto height = static_cast<float>(image.height);
-  const std::uint8_t step[2] = {static_cast<std::uint8_t>(run.weight),
-                                static_cast<std::uint8_t>(-run.weight)};
+  PackedEdges packed;
   for (std::int32_t first = 0; first < count; first += kLanes) {
     const std::uint32_t* const edges = found + first;
     Floats from[3], to[3];
@@ -314,40 +395,21 @@ void accumulate(const EdgeRun& run, std::uint32_t* found, std::int32_t count, co
     Floats u1 = row_times(P, to) * z1;
     Floats v0 = row_times(P + 4, from) * z0;
     Floats v1 = row_times(P + 4, to) * z1;
-    const unsigned backwards = greater(u0, u1);
+    const Floats directed = directions(edges, u0, u1);
     order(u0, v0, u1, v1);
     u_min = min(u_min, u0);
     u_max = max(u_max, u1);
     v_min = min(v_min, min(v0, v1));
     v_max = max(v_max, max(v0, v1));
-
-    // The edge crosses the centres of columns first .. end - 1, a column of all eight at a time.
-    Floats column = ceil(min(max(u0, splat(0.0f)), splat(width)));
-    const Floats end = ceil(min(max(u1, splat(0.0f)), splat(width)));
+    // Most edges of a fine mesh are shorter than a pixel and cross no centre: they end here.
     const std::int32_t lanes = count - first < kLanes ? count - first : kLanes;
-    unsigned left = greater(end, column) & (0xFFu >> (kLanes - lanes));
-    if (left == 0) continue;
-    const unsigned negative = ~(low_bits(edges) ^ backwards);
-    const Floats slope = (v1 - v0) / (u1 - u0);
-    // Rounding must not carry a crossing beyond the bounds that resolve() clears; an overflow that
-    // made a NaN ends at `low`.
-    const Floats low = min(max(min(v0, v1), splat(0.0f)), splat(height));
-    const Floats high = min(max(max(v0, v1), splat(0.0f)), splat(height));
-    do {
-      const Floats v = min(max(fma(column - u0, slope, v0), low), high);
-      alignas(32) std::int32_t offset[kLanes];
-      store_offsets(offset, ceil(v), image.stride, column);
-      unsigned todo = left;
-      do {
-        const int k = __builtin_ctz(todo);
-        todo &= todo - 1;
-        std::uint8_t& delta = image.deltas[offset[k]];
-        delta = static_cast<std::uint8_t>(delta + step[(negative >> k) & 1u]);
-      } while (todo != 0);
-      column = column + splat(1.0f);
-      left &= greater(end, column);
-    } while (left != 0);
+    const unsigned crossing = greater(ceil(clamp(u1, width)), ceil(clamp(u0, width))) &
+                              (0xFFu >> (kLanes - lanes));
+    packed.put(Packing(crossing), u0, v0, u1, v1, directed);
+    packed.count += __builtin_popcount(crossing);
+    if (packed.count > kPacked - kLanes) scatter(packed, run.weight, image);
   }
+  scatter(packed, run.weight, image);
   alignas(32) float lane[4][kLanes];
   store(lane[0], u_min);
   store(lane[1], u_max);
