@@ -1,0 +1,136 @@
+#include "bodyschema/pipeline/replay.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "bodyschema/bus/log.hpp"
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/simulator/recording.hpp"
+
+namespace bodyschema {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+const fs::path kConfig = fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml";
+
+std::string content(const fs::path& file) {
+  std::ifstream stream(file);
+  std::stringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// A short reach of our own robot, recorded once for all tests of this file.
+class ReplayTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = fs::temp_directory_path() / ("replay_test_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+    const Configuration configuration = Configuration::load(kConfig);
+    const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
+    const StereoRig rig = StereoRig::from(configuration.section("cameras"));
+    simulator::SimulationPlan plan;
+    plan.seed = 3;
+    plan.frames = 20;
+    plan.offsets_deg = {{"r_shoulder_pitch", 5}, {"r_elbow", -2}, {"r_wrist_pitch", -7}};
+    simulator::Simulator simulator(setup.load(), setup, rig,
+                                   simulator::SimulatorSettings::from(configuration.section("simulator")), plan);
+    LogWriter log(folder_ / "reach.log");
+    simulator::FramePublisher publisher(simulator.joint_names(), {});
+    simulator::TruthWriter truth(folder_ / "truth.json", simulator, setup);
+    while (auto frame = simulator.next()) {
+      publisher.publish(*frame, log);
+      truth.add(*frame);
+    }
+    truth.close();
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+
+  static ReplayOptions options(const std::string& out) {
+    ReplayOptions o;
+    o.log = folder_ / "reach.log";
+    o.out = folder_ / out;
+    o.overlays = 2;
+    return o;
+  }
+  static Configuration configuration(const std::vector<std::string>& overrides = {}) {
+    Configuration c = Configuration::load(kConfig, overrides);
+    (void)simulator::SimulatorSettings::from(c.section("simulator"));  // its keys are known here
+    return c;
+  }
+  static inline fs::path folder_;
+};
+
+TEST_F(ReplayTest, WritesEstimatesSummaryAndPictures) {
+  ReplayOptions o = options("first");
+  o.truth = folder_ / "truth.json";
+  o.masks = true;
+  const std::string table = replay(configuration(), o);
+  EXPECT_THAT(table, HasSubstr("r_wrist_pitch"));
+  std::ifstream lines(o.out / "estimates.jsonl");
+  std::string line;
+  nlohmann::json last;
+  std::int64_t before = 0;
+  while (std::getline(lines, line)) {
+    last = nlohmann::json::parse(line);
+    EXPECT_GT(last["utime"].get<std::int64_t>(), before);
+    before = last["utime"].get<std::int64_t>();
+  }
+  EXPECT_EQ(last["state"], "converged");
+  EXPECT_EQ(last["offset_deg"].size(), 7u);
+  EXPECT_EQ(last["stddev_deg"].size(), 7u);
+  EXPECT_EQ(last["hand_pose_left_camera"].size(), 4u);
+  EXPECT_GT(last["likelihood"].get<double>(), 0.95);
+  EXPECT_LT(last["error_left"]["position_mm"].get<double>(), 1.0);
+  const auto summary = nlohmann::json::parse(content(o.out / "summary.json"));
+  EXPECT_LT(summary["errors"]["left"]["last_frames"]["position_mm"]["after"].get<double>(),
+            0.1 * summary["errors"]["left"]["last_frames"]["position_mm"]["before"].get<double>());
+  EXPECT_TRUE(fs::exists(o.out / "overlay_final.png"));
+  EXPECT_FALSE(fs::is_empty(o.out / "masks"));
+}
+
+TEST_F(ReplayTest, TwoReplaysAreIdenticalWhateverTheThreads) {
+  replay(configuration(), options("a"));
+  replay(configuration({"silhouette.threads=3"}), options("b"));
+  EXPECT_EQ(content(folder_ / "a/estimates.jsonl"), content(folder_ / "b/estimates.jsonl"));
+  replay(configuration({"filter.seed=2", "estimator.mode=paper"}), options("c"));
+  EXPECT_NE(content(folder_ / "a/estimates.jsonl"), content(folder_ / "c/estimates.jsonl"));
+}
+
+TEST_F(ReplayTest, ALogWithoutOurChannelsIsRefused) {
+  {
+    LogWriter log(folder_ / "other.log");
+    const std::vector<std::uint8_t> bytes(16, 0);
+    log.publish("OTHER", 1, bytes);
+  }
+  ReplayOptions o = options("other");
+  o.log = folder_ / "other.log";
+  try {
+    replay(configuration(), o);
+    FAIL() << "no error";
+  } catch (const DataError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("ICUB_JOINT_STATE"));
+  }
+  o.log = folder_ / "none.log";
+  EXPECT_THROW(replay(configuration(), o), FileError);
+}
+
+TEST_F(ReplayTest, AnUnknownKeyIsRefused) {
+  try {
+    replay(configuration({"filter.particels=3"}), options("unknown"));
+    FAIL() << "no error";
+  } catch (const ConfigurationError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("filter.particles"));
+  }
+}
+
+}  // namespace
+}  // namespace bodyschema

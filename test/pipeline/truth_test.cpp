@@ -1,0 +1,71 @@
+#include "bodyschema/pipeline/truth.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+namespace {
+
+using ::testing::HasSubstr;
+
+class TruthFile : public ::testing::Test {
+ protected:
+  TruthFile() : path_(std::filesystem::temp_directory_path() / ("truth_" + std::to_string(getpid()) + ".json")) {}
+  ~TruthFile() override { std::filesystem::remove(path_); }
+  Truth load(const std::string& text) {
+    std::ofstream(path_) << text;
+    return Truth::load(path_);
+  }
+  std::string error_of(const std::string& text) {
+    try {
+      load(text);
+    } catch (const FileError& e) {
+      return e.what();
+    }
+    return "";
+  }
+  std::filesystem::path path_;
+};
+
+const char* const kPose = "[[1,0,0,0.1],[0,1,0,0.2],[0,0,1,0.3],[0,0,0,1]]";
+
+TEST_F(TruthFile, ReadsTheSimulatorsFrames) {
+  const std::string frame = std::string(R"({"utime": 1000000, "hand_in_left_camera": )") + kPose +
+                            R"(, "hand_in_right_camera": )" + kPose + R"(, "fingertips_in_hand_m": [[0,0,0.05]]})";
+  const Truth truth = load(R"({"offsets_deg": {"r_elbow": -2}, "frames": [)" + frame + "]}");
+  ASSERT_NE(truth.at(1'000'000), nullptr);
+  EXPECT_DOUBLE_EQ(truth.at(1'000'000)->X_CP[1].translation().z(), 0.3);
+  EXPECT_EQ(truth.at(1'000'000)->fingertips_P.size(), 1u);
+  EXPECT_EQ(truth.at(2'000'000), nullptr) << "a second away there is no truth";
+  ASSERT_EQ(truth.offsets().size(), 1u);
+  EXPECT_DOUBLE_EQ(truth.offsets()[0].second, radians(-2.0));
+}
+
+TEST_F(TruthFile, ErrorsNameTheFile) {
+  EXPECT_THAT(error_of("{"), HasSubstr(path_.string()));
+  EXPECT_THAT(error_of(R"({"frames": [{"utime": 1}]})"), HasSubstr("not a truth file"));
+  EXPECT_THAT(error_of(R"({"frames": []})"), HasSubstr("holds no pose"));
+  EXPECT_THROW(Truth::load("/nonexistent/truth.json"), FileError);
+}
+
+TEST(TruthOfTheRecording, HoldsSeventyThreePoses) {
+  const char* data = std::getenv("BODYSCHEMA_DATA");
+  const std::filesystem::path root =
+      data != nullptr ? std::filesystem::path(data)
+                      : std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "../shared/data";
+  if (!std::filesystem::exists(root / "eyehand-sim/truth.json")) GTEST_SKIP() << "no recording at hand";
+  const Truth truth = Truth::load(root / "eyehand-sim/truth.json");
+  EXPECT_EQ(truth.instants().size(), 73u);
+  EXPECT_EQ(truth.fingers().size(), 5u);
+  EXPECT_EQ(truth.offsets().size(), 7u);
+  EXPECT_NEAR(degrees(truth.offsets()[5].second), -20.0, 1e-9);
+}
+
+}  // namespace
+}  // namespace bodyschema
