@@ -100,7 +100,8 @@ const char* unit_of(ParameterKind kind) {
     case ParameterKind::kJointOffset:
     case ParameterKind::kFingerCurl:
     case ParameterKind::kVergence: return "rad";
-    case ParameterKind::kPrincipalDifference:
+    case ParameterKind::kPrincipalDifferenceX:
+    case ParameterKind::kPrincipalDifferenceY:
     case ParameterKind::kDilation: return "px";
     case ParameterKind::kFocalScale:
     case ParameterKind::kMeshScale: return "1";
