@@ -32,6 +32,8 @@ class Help:
                 self.description += line.strip() + "\n"
             elif not line.strip():
                 continue
+            elif title.startswith("Example"):
+                self.sections[title].append([line, ""])  # the footer: as it stands
             elif item:
                 self.sections[title].append([item.group(1), item.group(2) or ""])
             elif self.sections[title]:
@@ -65,19 +67,20 @@ def roff(text):
 def man_page(page, version):
     shown = " ".join([pathlib.Path(page.words[0]).name, *page.words[1:]])
     usage = page.usage.split(" ", 1)[1] if " " in page.usage else ""
-    first = page.description.splitlines()[0] if page.description else shown
+    summary = " ".join(page.description.split()) or shown
     lines = [f'.TH {page.name.upper()} 1 "" "bodyschema {version}" "Body Schema"',
-             ".SH NAME", f"{page.name} \\- {roff(first)}",
+             ".SH NAME", f"{page.name} \\- {roff(summary)}",
              ".SH SYNOPSIS", f".B {roff(shown)}", roff(usage.removeprefix(" ".join(page.words[1:])).strip()),
              ".SH DESCRIPTION", roff(page.description)]
     for title, items in page.sections.items():
         lines.append(f".SH {title.upper()}")
-        prose = title.startswith("Example")
         for term, description in items:
-            if prose:
-                lines += [".nf", roff(f"{term}  {description}".rstrip()), ".fi"]
-            else:
+            if not title.startswith("Example"):
                 lines += [".TP", f".B {roff(term)}", roff(description)]
+            elif term.startswith(" "):
+                lines += [".nf", roff(term), ".fi"]
+            else:
+                lines += [roff(term)]
         if title == "Subcommands":
             related = ", ".join(f"{page.name}\\-{roff(c)}(1)" for c in page.subcommands())
             lines += [".PP", f"Each has its own page: {related}."]
