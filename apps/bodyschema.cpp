@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", BODYSCHEMA_VERSION);
   bodyschema::apps::add_import_yarp(app);
   bodyschema::apps::add_replay(app);
+  bodyschema::apps::add_export(app);
   bodyschema::apps::add_evaluate(app);
   try {
     app.parse(argc, argv);

@@ -6,6 +6,7 @@ namespace bodyschema::apps {
 
 /// Each adds one subcommand of `bodyschema`; its callback throws Error on failure.
 void add_evaluate(CLI::App& app);
+void add_export(CLI::App& app);
 void add_replay(CLI::App& app);
 void add_import_yarp(CLI::App& app);
 

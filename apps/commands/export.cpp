@@ -1,0 +1,32 @@
+#include <cstdio>
+#include <memory>
+
+#include "../common_options.hpp"
+#include "bodyschema/pipeline/export_correction.hpp"
+#include "bodyschema/robot/robot_setup.hpp"
+#include "commands.hpp"
+
+namespace bodyschema::apps {
+
+void add_export(CLI::App& app) {
+  struct Arguments {
+    CommonOptions common;
+    std::string summary;
+    std::string out;
+  };
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand(
+      "export", "Write a result as corrected URDF, YAML by joint and iCub calibrationDelta");
+  command->footer(
+      "Example:\n  bodyschema export out/reach/summary.json --config config/icub_right/estimator.yaml --out out/apply");
+  command->add_option("summary", a->summary, "summary.json of a replay")->required();
+  command->add_option("-o,--out", a->out, "Folder for the files")->required();
+  a->common.add_to(*command);
+  command->callback([a] {
+    const Configuration configuration = a->common.load();
+    const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
+    std::fputs(export_correction(a->summary, setup.model.urdf, a->out).c_str(), stdout);
+  });
+}
+
+}  // namespace bodyschema::apps
