@@ -8,7 +8,7 @@ namespace bodyschema::simulator {
 namespace {
 
 constexpr double kStep_s = 0.004;
-/// History reaches beyond both ends of the trajectory for exposures moved by latency.
+/// Deflections reach beyond both ends of the trajectory for exposures moved by latency.
 constexpr double kMargin_s = 1.5;
 
 class TorquesOfGravity final : public JointTorques {
@@ -146,13 +146,12 @@ TrueRobot::TrueRobot(FaultSite site, const StereoRig& rig, Trajectory trajectory
     }
   }
 
-  transmission_is_rigid_ = specs.empty();
-  if (transmission_is_rigid_) return;
+  if (specs.empty()) return;
   TorquesOfGravity torques(site_, body_.payload_kg);
   start_s_ = -kMargin_s;
   const double end_s = trajectory_.duration_s() + kMargin_s;
   const auto steps = static_cast<std::size_t>(std::ceil((end_s - start_s_) / kStep_s)) + 1;
-  history_.reserve(steps);
+  deflection_.reserve(steps);
   Eigen::VectorXd before = trajectory_.position(start_s_ - kStep_s);
   Eigen::VectorXd now = trajectory_.position(start_s_);
   Eigen::VectorXd after(now.size());
@@ -166,7 +165,7 @@ TrueRobot::TrueRobot(FaultSite site, const StereoRig& rig, Trajectory trajectory
     Eigen::VectorXd q = now;
     const MotorStep step{t, kStep_s, now, velocity, acceleration, torques};
     for (auto& fault : readers_) fault->transmit(step, q);
-    history_.push_back(std::move(q));
+    deflection_.push_back(q - now);
     before.swap(now);
     now.swap(after);
   }
@@ -174,14 +173,12 @@ TrueRobot::TrueRobot(FaultSite site, const StereoRig& rig, Trajectory trajectory
 
 void TrueRobot::joints(double t_s, Eigen::VectorXd& q) const {
   q.resize(site_.model->joint_count());
-  if (transmission_is_rigid_) {
-    trajectory_.position(t_s, q);
-    return;
-  }
-  const double x = std::clamp((t_s - start_s_) / kStep_s, 0.0, static_cast<double>(history_.size() - 1));
-  const auto i = std::min(static_cast<std::size_t>(x), history_.size() - 2);
+  trajectory_.position(t_s, q);
+  if (deflection_.empty()) return;
+  const double x = std::clamp((t_s - start_s_) / kStep_s, 0.0, static_cast<double>(deflection_.size() - 1));
+  const auto i = std::min(static_cast<std::size_t>(x), deflection_.size() - 2);
   const double share = x - static_cast<double>(i);
-  q = (1.0 - share) * history_[i] + share * history_[i + 1];
+  q += (1.0 - share) * deflection_[i] + share * deflection_[i + 1];
 }
 
 Eigen::VectorXd TrueRobot::joints(double t_s) const {

@@ -78,6 +78,12 @@ class Rasterizer {
   std::vector<float> inverse_depth_;     // per sample, 0: background
   std::vector<std::uint8_t> part_;       // per sample
   std::vector<float> shade_;             // per sample
+  std::vector<float> weight_;            // per sample, 1 but where a dilated outline passes
+  struct Change {
+    std::size_t to, from;
+    float weight;
+  };
+  std::vector<Change> changes_;          // what dilate did to the present picture
   std::vector<float> distance_;          // scratch of dilate
   std::vector<int> nearest_;             // scratch of dilate
   std::vector<Eigen::Vector3f> points_C_;

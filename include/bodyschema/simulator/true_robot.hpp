@@ -72,9 +72,8 @@ class TrueRobot {
   ExposureTiming timing_;
   std::vector<std::unique_ptr<Fault>> readers_;  // by stage
   Eigen::VectorXd offsets_;
-  bool transmission_is_rigid_ = true;
   double start_s_ = 0.0;
-  std::vector<Eigen::VectorXd> history_;
+  std::vector<Eigen::VectorXd> deflection_;  // joint minus motor, one per step; empty: none
 };
 
 }  // namespace bodyschema::simulator
