@@ -30,7 +30,7 @@ void add_evaluate(CLI::App& app) {
   command->add_option("--seed", a->options.seed, "Seed of the first trial");
   command->add_option("--threads", a->options.threads, "Trials side by side; 0: one per core")
       ->check(CLI::Range(0, 1024));
-  command->add_option("-o,--out", a->out, "Folder for summary.json")->required();
+  command->add_option("-o,--out", a->out, "Folder for summary.json and report.html")->required();
   a->common.add_to(*command);
   command->get_option("--config")->required(false);
   command->callback([a] {
@@ -45,7 +45,7 @@ void add_evaluate(CLI::App& app) {
     const auto recorded = find_data_file("config");
     if (a->options.data.empty()) a->options.data = recorded / "../../shared/data";
     std::fputs(evaluate(configuration, recorded, a->options).c_str(), stdout);
-    std::printf("\nresults in %s/summary.json\n", a->out.c_str());
+    std::printf("\nresults in %s/summary.json and report.html\n", a->out.c_str());
   });
 }
 

@@ -38,7 +38,8 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
 
   Json summary;
   std::string table;
-  ExperimentContext context{simulated, recorded, options, summary, table};
+  Report report("Body Schema: experiment " + options.experiment);
+  ExperimentContext context{simulated, recorded, options, summary, table, report};
   const auto wanted = [&](const char* name) {
     return options.experiment == name || options.experiment == "all";
   };
@@ -55,6 +56,11 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   summary["seed"] = options.seed;
   file << summary.dump(2) << '\n';
   if (!file.flush()) throw FileError((options.out / "summary.json").string() + ": cannot be written");
+  report.heading("Figures");
+  report.preformatted(table);
+  report.paragraph("Trials: " + std::to_string(options.trials) + ", seed " + std::to_string(options.seed) +
+                   ". Simulated robot; means over trials of the mean over the last ten frames.");
+  report.write(options.out / "report.html");
   return table;
 }
 

@@ -89,6 +89,42 @@ void add_heading(ExperimentContext& context, const std::string& title) {
                                "rotation deg", "worst", "worst", "frames");
 }
 
+/// Error of the hand over the frames, mean over trials (Figs. 6 and 8).
+void chart_errors(ExperimentContext& context, const std::string& title,
+                  const std::vector<TrialRecord>& trials, const std::vector<Contestant>& contestants,
+                  int camera) {
+  context.report.heading(title);
+  struct Figure {
+    const char* what;
+    const char* unit;
+    std::array<double, 2> FrameRecord::*values;
+  };
+  for (const Figure& figure : {Figure{"position error", "mm", &FrameRecord::position_mm},
+                               Figure{"orientation error", "deg", &FrameRecord::rotation_deg}}) {
+    Chart chart;
+    chart.title = std::string(figure.what) + ", mean of " + std::to_string(trials.size()) + " trials";
+    chart.x_label = "frame";
+    chart.y_label = figure.unit;
+    chart.logarithmic_y = true;
+    for (std::size_t i = 0; i < contestants.size(); ++i) {
+      ChartSeries series{contestants[i].name, {}, {}};
+      for (std::size_t f = 0; f < trials.front().contestants[i].frames.size(); ++f) {
+        std::vector<double> values;
+        for (const auto& trial : trials) {
+          if (f >= trial.contestants[i].frames.size()) continue;
+          const double value = (trial.contestants[i].frames[f].*figure.values)[static_cast<std::size_t>(camera)];
+          if (value >= 0.0) values.push_back(value);
+        }
+        if (values.empty()) continue;
+        series.x.push_back(static_cast<double>(f));
+        series.y.push_back(Statistics::of(values).mean);
+      }
+      chart.series.push_back(std::move(series));
+    }
+    context.report.chart(chart);
+  }
+}
+
 /// Both modes on the same pictures; results under summary[mode][key].stereo.
 void compare_modes(ExperimentContext& context, const std::string& title, const std::string& key,
                    int trials, const std::function<TrialSetting(std::uint64_t)>& setting_of,
@@ -99,6 +135,7 @@ void compare_modes(ExperimentContext& context, const std::string& title, const s
   }
   const auto records = run_trials(context, title, trials, setting_of, contestants);
   add_heading(context, title);
+  chart_errors(context, title, records, contestants, camera);
   for (std::size_t i = 0; i < contestants.size(); ++i) {
     const ReachResult result = reach_result(records, i, camera);
     context.summary[kModes[i]][key]["stereo"] = to_json(result);
@@ -208,6 +245,7 @@ void run_experiment1(ExperimentContext& context, bool paper_only) {
   const auto records = run_trials(context, "experiment 1: offsets in the arm", context.options.trials,
                                   [&](std::uint64_t) { return standard_setting(context); }, contestants);
   add_heading(context, "experiment 1: offsets in the arm");
+  chart_errors(context, "experiment 1: offsets in the arm", records, contestants, kLeft);
   for (std::size_t i = 0; i < contestants.size(); ++i) {
     const ReachResult result = reach_result(records, i, kLeft);
     const std::string mode = contestants[i].name.substr(0, contestants[i].name.find('.'));
@@ -327,6 +365,7 @@ void run_slip(ExperimentContext& context) {
                                     return setting;
                                   },
                                   contestants);
+  chart_errors(context, "a joint slips by 5 degrees", records, contestants, kLeft);
   std::vector<double> recovery;
   std::vector<double> dishonest;
   std::string by_joint;

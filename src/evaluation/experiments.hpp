@@ -7,6 +7,7 @@
 
 #include "bodyschema/evaluation/evaluate.hpp"
 #include "bodyschema/evaluation/trial.hpp"
+#include "bodyschema/report/report.hpp"
 
 namespace bodyschema {
 
@@ -19,6 +20,7 @@ struct ExperimentContext {
   EvaluationOptions options;
   Json& summary;       ///< results by mode: summary["best"]["experiment1"]...
   std::string& table;  ///< lines for people
+  Report& report;
 };
 
 /// Conditions of the simulated experiments: the paper's offsets, the background learned first.

@@ -7,6 +7,7 @@
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/evaluation/statistics.hpp"
 #include "bodyschema/pipeline/hand_errors.hpp"
+#include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/pipeline/truth.hpp"
 #include "experiments.hpp"
@@ -29,6 +30,9 @@ struct RecordingResult {
   TipErrors final;         ///< the last estimate applied to all poses
   double online_px = 0.0;  ///< each estimate at its time, last 30 poses
   Eigen::VectorXd offset_deg;
+  std::vector<std::string> joint_names;
+  std::vector<Eigen::VectorXd> offsets;  ///< deg, frame by frame (Fig. 9)
+  Image overlay;                         ///< last frame with and without correction (Fig. 10)
 };
 
 /// A log that goes when the experiment ends.
@@ -48,6 +52,35 @@ class ScratchFile {
   fs::path path_;
 };
 
+Image overlay(Pipeline& pipeline, const Observation& observation, const std::string& caption) {
+  std::vector<OverlayView> views;
+  for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
+    if (!observation.cameras[c]) continue;
+    views.push_back({&observation.cameras[c]->image,
+                     pipeline.estimator().predicted_silhouette(observation, c, false),
+                     pipeline.estimator().predicted_silhouette(observation, c, true)});
+  }
+  return draw_overlay(views, caption);
+}
+
+void show(ExperimentContext& context, const std::string& title, const RecordingResult& result) {
+  context.report.heading("recording: " + title);
+  Chart chart;
+  chart.title = "estimated offsets";
+  chart.x_label = "frame";
+  chart.y_label = "deg";
+  for (std::size_t k = 0; k < result.joint_names.size(); ++k) {
+    ChartSeries series{result.joint_names[k], {}, {}};
+    for (std::size_t f = 0; f < result.offsets.size(); ++f) {
+      series.x.push_back(static_cast<double>(f));
+      series.y.push_back(result.offsets[f](static_cast<Eigen::Index>(k)));
+    }
+    chart.series.push_back(std::move(series));
+  }
+  context.report.chart(chart);
+  context.report.picture(result.overlay, title + ": the encoders as they are (red), corrected (green)");
+}
+
 RecordingResult watch(const Configuration& configuration, const fs::path& log, const Truth& truth,
                       const std::string& label) {
   Pipeline pipeline(configuration);
@@ -60,8 +93,11 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
   std::vector<Seen> seen;
   std::vector<std::pair<Microseconds, double>> online;
   Estimate last;
+  std::optional<Observation> last_view;
+  std::vector<Eigen::VectorXd> offsets;
   const auto take = [&](Observation& observation) {
     last = pipeline.process(observation);
+    offsets.push_back(last.offset_rad * (180.0 / kPi));
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
       if (!observation.cameras[c]) continue;
       const auto& picture = *observation.cameras[c];
@@ -72,6 +108,7 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
                                 .fingertip_px);
       }
     }
+    last_view = std::move(observation);
   };
   LogReader reader(log);
   ProgressBar bar(label, reader.size());
@@ -87,6 +124,9 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
   if (seen.empty()) throw DataError(log.string() + ": no synchronised pictures in the recording");
 
   RecordingResult result;
+  result.overlay = overlay(pipeline, *last_view, label);
+  result.offsets = std::move(offsets);
+  result.joint_names = last.joint_names;
   std::vector<double> before_px, before_mm, after_px, after_mm, online_px;
   for (const auto& frame : seen) {
     const TruthInstant* instant = truth.at(frame.utime);
@@ -155,6 +195,7 @@ void run_recording(ExperimentContext& context) {
         mm.push_back(result.final.mm);
         online.push_back(result.online_px);
       }
+      show(context, fmt::format("{}, {}", robot.title, mode), result);
       const double final_px = Statistics::of(px).median;
       const double final_mm = Statistics::of(mm).median;
       const double online_px = Statistics::of(online).median;

@@ -12,7 +12,7 @@ namespace bodyschema {
 struct EvaluationOptions {
   /// "paper" (experiment 1 with the published filter), one experiment by name, or "all".
   std::string experiment = "all";
-  std::filesystem::path out;         ///< folder for summary.json, created
+  std::filesystem::path out;         ///< folder for summary.json and report.html, created
   int trials = 30;
   std::uint64_t seed = 7;
   int threads = 0;                   ///< trials run side by side; 0: one per core
@@ -25,7 +25,7 @@ struct EvaluationOptions {
 const std::vector<std::pair<std::string, std::string>>& experiment_names();
 
 /// Runs experiments on the simulator of our own robot and on the public recording, writes
-/// `summary.json`, and returns the table for people. Trials are seeded seed, seed + 1, ...; the
+/// `summary.json` and `report.html`, and returns the table for people. Trials are seeded seed, seed + 1, ...; the
 /// result does not depend on the number of threads.
 /// @param simulated  configuration that holds estimator and simulator of our own robot
 /// @param recorded  folder that holds icub_unity/ and icub_v2_5/ configurations

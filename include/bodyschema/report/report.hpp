@@ -1,0 +1,57 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bodyschema/geometry/image.hpp"
+
+namespace bodyschema {
+
+/// One line, or one set of bars, of a chart.
+struct ChartSeries {
+  std::string name;
+  std::vector<double> x;  ///< ignored for bars
+  std::vector<double> y;
+};
+
+/// A chart of a report. Values that are not finite are left out.
+struct Chart {
+  enum class Kind { kLine, kScatter, kBar };
+  std::string title;
+  std::string x_label;
+  std::string y_label;
+  Kind kind = Kind::kLine;
+  std::vector<std::string> labels;  ///< names of the bars
+  std::vector<ChartSeries> series;
+  bool logarithmic_y = false;
+};
+
+/// A page in one file: text, tables, charts (drawn by Chart.js, which is put into the page) and
+/// pictures. It needs no network and no other file, reads well on a phone, and every text is
+/// escaped. Where the build machine had no Chart.js, charts appear as tables of their values.
+class Report {
+ public:
+  explicit Report(std::string title);
+  void heading(const std::string& text);
+  void paragraph(const std::string& text);
+  /// A paragraph that stands out: the answer in one sentence.
+  void verdict(const std::string& text);
+  /// @param rows  as wide as `head`; cells that look like numbers are set right
+  void table(const std::vector<std::string>& head, const std::vector<std::vector<std::string>>& rows);
+  void preformatted(const std::string& text);
+  void chart(const Chart& chart);
+  /// Throws DataError for an empty picture.
+  void picture(const Image& image, const std::string& caption);
+  /// Throws FileError when the file cannot be written.
+  void write(const std::filesystem::path& file) const;
+  [[nodiscard]] std::string html() const;
+
+ private:
+  std::string title_;
+  std::string body_;
+  std::string script_;
+  int charts_ = 0;
+};
+
+}  // namespace bodyschema

@@ -1,0 +1,208 @@
+#include "bodyschema/report/report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "bodyschema/core/error.hpp"
+#include "chart_js.hpp"
+
+namespace bodyschema {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* const kColours[] = {"#1f6fb4", "#d1495b", "#3a9d5d", "#c98a1b",
+                                "#7a4fb0", "#3aa6a6", "#8a6d5a", "#5c677d"};
+
+const char* const kStyle = R"css(
+:root { color-scheme: light dark; --line: #8884; --ink: #1b1f24; --paper: #fff; --soft: #5a6572; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e6e8eb; --paper: #15181c; --soft: #9aa4af; } }
+body { font: 16px/1.55 system-ui, sans-serif; color: var(--ink); background: var(--paper);
+       max-width: 62rem; margin: 0 auto; padding: 1.2rem; }
+h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
+.verdict { font-size: 1.15rem; border-left: 4px solid #1f6fb4; padding: .4rem 0 .4rem 1rem; }
+.scroll { overflow-x: auto; } table { border-collapse: collapse; margin: .8rem 0; }
+th, td { padding: .3rem .7rem; border-bottom: 1px solid var(--line); text-align: left; }
+td.number { text-align: right; font-variant-numeric: tabular-nums; }
+pre { overflow-x: auto; font-size: .85rem; } figure { margin: 1.2rem 0; }
+figure img { max-width: 100%; image-rendering: auto; } figcaption { color: var(--soft); font-size: .9rem; }
+.chart { position: relative; height: 22rem; margin: 1.2rem 0; }
+)css";
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&': out += "&amp;"; break;
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += c;
+    }
+  }
+  return out;
+}
+
+/// JSON that may stand inside a <script>: without '<' nothing in it can end or begin an element.
+std::string script_json(const Json& json) {
+  std::string out;
+  for (const char c : json.dump(-1, ' ', true)) {
+    if (c == '<') {
+      out += "\\u003c";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+bool looks_like_a_number(const std::string& cell) {
+  return !cell.empty() && cell.find_first_not_of("0123456789+-.eE %") == std::string::npos &&
+         cell.find_first_of("0123456789") != std::string::npos;
+}
+
+std::string base64(const std::vector<std::uint8_t>& bytes) {
+  static const char* const kAlphabet =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t left = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t word = 0;
+    for (std::size_t k = 0; k < 3; ++k) word = (word << 8) | (k < left ? bytes[i + k] : 0u);
+    for (std::size_t k = 0; k < 4; ++k) {
+      out += k <= left ? kAlphabet[(word >> (18 - 6 * k)) & 63u] : '=';
+    }
+  }
+  return out;
+}
+
+Json dataset(const ChartSeries& series, Chart::Kind kind, std::size_t index) {
+  const char* colour = kColours[index % std::size(kColours)];
+  Json data = Json::array();
+  for (std::size_t i = 0; i < series.y.size(); ++i) {
+    if (kind == Chart::Kind::kBar) {
+      data.push_back(std::isfinite(series.y[i]) ? Json(series.y[i]) : Json(nullptr));
+    } else if (i < series.x.size() && std::isfinite(series.x[i]) && std::isfinite(series.y[i])) {
+      data.push_back({{"x", series.x[i]}, {"y", series.y[i]}});
+    }
+  }
+  return {{"label", series.name},     {"data", data},
+          {"borderColor", colour},    {"backgroundColor", kind == Chart::Kind::kLine ? "transparent" : colour},
+          {"borderWidth", kind == Chart::Kind::kScatter ? 0 : 2},
+          {"pointRadius", kind == Chart::Kind::kScatter ? 2 : 0}, {"tension", 0}};
+}
+
+}  // namespace
+
+Report::Report(std::string title) : title_(std::move(title)) {}
+
+void Report::heading(const std::string& text) { body_ += "<h2>" + escaped(text) + "</h2>\n"; }
+void Report::paragraph(const std::string& text) { body_ += "<p>" + escaped(text) + "</p>\n"; }
+void Report::verdict(const std::string& text) {
+  body_ += "<p class=\"verdict\">" + escaped(text) + "</p>\n";
+}
+void Report::preformatted(const std::string& text) {
+  body_ += "<pre>" + escaped(text) + "</pre>\n";
+}
+
+void Report::table(const std::vector<std::string>& head,
+                   const std::vector<std::vector<std::string>>& rows) {
+  body_ += "<div class=\"scroll\"><table><thead><tr>";
+  for (const auto& cell : head) body_ += "<th>" + escaped(cell) + "</th>";
+  body_ += "</tr></thead><tbody>\n";
+  for (const auto& row : rows) {
+    body_ += "<tr>";
+    for (const auto& cell : row) {
+      body_ += (looks_like_a_number(cell) ? "<td class=\"number\">" : "<td>") + escaped(cell) + "</td>";
+    }
+    body_ += "</tr>\n";
+  }
+  body_ += "</tbody></table></div>\n";
+}
+
+void Report::chart(const Chart& chart) {
+  if (report_assets::kChartJs.empty()) {
+    heading(chart.title);
+    std::vector<std::vector<std::string>> rows;
+    for (const auto& series : chart.series) {
+      for (std::size_t i = 0; i < series.y.size(); ++i) {
+        const bool named = chart.kind == Chart::Kind::kBar && i < chart.labels.size();
+        rows.push_back({series.name,
+                        named ? chart.labels[i] : i < series.x.size() ? std::to_string(series.x[i]) : "",
+                        std::to_string(series.y[i])});
+      }
+    }
+    table({"", chart.x_label, chart.y_label}, rows);
+    return;
+  }
+  Json datasets = Json::array();
+  for (std::size_t i = 0; i < chart.series.size(); ++i) {
+    datasets.push_back(dataset(chart.series[i], chart.kind, i));
+  }
+  const bool bars = chart.kind == Chart::Kind::kBar;
+  Json data = {{"datasets", datasets}};
+  if (bars) data["labels"] = chart.labels;
+  const auto axis = [](const std::string& label, const char* type) {
+    Json json = {{"title", {{"display", !label.empty()}, {"text", label}}}};
+    if (type != nullptr) json["type"] = type;
+    return json;
+  };
+  const Json config = {
+      {"type", bars ? "bar" : chart.kind == Chart::Kind::kScatter ? "scatter" : "line"},
+      {"data", data},
+      {"options",
+       {{"animation", false},
+        {"maintainAspectRatio", false},
+        {"plugins",
+         {{"title", {{"display", true}, {"text", chart.title}}},
+          {"legend", {{"display", chart.series.size() > 1}}}}},
+        {"scales",
+         {{"x", axis(chart.x_label, bars ? nullptr : "linear")},
+          {"y", axis(chart.y_label, chart.logarithmic_y ? "logarithmic" : nullptr)}}}}}};
+  const std::string id = "chart" + std::to_string(charts_++);
+  body_ += "<div class=\"chart\"><canvas id=\"" + id + "\" role=\"img\" aria-label=\"" + escaped(chart.title) +
+           "\"></canvas></div>\n";
+  script_ += "new Chart(document.getElementById('" + id + "')," + script_json(config) + ");\n";
+}
+
+void Report::picture(const Image& image, const std::string& caption) {
+  if (image.empty()) throw DataError("a report's picture is empty: " + caption);
+  const cv::Mat view(image.height, image.width, image.channels == 3 ? CV_8UC3 : CV_8UC1,
+                     const_cast<std::uint8_t*>(image.data.data()));
+  cv::Mat bgr = view.clone();
+  if (image.channels == 3) {
+    for (auto pixel = bgr.begin<cv::Vec3b>(); pixel != bgr.end<cv::Vec3b>(); ++pixel) {
+      std::swap((*pixel)[0], (*pixel)[2]);
+    }
+  }
+  std::vector<std::uint8_t> jpeg;
+  cv::imencode(".jpg", bgr, jpeg, {cv::IMWRITE_JPEG_QUALITY, 90});
+  body_ += "<figure><img alt=\"" + escaped(caption) + "\" src=\"data:image/jpeg;base64," + base64(jpeg) +
+           "\"><figcaption>" + escaped(caption) + "</figcaption></figure>\n";
+}
+
+std::string Report::html() const {
+  std::string page = "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+                     "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
+                     escaped(title_) + "</title>\n<style>" + kStyle + "</style></head><body>\n<h1>" +
+                     escaped(title_) + "</h1>\n" + body_;
+  if (!script_.empty()) {
+    page += "<script>";
+    page += report_assets::kChartJs;
+    page += "</script>\n<script>\n" + script_ + "</script>\n";
+  }
+  return page + "</body></html>\n";
+}
+
+void Report::write(const std::filesystem::path& file) const {
+  std::error_code error;
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
+  std::ofstream stream(file);
+  stream << html();
+  if (!stream.flush()) throw FileError(file.string() + ": cannot be written");
+}
+
+}  // namespace bodyschema
