@@ -268,17 +268,24 @@ Camera::Camera(const PinholeIntrinsics& k) : intrinsics(k) {
 
 PlacedPart place(const Part& part, const Camera& camera, const Eigen::Isometry3f& X_CB) {
   PlacedPart placed;
-  placed.R_CB = X_CB.linear();
-  placed.p_CB = placed.R_CB * part.centre + X_CB.translation();
-  const Eigen::Vector3f& p = placed.p_CB;
+  const Eigen::Matrix3f A = X_CB.linear();
+  const Eigen::Vector3f p = A * part.centre + X_CB.translation();
+  placed.R_CB = A;
+  placed.p_CB = p;
+  // How much A may stretch a length: 1 for a rotation, a little more for the small changes of scale
+  // and shear that camera parameters bring (Gershgorin's bound on the eigenvalues of A'A).
+  const float stretch = std::sqrt((A.transpose() * A).cwiseAbs().rowwise().sum().maxCoeff());
+  const float radius = stretch * part.radius;
+  Eigen::Map<Eigen::Vector3f> camera_B(placed.camera_B);
+  camera_B = -(A.inverse() * p);
   // Written so that a NaN anywhere leaves the part out.
-  const bool sane = p.cwiseAbs().maxCoeff() < kFarthest_m && std::isfinite(placed.R_CB.sum());
-  if (!sane || !(p.z() + part.radius > kNearPlane_m)) return placed;
+  const bool sane = p.cwiseAbs().maxCoeff() < kFarthest_m && radius < kFarthest_m &&
+                    camera_B.cwiseAbs().maxCoeff() < kFarthest_m;
+  if (!sane || !(p.z() + radius > kNearPlane_m)) return placed;
   for (const auto& side : camera.sides) {
-    if (side.dot(p) < -part.radius) return placed;
+    if (side.dot(p) < -radius) return placed;
   }
-  placed.view = p.z() - part.radius > kNearPlane_m ? View::kInFront : View::kCut;
-  Eigen::Map<Eigen::Vector3f>(placed.camera_B) = -(placed.R_CB.transpose() * p);
+  placed.view = p.z() - radius > kNearPlane_m ? View::kInFront : View::kCut;
   const auto& k = camera.intrinsics;
   const auto fx = static_cast<float>(k.fx), fy = static_cast<float>(k.fy);
   const auto cx = static_cast<float>(k.cx), cy = static_cast<float>(k.cy);

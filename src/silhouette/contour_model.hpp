@@ -69,7 +69,7 @@ struct Camera {
 /// Pose of a part in a camera, in the terms the kernels want.
 struct PlacedPart {
   View view = View::kInvisible;
-  Eigen::Matrix3f R_CB;
+  Eigen::Matrix3f R_CB;          ///< a rotation, or nearly one (see SilhouetteScorer::score)
   Eigen::Vector3f p_CB;          ///< of the part's centre
   float camera_B[3] = {0, 0, 0};  ///< camera centre, centred part frame
   float P[12] = {0};             ///< centred part frame to homogeneous pixels

@@ -136,6 +136,26 @@ TEST_P(Engine, MonoHandWithValidMask) {
   expect_scores(*scorer, model, cameras, observed, synthetic::stereo_particles(10, 1, 4));
 }
 
+// A focal length changed by s scales camera x and y; a moved principal point shears them.
+TEST_P(Engine, PosesMayScaleAndShear) {
+  auto model = synthetic::hand(2000);
+  model.parts.front() = half_of(model.parts.front());
+  const std::vector cameras{synthetic::camera(320, 240)};
+  auto X_CB = synthetic::stereo_particles(8, 1, 18);
+  for (std::size_t i = 0; i < X_CB.size(); ++i) {
+    const float much = 0.02f * static_cast<float>(i / 17);  // up to 14 %
+    Eigen::Matrix3f warp;
+    warp << 1.0f + much, 0.0f, much, 0.0f, 1.0f - much, -0.5f * much, 0.0f, 0.0f, 1.0f;
+    X_CB[i].matrix().topRows<3>() = (warp * X_CB[i].matrix().topRows<3>()).eval();
+    X_CB[i].linear() *= 1.0f + 0.5f * much;
+  }
+  for (const auto culling : {FaceCulling::kNone, FaceCulling::kBack}) {
+    model.culling = culling;
+    const auto scorer = make(model, cameras);
+    expect_scores(*scorer, model, cameras, observe(model, cameras, 19), X_CB);
+  }
+}
+
 TEST_P(Engine, OddSizesAndDifferentCameras) {
   const auto model = synthetic::hand(2000);
   const std::vector cameras{synthetic::camera(161, 119), synthetic::camera(333, 77)};

@@ -49,7 +49,9 @@ class SilhouetteScorer {
   /// std::invalid_argument.
   virtual void set_observation(std::span<const ObservedSilhouette> observed) = 0;
 
-  /// @param X_CB  pose of each part in each camera, row-major [particle][camera][part]
+  /// @param X_CB  pose of each part in each camera, row-major [particle][camera][part]. The linear
+  ///   part may differ from a rotation by scale and shear (not by a reflection): camera parameters
+  ///   are folded in there. A pose that is not finite draws nothing.
   /// @param counts  out, row-major [particle][camera]; its size gives the number of particles
   /// A camera may be left out with `camera_mask` (bit c set: camera c is scored; counts of others
   /// are zero), for mono operation and dead cameras.
