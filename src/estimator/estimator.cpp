@@ -22,8 +22,28 @@ double elapsed_ms(Clock::time_point since) {
   return std::chrono::duration<double, std::milli>(Clock::now() - since).count();
 }
 
-std::vector<Parameter> make_parameters(const RobotModel& robot, const RobotSetup& setup,
-                                       const StereoRig& rig, const EstimatorOptions& options) {
+/// Head joints that move every camera. A joint of one eye alone changes the vergence, which is a
+/// parameter of its own.
+std::vector<std::string> shared_head_joints(const std::shared_ptr<const RobotModel>& robot,
+                                            const RobotSetup& setup, const StereoRig& rig) {
+  std::vector<std::string> links;
+  for (const auto& camera : rig.cameras) links.push_back(camera.link);
+  const ForwardKinematics kinematics(robot, links);
+  std::vector<std::string> joints;
+  for (const auto& name : setup.head_joints) {
+    bool all = true;
+    for (std::size_t c = 0; c < links.size(); ++c) {
+      all = all && kinematics.moves(robot->joint_index(name), c);
+    }
+    if (all) joints.push_back(name);
+  }
+  return joints;
+}
+
+std::vector<Parameter> make_parameters(const std::shared_ptr<const RobotModel>& model,
+                                       const RobotSetup& setup, const StereoRig& rig,
+                                       const EstimatorOptions& options) {
+  const RobotModel& robot = *model;
   std::vector<Parameter> parameters;
   for (const auto& name : setup.estimated_joints) {
     parameters.push_back({name, ParameterKind::kJointOffset, robot.joint_index(name),
@@ -32,7 +52,7 @@ std::vector<Parameter> make_parameters(const RobotModel& robot, const RobotSetup
   if (options.mode == EstimatorMode::kPaper) return parameters;
   const NuisancePriors& priors = options.priors;
   if (priors.head_rad > 0.0) {
-    for (const auto& name : setup.head_joints) {
+    for (const auto& name : shared_head_joints(model, setup, rig)) {
       parameters.push_back(
           {name, ParameterKind::kJointOffset, robot.joint_index(name), priors.head_rad});
     }
@@ -113,7 +133,7 @@ struct Estimator::Impl {
   Impl(std::shared_ptr<const RobotModel> robot_model, const RobotSetup& robot_setup,
        const StereoRig& stereo_rig, const EstimatorOptions& estimator_options)
       : options(estimator_options), setup(robot_setup), rig(stereo_rig),
-        parameters(make_parameters(*robot_model, setup, rig, options)),
+        parameters(make_parameters(robot_model, setup, rig, options)),
         silhouettes(make_silhouette_model(*robot_model, setup)),
         intrinsics(rig.intrinsics()),
         body(robot_model, setup, rig, parameters),

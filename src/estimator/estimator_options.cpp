@@ -36,7 +36,7 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
   o.memory_frames = best.number_or("memory_frames", o.memory_frames, 1.0, 1e9);
   o.lock_distance = best.number_or("lock_distance", o.lock_distance, 0.0, 1.0);
   o.lock_rms_px = best.number_or("lock_rms_px", o.lock_rms_px, 0.0, 1e3);
-  o.converged_hand_sd_m = 1e-3 * best.number_or("converged_hand_sd_mm", 0.7, 1e-6, 1e3);
+  o.converged_hand_sd_m = 1e-3 * best.number_or("converged_hand_sd_mm", 1.0, 1e-6, 1e3);
   const Configuration priors = best.section("prior_sd");
   o.priors.head_rad = radians(priors.number_or("head_deg", 0.0, 0.0, 90.0));
   o.priors.finger_curl_rad = radians(priors.number_or("finger_curl_deg", 0.0, 0.0, 90.0));
