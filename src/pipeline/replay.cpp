@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
@@ -102,6 +103,20 @@ class Replay {
     if (frames_.empty()) {
       throw DataError(options_.log.string() + ": no synchronised pictures and encoders in this log; " +
                       complaint_);
+    }
+    for (std::size_t c = 0; c < pipeline_.rig().cameras.size(); ++c) {
+      const bool seen = std::any_of(frames_.begin(), frames_.end(),
+                                    [&](const SeenFrame& frame) { return frame.utime[c] >= 0; });
+      if (seen) continue;
+      const auto& camera = pipeline_.rig().cameras[c];
+      if (statistics_.faults[static_cast<std::size_t>(MessageFault::kWrongSize)] > 0) {
+        throw DataError(fmt::format(
+            "{}: no picture of camera '{}' has the configured size {}x{} (cameras.{}.width, .height)",
+            options_.log.string(), camera.name, camera.intrinsics.width, camera.intrinsics.height,
+            camera.name));
+      }
+      spdlog::warn("{}: no usable picture of camera '{}'; estimated from the other one",
+                   options_.log.string(), camera.name);
     }
     estimates_.flush();
     if (!estimates_) throw FileError(options_.out.string() + ": disk full? estimates.jsonl is cut short");

@@ -123,6 +123,16 @@ TEST_F(ReplayTest, ALogWithoutOurChannelsIsRefused) {
   EXPECT_THROW(replay(configuration(), o), FileError);
 }
 
+TEST_F(ReplayTest, PicturesOfAnotherSizeThanConfiguredAreRefused) {
+  try {
+    replay(configuration({"cameras.left.width=640"}), options("size"));
+    FAIL() << "no error";
+  } catch (const DataError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("camera 'left'"));
+    EXPECT_THAT(e.what(), HasSubstr("640x240"));
+  }
+}
+
 TEST_F(ReplayTest, AnUnknownKeyIsRefused) {
   try {
     replay(configuration({"filter.particels=3"}), options("unknown"));
