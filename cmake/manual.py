@@ -15,7 +15,7 @@ class Help:
 
     def __init__(self, words):
         self.words = words
-        text = subprocess.run([*words, "--help"], capture_output=True, text=True, check=True,
+        text = subprocess.run([*words, "--help"], capture_output=True, encoding="utf-8", check=True,
                               timeout=30).stdout
         self.sections = {}  # title -> [(term, description)], or text for a section in prose
         self.description, self.usage = "", ""
@@ -120,9 +120,9 @@ def main():
             pages.append(page)
             todo += [[*page.words, command] for command in page.subcommands()]
         for page in pages:
-            (out / "man1" / f"{page.name}.1").write_text(man_page(page, version))
+            (out / "man1" / f"{page.name}.1").write_text(man_page(page, version), encoding="utf-8")
         name = pathlib.Path(program).name
-        (out / "completions" / name).write_text(completion(name, pages))
+        (out / "completions" / name).write_text(completion(name, pages), encoding="utf-8")
 
 
 if __name__ == "__main__":
