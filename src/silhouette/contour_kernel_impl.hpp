@@ -294,22 +294,29 @@ std::int32_t find(const EdgeRun& run, const float c[3], std::uint32_t* out) {
     return static_cast<std::int32_t>(out - begin);
   }
   const Floats distance = splat(__builtin_sqrtf(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]));
+  // Blocks that may hold contour edges are listed first and looked into afterwards: two loops that
+  // the processor predicts, instead of one that it does not.
+  constexpr std::int32_t kGroups = 32;
+  std::uint32_t open[kGroups * kLanes + kLanes];
   const std::int32_t groups = (run.block_count + kLanes - 1) / kLanes;
-  for (std::int32_t g = 0; g < groups; ++g) {
-    const BlockBounds& bounds = run.bounds[g];
-    const Floats middle = abs(side(bounds.nx, bounds.ny, bounds.nz, bounds.d, cx, cy, cz));
-    const Floats reach = fma(load(bounds.spread), distance, load(bounds.slack));
-    unsigned open = ~greater(middle, reach) & 0xFFu;
-    while (open != 0) {
-      const std::int32_t b = g * kLanes + __builtin_ctz(open);
-      open &= open - 1;
+  for (std::int32_t first = 0; first < groups; first += kGroups) {
+    std::uint32_t* open_end = open;
+    const std::int32_t last = first + kGroups < groups ? first + kGroups : groups;
+    for (std::int32_t g = first; g < last; ++g) {
+      const BlockBounds& bounds = run.bounds[g];
+      const Floats middle = abs(side(bounds.nx, bounds.ny, bounds.nz, bounds.d, cx, cy, cz));
+      const Floats reach = fma(load(bounds.spread), distance, load(bounds.slack));
+      append(~greater(middle, reach) & 0xFFu, 0, static_cast<std::uint32_t>(g * kLanes), open_end);
+    }
+    for (const std::uint32_t* entry = open; entry != open_end; ++entry) {
+      const std::uint32_t b = *entry >> 1;
       const EdgeBlock& block = run.blocks[b];
       const unsigned left = greater(
           side(block.left_nx, block.left_ny, block.left_nz, block.left_d, cx, cy, cz), splat(0.0f));
       const unsigned right =
           greater(side(block.right_nx, block.right_ny, block.right_nz, block.right_d, cx, cy, cz),
                   splat(0.0f));
-      append(left ^ right, left, static_cast<std::uint32_t>(b * kLanes), out);
+      append(left ^ right, left, b * kLanes, out);
     }
   }
   return static_cast<std::int32_t>(out - begin);
