@@ -48,7 +48,7 @@ int main(int argc, char** argv) {
   app.footer(
       "Examples:\n"
       "  bodyschemad --config config/icub_right/estimator.yaml\n"
-      "  bodyschemad --config config/icub_right/estimator.yaml --record reach.lcmlog\n"
+      "  bodyschemad --config config/icub_right/estimator.yaml --record reach.lcmlog --page 8080\n"
       "SIGTERM stops, SIGHUP reads the configuration again. Exit status: 0 stopped as asked, 2 wrong\n"
       "command line, configuration or file, 1 any other failure.");
   apps::CommonOptions common;
@@ -57,6 +57,7 @@ int main(int argc, char** argv) {
   std::string lcm_url;
   std::string record;
   std::string estimates;
+  int page = 0;
   bool check_config = false;
   common.add_to(app);
   app.add_option("-l,--lcm-url", lcm_url, "LCM network; default: $LCM_DEFAULT_URL, else this machine only");
@@ -66,6 +67,8 @@ int main(int argc, char** argv) {
   app.add_option("--stop-after-idle", options.stop_after_idle_s,
                  "Stop when nothing has come for so many seconds, once something has")
       ->check(CLI::Range(0.1, 1e6));
+  app.add_option("--page", page, "Serve the live page on this port of localhost: http://localhost:PORT/")
+      ->check(CLI::Range(1, 65535));
   app.add_flag("--timings", options.timings, "Print the time of each stage at the end");
   app.add_flag("--check-config", check_config, "Check configuration, robot and engine, and stop");
   try {
@@ -77,6 +80,7 @@ int main(int argc, char** argv) {
     options.lcm_url = resolve_lcm_url(lcm_url);
     if (!record.empty()) options.record = record;
     if (!estimates.empty()) options.estimates = estimates;
+    if (page > 0) options.page_port = page;
     if (check_config) {
       check_configuration(common, options.lcm_url);
     } else if (common.print_config) {

@@ -15,6 +15,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/pipeline/estimate_line.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/service/live_page.hpp"
 #include "bodyschema/service/notifier.hpp"
 #include "bodyschema/service/offsets_message.hpp"
 #include "bodyschema/service/start_up_checks.hpp"
@@ -113,6 +114,10 @@ class Daemon {
     auto pipeline = load(load_configuration_);
     open_files();
     for (const auto& complaint : check_network(options_.lcm_url)) spdlog::warn("{}", complaint);
+    if (options_.page_port) {
+      page_ = std::make_unique<LivePage>(*options_.page_port, camera_names(*pipeline));
+      spdlog::info("live page: {}", page_->url());
+    }
     start_session(std::move(pipeline));
     spdlog::info("waiting for encoders and pictures on {} and {} ({})",
                  channels().joint_state, channels().cameras, options_.lcm_url);
@@ -176,8 +181,15 @@ class Daemon {
     progress_.estimate = {};
     progress_.last_estimate_us = -1;
     progress_.cameras.clear();
-    for (const auto& camera : loaded.rig().cameras) progress_.cameras.push_back({.name = camera.name});
+    for (const auto& name : camera_names(loaded)) progress_.cameras.push_back({.name = name});
     progress_.camera_seen_us.assign(progress_.cameras.size(), -1);
+    if (page_) page_->start_anew(camera_names(loaded));
+  }
+
+  static std::vector<std::string> camera_names(const Pipeline& pipeline) {
+    std::vector<std::string> names;
+    for (const auto& camera : pipeline.rig().cameras) names.push_back(camera.name);
+    return names;
   }
 
   [[nodiscard]] Channels channels() const { return session_->pipeline->bus().channels(); }
@@ -238,11 +250,28 @@ class Daemon {
       progress_.stages.add(stages);
       note_cameras(observation, published);
     }
+    if (page_) show(observation, estimate);
     if (!ready_) {
       ready_ = true;
       notifier_.ready();
       spdlog::info("ready: the first pictures and encoders came together");
     }
+  }
+
+  /// Copies for the page, after the estimate has gone out; the outlines are predicted here, because
+  /// only this thread may ask the estimator.
+  void show(Observation& observation, const Estimate& estimate) {
+    page_->add(estimate);
+    if (!page_->wants_pictures(session_->queue.size() == 0)) return;
+    std::vector<CameraPicture> pictures;
+    Estimator& estimator = session_->pipeline->estimator();
+    for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
+      if (!observation.cameras[c]) continue;
+      pictures.push_back({c, {}, estimator.predicted_silhouette(observation, c, false),
+                          estimator.predicted_silhouette(observation, c, true)});
+      pictures.back().image = std::move(observation.cameras[c]->image);
+    }
+    page_->set_pictures(std::move(pictures));
   }
 
   /// monotonic_us() when the message was out.
@@ -336,6 +365,7 @@ class Daemon {
     }
     const offsets_status_t status = reporter_.report(facts, progress, recorder_.get());
     send(channels().offsets_status, encode(status));
+    if (page_) page_->set_status(status);
     const auto level = static_cast<HealthLevel>(status.level);
     notifier_.status(std::string(to_string(level)) + ": " + status.sentence);
     if (level != logged_level_) {
@@ -358,6 +388,7 @@ class Daemon {
   Notifier notifier_;
   std::unique_ptr<Recorder> recorder_;
   std::ofstream estimates_;
+  std::unique_ptr<LivePage> page_;
 
   std::mutex session_mutex_;  ///< held to replace the session, and by the reporter to use it
   std::unique_ptr<Session> session_;

@@ -218,6 +218,70 @@ void Player::work(const std::stop_token& stop) {
   }
 }
 
+Robot::Robot(const std::string& lcm_url, const fs::path& log, double speed) : link_(lcm_url), speed_(speed) {
+  LogReader reader(log);
+  for (LogEvent event; reader.next(event);) {
+    Message message;
+    message.time_us = event.time_us;
+    const int size = static_cast<int>(event.data.size());
+    if (event.channel == "ICUB_CAMERAS") {
+      message.pictures.emplace().decode(event.data.data(), 0, size);
+    } else if (event.channel == "ICUB_JOINT_STATE") {
+      message.joints.emplace().decode(event.data.data(), 0, size);
+    } else {
+      continue;
+    }
+    messages_.push_back(std::move(message));
+  }
+  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+}
+
+Robot::~Robot() = default;
+
+void Robot::set_faults(Faults faults) {
+  const std::lock_guard lock(mutex_);
+  faults_ = std::move(faults);
+}
+
+void Robot::work(const std::stop_token& stop) {
+  const Microseconds first = messages_.front().time_us;
+  const Microseconds length = messages_.back().time_us - first;
+  const auto start = Clock::now();
+  for (Microseconds lap = 0; !stop.stop_requested(); ++lap) {
+    const bool forwards = lap % 2 == 0;
+    for (std::size_t i = 0; i < messages_.size() && !stop.stop_requested(); ++i) {
+      const Message& message = messages_[forwards ? i : messages_.size() - 1 - i];
+      const Microseconds along = forwards ? message.time_us - first : length - (message.time_us - first);
+      const Microseconds now = lap * (length + 10'000) + along;
+      std::this_thread::sleep_until(
+          start + std::chrono::duration_cast<Clock::duration>(Seconds(seconds(now) / speed_)));
+      publish(message, forwards, first + now);
+    }
+  }
+}
+
+void Robot::publish(const Message& message, bool forwards, Microseconds now) {
+  const auto moved = [&](Microseconds stamp) {
+    return forwards ? now + (stamp - message.time_us) : now - (stamp - message.time_us);
+  };
+  const std::lock_guard lock(mutex_);
+  if (message.pictures) {
+    bot_core::images_t pictures = *message.pictures;
+    pictures.utime = moved(pictures.utime);
+    for (auto& image : pictures.images) image.utime = moved(image.utime);
+    if (faults_.pictures && !faults_.pictures(pictures, link_)) return;
+    link_.publish_message("ICUB_CAMERAS", now, pictures);
+  } else {
+    bot_core::joint_state_t joints = *message.joints;
+    joints.utime = moved(joints.utime);
+    if (!forwards) {
+      for (auto& velocity : joints.joint_velocity) velocity = -velocity;
+    }
+    if (faults_.joints && !faults_.joints(joints, link_)) return;
+    link_.publish_message("ICUB_JOINT_STATE", now, joints);
+  }
+}
+
 // --- logs ------------------------------------------------------------------------------------------
 
 std::string reach_configuration() {
@@ -226,22 +290,26 @@ std::string reach_configuration() {
 
 fs::path reach_log() {
   const fs::path file = fs::path(BODYSCHEMA_BINARY_DIR) / "test-logs" / "reach.lcmlog";
-  if (fs::exists(file)) return file;
+  if (fs::exists(file) && fs::exists(reach_truth())) return file;
   fs::create_directories(file.parent_path());
   // Tests run side by side: each writes under a name of its own, the last rename wins.
   const fs::path mine = file.string() + "." + std::to_string(getpid());
+  const fs::path truth = mine.string() + ".truth";
   const fs::path simulator = fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/simulator.yaml";
   {
     Scratch scratch;
     Process sim({"bodyschema-sim", "--config", simulator.string(), "--frames", "60", "--seed", "7", "--log",
-                 mine.string()},
+                 mine.string(), "--truth", truth.string()},
                 scratch.folder());
     const auto status = sim.wait(Seconds(120));
     if (status != 0) throw std::runtime_error("bodyschema-sim failed: " + sim.err());
   }
+  fs::rename(truth, reach_truth());
   fs::rename(mine, file);
   return file;
 }
+
+fs::path reach_truth() { return fs::path(BODYSCHEMA_BINARY_DIR) / "test-logs" / "reach_truth.json"; }
 
 std::map<Microseconds, std::string> estimates_by_utime(const fs::path& file) {
   std::map<Microseconds, std::string> lines;

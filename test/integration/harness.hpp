@@ -112,9 +112,45 @@ class Player {
   std::jthread thread_;
 };
 
+/// A robot that never ends: a log played forwards, then backwards, and so on, so that the arm moves
+/// without a jump for as long as a test needs. Stamps rise steadily.
+class Robot {
+ public:
+  /// Each may alter a message or keep it from going out (false), or publish more through the link.
+  struct Faults {
+    std::function<bool(bot_core::images_t&, LcmLink&)> pictures;
+    std::function<bool(bot_core::joint_state_t&, LcmLink&)> joints;
+  };
+  Robot(const std::string& lcm_url, const std::filesystem::path& log, double speed = 1.0);
+  ~Robot();
+  Robot(const Robot&) = delete;
+  Robot& operator=(const Robot&) = delete;
+
+  /// Takes effect from the next message on; {} heals.
+  void set_faults(Faults faults);
+
+ private:
+  struct Message {
+    Microseconds time_us = 0;
+    std::optional<bot_core::images_t> pictures;
+    std::optional<bot_core::joint_state_t> joints;
+  };
+  void work(const std::stop_token& stop);
+  void publish(const Message& message, bool forwards, Microseconds now);
+
+  LcmLink link_;
+  double speed_;
+  std::vector<Message> messages_;
+  std::mutex mutex_;
+  Faults faults_;
+  std::jthread thread_;
+};
+
 /// A reach of our own simulated robot, made once per build folder: stereo at 30 Hz, encoders at
 /// 100 Hz, empty frames first for the background.
 std::filesystem::path reach_log();
+/// What was true in it (the simulator's --truth).
+std::filesystem::path reach_truth();
 /// The configuration that goes with it.
 std::string reach_configuration();
 

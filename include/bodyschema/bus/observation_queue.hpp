@@ -47,6 +47,11 @@ class ObservationQueue {
     filled_.notify_all();
   }
 
+  [[nodiscard]] std::size_t size() const {
+    const std::lock_guard lock(mutex_);
+    return waiting_.size();
+  }
+
   /// Observations shed since construction.
   [[nodiscard]] std::uint64_t shed() const {
     const std::lock_guard lock(mutex_);

@@ -18,6 +18,7 @@ struct DaemonOptions {
   std::optional<std::filesystem::path> estimates;
   std::uint64_t frames = 0;        ///< stop after this many estimates; 0: do not
   double stop_after_idle_s = 0.0;  ///< stop when nothing has come for so long, once something has; 0: do not
+  std::optional<int> page_port;    ///< serve the live page on localhost
   bool timings = false;            ///< print a table of stage times at the end
   std::string version;
 };
