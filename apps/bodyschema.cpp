@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
   bodyschema::apps::add_replay(app);
   bodyschema::apps::add_export(app);
   bodyschema::apps::add_evaluate(app);
+  bodyschema::apps::add_diagnose(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -9,5 +9,6 @@ void add_evaluate(CLI::App& app);
 void add_export(CLI::App& app);
 void add_replay(CLI::App& app);
 void add_import_yarp(CLI::App& app);
+void add_diagnose(CLI::App& app);
 
 }  // namespace bodyschema::apps

@@ -19,7 +19,14 @@ class Backlash final : public Clonable<Backlash> {
   void forget() override { started_ = false; }
   void observe(const JointSample& sample) override {
     const double x = sample.q[joint_];
-    link_ = started_ ? play(x) : x;
+    if (!started_) {
+      link_ = steady_ = x;
+    } else {
+      const double dt = std::max(0.0, seconds(sample.utime - last_));
+      steady_ += (x - steady_) * (dt > 0.0 ? dt / (kSteady_s + dt) : 0.0);
+      link_ = play(steady_);
+    }
+    last_ = sample.utime;
     started_ = true;
   }
   void apply(const Instant& at, Corrections& add_to) const override {
@@ -36,8 +43,14 @@ class Backlash final : public Clonable<Backlash> {
     return std::clamp(link_, x - half, x + half);
   }
 
+  /// Encoder noise must not push the link to and fro; the link is only taken along by a mean over
+  /// about this time, short against any turn of the motion.
+  static constexpr double kSteady_s = 0.015;
+
   Eigen::Index joint_;
-  double link_ = 0.0;  ///< encoder angle at which the link stands
+  double link_ = 0.0;    ///< encoder angle at which the link stands
+  double steady_ = 0.0;  ///< encoder angle without its noise
+  Microseconds last_ = 0;
   bool started_ = false;
 };
 

@@ -1,0 +1,47 @@
+#include "bodyschema/diagnosis/log_diagnosis.hpp"
+
+#include <cstdio>
+#include <memory>
+
+#include "../common_options.hpp"
+#include "commands.hpp"
+
+namespace bodyschema::apps {
+
+void add_diagnose(CLI::App& app) {
+  struct Arguments {
+    CommonOptions common;
+    std::string log;
+    std::string out;
+    double rate_hz = 10.0;
+    int threads = 2;
+  };
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command =
+      app.add_subcommand("diagnose", "Say what the model of the robot gets wrong, from a recorded log");
+  command->footer(
+      "Example:\n  bodyschema diagnose babble.log --config config/icub_right/estimator.yaml --out out/diagnosis");
+  command->add_option("log", a->log, "LCM log")->required();
+  command->add_option("-o,--out", a->out, "Folder for report.json and extended_model.yaml")->required();
+  command->add_option("--picture-rate", a->rate_hz, "Pictures used per second and camera")
+      ->check(CLI::Range(0.5, 120.0));
+  command->add_option("--threads", a->threads, "Worker threads")->check(CLI::Range(1, 256));
+  a->common.add_to(*command);
+  command->callback([a] {
+    LogDiagnosisOptions options;
+    options.log = a->log;
+    options.out = a->out;
+    options.picture_rate_hz = a->rate_hz;
+    options.threads = a->threads;
+    const auto report = diagnose_log(a->common.load(), options);
+    std::printf("%s\n", report.sentence.c_str());
+    for (const auto& warning : report.warnings) std::printf("note: %s\n", warning.c_str());
+    std::printf("held out: %.3f -> %.3f px, hand %.2f -> %.2f mm, %.2f -> %.2f deg\n",
+                report.before.rms_px, report.after.rms_px, report.before.hand_mm,
+                report.after.hand_mm, report.before.hand_deg, report.after.hand_deg);
+    std::printf("not testable with this log: %zu causes; results in %s\n",
+                report.not_testable.size(), a->out.c_str());
+  });
+}
+
+}  // namespace bodyschema::apps

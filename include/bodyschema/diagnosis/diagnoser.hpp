@@ -1,0 +1,48 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bodyschema/diagnosis/diagnosis_report.hpp"
+#include "bodyschema/diagnosis/measurement.hpp"
+#include "bodyschema/diagnosis/selection.hpp"
+
+namespace bodyschema {
+
+struct DiagnosisOptions {
+  double block_s = 2.0;          ///< shortest block of the cross-validation
+  double shortest_log_s = 10.0;  ///< below it the log is refused
+  SelectionOptions selection;
+  int baseline_iterations = 8;
+  int refit_iterations = 4;
+  /// Effects that every real robot has and that the baseline fits beside the offsets. A joint or
+  /// source after a colon.
+  std::vector<CauseName> nuisances;
+  /// Sizes of nuisances, by effect name in the unit of its parameter, that are put up with: a
+  /// picture's blur and threshold alone make a mask a little fatter.
+  std::map<std::string, double> tolerances;
+  /// Causes that are not in this log whatever the data say, with the reason.
+  std::vector<NotTestable> excluded;
+  /// Instead of searching: exactly these causes are fitted (to measure what a known one is worth).
+  std::optional<std::vector<CauseName>> fixed_causes;
+  /// Where the fit of the offsets starts, rad by joint (encoder = true + offset); others at zero.
+  std::map<std::string, double> start_offsets;
+  /// Called before every linearisation of the baseline, counted from 0, and with a large number
+  /// before those of the refit: a source may narrow its search.
+  std::function<void(int)> before_iteration;
+  std::function<void(double)> progress;  ///< called with the share done
+};
+
+/// The usual nuisances for a robot: finger curl, mesh scale, mask dilation, vergence, neck roll,
+/// eye tilt and focal length.
+std::vector<CauseName> usual_nuisances(const JointRoles& roles);
+
+/// Says what the model gets wrong, from residuals. Steps: fit offsets and nuisances; compress;
+/// test the catalogue on blocks; refit with the causes found; measure the gain on held-out blocks.
+/// Throws DataError saying what to record when the log cannot be used at all.
+DiagnosisReport diagnose(MeasurementSource& source, const DiagnosisOptions& options);
+
+}  // namespace bodyschema

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bodyschema/effects/error_model.hpp"
+
+namespace bodyschema {
+
+/// A cause as people read it: an effect and what it acts on.
+struct CauseName {
+  std::string name;
+  std::string joint;   ///< empty for the whole robot
+  std::string source;  ///< second joint of a coupling, or which principal point
+  friend bool operator==(const CauseName&, const CauseName&) = default;
+  [[nodiscard]] std::string text() const;
+};
+
+struct EstimatedParameter {
+  std::string parameter;
+  std::string unit;
+  double estimate = 0.0;
+  std::array<double, 2> ci95{};
+};
+
+struct DiagnosedCause {
+  CauseName cause;       ///< name is "unexplained" for structure that no effect explains
+  std::string variable;  ///< unexplained: what the residual follows
+  std::vector<EstimatedParameter> parameters;
+  /// Causes that this log cannot tell apart from it, itself first. One entry: named.
+  std::vector<CauseName> same;
+  std::string advice;  ///< the motion that would tell them apart; empty for a class of one
+  double z = 0.0;
+  double heldout_gain = 0.0;  ///< share of the baseline's held-out loss
+};
+
+struct NotTestable {
+  CauseName cause;
+  std::string reason;
+};
+
+struct ExclusionLimit {
+  CauseName cause;
+  std::string parameter;
+  std::string unit;
+  double limit = 0.0;  ///< absolute value that is excluded with 95 % confidence
+};
+
+/// How well the model predicts blocks that its fit has not seen.
+struct HeldoutError {
+  double rms_px = 0.0;    ///< along the outline's normals
+  double hand_mm = 0.0;   ///< rms of the hand's displacement that the residuals ask for
+  double hand_deg = 0.0;
+};
+
+/// One bar of the chart of all candidates.
+struct CandidateBar {
+  std::string label;
+  bool generic = false;
+  bool nuisance = false;
+  bool testable = true;
+  double z_before = 0.0, gain_before = 0.0;  ///< against the baseline
+  double z_after = 0.0, gain_after = 0.0;    ///< against the extended model
+};
+
+/// What is left at one exposure, for the charts of structure: the correction of each arm joint
+/// alone that the residuals ask for, before and after the extension.
+struct ResidualSample {
+  double time_s = 0.0;
+  std::size_t camera = 0;
+  double rms_px_before = 0.0, rms_px_after = 0.0;
+  double mean_px_before = 0.0, mean_px_after = 0.0;  ///< mean along the outward normal
+  std::vector<double> angle_deg, velocity_deg_s, torque_nm;    ///< per arm joint
+  std::vector<double> apparent_deg_before, apparent_deg_after; ///< per arm joint
+  double image_radius_px = 0.0;  ///< of the hand's frame from the principal point
+  double depth_m = 0.0;
+};
+
+/// The answer to "what does the model of this robot get wrong?".
+struct DiagnosisReport {
+  std::string verdict;   ///< "none", "named", "class" or "unexplained"
+  std::string sentence;  ///< the same for people
+  std::vector<DiagnosedCause> causes;
+  std::vector<NotTestable> not_testable;
+  std::vector<ExclusionLimit> exclusion_limits;
+  HeldoutError before, after;
+  std::map<std::string, double> offsets_deg_before, offsets_deg_after;
+  std::map<std::string, std::array<double, 2>> offsets_ci95_deg;
+  std::vector<std::string> warnings;
+
+  // For charts.
+  std::vector<std::string> arm_joints;
+  std::vector<CandidateBar> bars;
+  double z_threshold = 0.0, gain_threshold = 0.0;
+  std::vector<ResidualSample> samples;
+  double duration_s = 0.0, block_s = 0.0, noise_correlation_s = 0.0;
+  std::size_t views = 0, blocks = 0;
+
+  /// What the models say the arm's joints are, minus the encoders, rad: views x arm joints. Causes
+  /// may trade a constant with the offsets; these sums do not.
+  Eigen::MatrixXd joint_corrections_before, joint_corrections_after;
+
+  /// Offsets, nuisances and causes with their estimates: the extended model.
+  std::optional<ErrorModel> extended_model;
+  std::optional<ErrorModel> baseline_model;
+
+  /// The keys of report.json.
+  [[nodiscard]] std::string to_json() const;
+  /// Writes report.json and extended_model.yaml; throws FileError.
+  void write(const std::filesystem::path& directory) const;
+};
+
+}  // namespace bodyschema

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bodyschema/diagnosis/block_statistics.hpp"
+#include "bodyschema/effects/effect.hpp"
+
+namespace bodyschema {
+
+/// A possible cause: an effect of the catalogue, or a generic feature that stands for "something
+/// that follows this variable on this joint".
+struct Candidate {
+  std::string name;        ///< the effect's name; "unexplained" for a generic feature
+  EffectTarget target;
+  std::string variable;    ///< generic features: what the residual follows ("velocity")
+  Columns columns;
+  /// Which fitted parameter of the effect each column is; a parameter that this log cannot tell from
+  /// the offsets has none.
+  std::vector<std::size_t> parameters;
+  bool nuisance = false;   ///< part of the baseline fit; reported when it is significant
+  double tolerance = 0.0;  ///< a nuisance below this (in units of its column) is not worth a word
+  bool slip = false;       ///< `columns` has one entry, switched on at its block
+  /// Whether it is a matter of time, which slow noise looks like.
+  [[nodiscard]] bool temporal() const { return slip || name == "drift" || variable == "time"; }
+  [[nodiscard]] bool generic() const { return name == "unexplained"; }
+  [[nodiscard]] std::string description() const;
+};
+
+struct SelectionOptions {
+  double z_enter = 4.5;
+  double gain_floor = 0.006;   ///< of the baseline's held-out loss
+  double t_enter = 1.5;        ///< paired over blocks
+  std::size_t far_group = 3;   ///< blocks held out together for causes in time: noise may be slow
+  double z_far = 3.5;          ///< ... and the z they must keep then
+  double z_same = 2.8;         ///< below it a cause counts as explained away by another
+  double t_same = 2.0;         ///< an alternative worse by more than this is not in the class
+  double t_generic = 2.0;      ///< a generic feature must beat named causes by this much
+  int max_causes = 6;
+  bool search = true;  ///< false: `fixed` are the causes
+  std::vector<std::size_t> fixed;
+};
+
+/// How a candidate fared when tested against the model so far.
+struct CandidateScore {
+  double z = 0.0;
+  double gain = 0.0;  ///< held-out loss it takes away, as a share of the baseline's
+  double t = 0.0;     ///< the same over its standard error between blocks
+  bool testable = true;
+};
+
+struct SelectedCause {
+  std::size_t candidate = 0;
+  CandidateScore score;
+  std::vector<std::size_t> same;  ///< other candidates that this log cannot tell apart from it
+};
+
+/// How large a cause could be without the data showing it.
+struct Limit {
+  std::size_t candidate = 0;
+  std::vector<double> limit;  ///< per column: excluded with 95 % confidence above this
+};
+
+struct Selection {
+  std::vector<SelectedCause> causes;
+  std::vector<std::size_t> model;  ///< candidates in the final fit: nuisances, then causes
+  std::vector<Limit> limits;       ///< of candidates that are not causes
+  std::vector<CandidateScore> first_scores;  ///< all candidates against the baseline
+  std::vector<CandidateScore> last_scores;   ///< all candidates against the final model
+  std::vector<std::size_t> not_testable;     ///< candidates without independent information
+  double baseline_heldout = 0.0;
+  double final_heldout = 0.0;
+};
+
+/// Decides which candidates the data asks for: greedy by held-out gain, with cluster-robust Wald z,
+/// then backwards drop, then the class of each.
+/// @param always  columns of the baseline that are not candidates (joint offsets)
+Selection select_causes(const BlockStatistics& statistics, const Columns& always,
+                        const std::vector<Candidate>& candidates,
+                        const SelectionOptions& options = {});
+
+}  // namespace bodyschema

@@ -1,0 +1,109 @@
+#include "bodyschema/diagnosis/diagnosis_report.hpp"
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// JSON has no infinities: what is not finite is null.
+Json number(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
+
+Json optional_text(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+
+Json json_of(const HeldoutError& e) {
+  return {{"rms_px", number(e.rms_px)}, {"hand_mm", number(e.hand_mm)}, {"hand_deg", number(e.hand_deg)}};
+}
+
+Json json_of(const CauseName& c) {
+  Json j = {{"name", c.name}, {"joint", optional_text(c.joint)}};
+  if (!c.source.empty()) j["source"] = c.source;
+  return j;
+}
+
+Json json_of(const EstimatedParameter& p) {
+  return {{"parameter", p.parameter}, {"unit", p.unit}, {"estimate", number(p.estimate)},
+          {"ci95", {number(p.ci95[0]), number(p.ci95[1])}}};
+}
+
+Json json_of(const DiagnosedCause& c) {
+  Json j = json_of(c.cause);
+  if (!c.variable.empty()) j["variable"] = c.variable;
+  // The parameter that is furthest from zero stands for the cause; all are listed as well.
+  const EstimatedParameter* first = nullptr;
+  double best = -1.0;
+  for (const auto& p : c.parameters) {
+    const double half = 0.5 * (p.ci95[1] - p.ci95[0]);
+    const double ratio = half > 0.0 ? std::abs(p.estimate) / half : 0.0;
+    if (ratio > best) {
+      best = ratio;
+      first = &p;
+    }
+  }
+  j["parameter"] = first ? Json(first->parameter) : Json(nullptr);
+  j["unit"] = first ? Json(first->unit) : Json(nullptr);
+  j["estimate"] = first ? number(first->estimate) : Json(nullptr);
+  j["ci95"] = first ? Json{number(first->ci95[0]), number(first->ci95[1])} : Json(nullptr);
+  j["class"] = Json::array();
+  for (const auto& s : c.same) j["class"].push_back(json_of(s));
+  j["z"] = number(c.z);
+  j["heldout_gain"] = number(c.heldout_gain);
+  j["parameters"] = Json::array();
+  for (const auto& p : c.parameters) j["parameters"].push_back(json_of(p));
+  if (!c.advice.empty()) j["motion_that_would_tell"] = c.advice;
+  return j;
+}
+
+}  // namespace
+
+std::string DiagnosisReport::to_json() const {
+  Json j;
+  j["verdict"] = verdict;
+  j["sentence"] = sentence;
+  j["causes"] = Json::array();
+  for (const auto& c : causes) j["causes"].push_back(json_of(c));
+  j["not_testable"] = Json::array();
+  for (const auto& n : not_testable) {
+    auto entry = json_of(n.cause);
+    entry["reason"] = n.reason;
+    j["not_testable"].push_back(entry);
+  }
+  j["exclusion_limits"] = Json::array();
+  for (const auto& l : exclusion_limits) {
+    auto entry = json_of(l.cause);
+    entry["parameter"] = l.parameter;
+    entry["unit"] = l.unit;
+    entry["limit"] = number(l.limit);
+    j["exclusion_limits"].push_back(entry);
+  }
+  j["heldout"] = {{"before", json_of(before)}, {"after", json_of(after)}};
+  j["offsets_deg"] = {{"before", Json::object()}, {"after", Json::object()}};
+  for (const auto& [joint, value] : offsets_deg_before) j["offsets_deg"]["before"][joint] = number(value);
+  for (const auto& [joint, value] : offsets_deg_after) j["offsets_deg"]["after"][joint] = number(value);
+  j["offsets_ci95_deg"] = Json::object();
+  for (const auto& [joint, ci] : offsets_ci95_deg) {
+    j["offsets_ci95_deg"][joint] = {number(ci[0]), number(ci[1])};
+  }
+  j["log"] = {{"duration_s", number(duration_s)}, {"views", views}, {"blocks", blocks},
+              {"block_s", number(block_s)}, {"noise_correlation_s", number(noise_correlation_s)}};
+  j["warnings"] = warnings;
+  return j.dump(2) + "\n";
+}
+
+void DiagnosisReport::write(const std::filesystem::path& directory) const {
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  const auto file = directory / "report.json";
+  std::ofstream out(file);
+  out << to_json();
+  out.close();
+  if (!out) throw FileError(file.string() + ": cannot be written");
+  if (extended_model) extended_model->save(directory / "extended_model.yaml");
+}
+
+}  // namespace bodyschema

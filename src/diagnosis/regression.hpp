@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bodyschema/diagnosis/block_statistics.hpp"
+#include "bodyschema/diagnosis/measurement.hpp"
+#include "bodyschema/diagnosis/selection.hpp"
+#include "bodyschema/effects/error_model.hpp"
+
+namespace bodyschema::diagnosis {
+
+/// All views linearised about one error model.
+struct Linearisation {
+  std::vector<Instant> instants;         ///< one per view
+  std::vector<Corrections> corrections;  ///< what the model said there
+  std::vector<CompressedView> views;
+  [[nodiscard]] double rms_px() const;
+};
+
+/// Plays the encoder log through the model and compresses every view about its prediction.
+Linearisation linearise(MeasurementSource& source, ErrorModel model);
+
+/// A column of the regression as a map: per view, the coordinates it moves and by how much.
+struct SparseColumn {
+  struct Entry {
+    std::uint32_t coordinate;
+    float value;
+  };
+  std::vector<std::vector<Entry>> views;
+};
+
+/// Which block each view belongs to.
+struct BlockPlan {
+  std::vector<std::size_t> block_of_view;
+  std::vector<double> weight_of_view;  ///< below one in a static hold, which repeats itself
+  std::vector<double> start_s;         ///< per block
+  double length_s = 0.0;
+  double correlation_s = 0.0;  ///< of the noise, measured in static holds; 0 when there is none
+  double still_share = 0.0;
+};
+
+/// Blocks of at least `shortest_s` and five noise correlation times, measured where the arm stands
+/// still. A static hold shows one posture again and again, so it counts as one block.
+BlockPlan plan_blocks(const MeasurementSource& source, const Linearisation& linearisation,
+                      double shortest_s);
+
+/// Columns for the fitted parameters of effects, taken one at a time: the change of the
+/// corrections per `typical` of the parameter. For an effect at zero this is the secant to its
+/// typical size, otherwise the derivative.
+std::vector<SparseColumn> effect_columns(MeasurementSource& source, const Linearisation& at,
+                                         const std::vector<std::unique_ptr<Effect>>& effects,
+                                         const CoordinateLayout& layout);
+
+/// A column that moves one joint by `value(view)` radians.
+SparseColumn joint_column(const CoordinateLayout& layout, Eigen::Index joint,
+                          const std::vector<double>& value);
+
+BlockStatistics accumulate(const std::vector<CompressedView>& views, const BlockPlan& plan,
+                           const std::vector<const SparseColumn*>& columns);
+
+/// Acceleration of every joint at every view, rad/s^2, from the velocities of the log.
+std::vector<Eigen::VectorXd> accelerations(const MeasurementSource& source);
+
+}  // namespace bodyschema::diagnosis

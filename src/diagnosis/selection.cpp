@@ -1,0 +1,406 @@
+#include "bodyschema/diagnosis/selection.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace bodyschema {
+namespace {
+
+using Ids = std::vector<std::size_t>;
+
+bool contains(const Ids& ids, std::size_t id) {
+  return std::find(ids.begin(), ids.end(), id) != ids.end();
+}
+
+Ids without(Ids ids, std::size_t id) {
+  std::erase(ids, id);
+  return ids;
+}
+
+Ids with(Ids ids, std::size_t id) {
+  ids.push_back(id);
+  return ids;
+}
+
+/// The same cause at another time is the same cause; so are two shapes of one generic variable.
+bool same_cause(const Candidate& a, const Candidate& b) {
+  return a.name == b.name && a.target == b.target && a.variable == b.variable;
+}
+
+class Selector {
+ public:
+  Selector(const BlockStatistics& statistics, const Columns& always,
+           const std::vector<Candidate>& candidates, const SelectionOptions& options)
+      : statistics_(statistics), always_(always), candidates_(candidates), options_(options) {
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      if (candidates[c].nuisance) model_.push_back(c);
+    }
+  }
+
+  Selection run() {
+    Selection result;
+    drop_dependent_nuisances(result);
+    current_ = fit(model_);
+    baseline_ = current_.heldout();
+    result.baseline_heldout = baseline_;
+    find_floor();
+    result.first_scores = score_all();
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      if (!result.first_scores[c].testable && !contains(result.not_testable, c)) {
+        result.not_testable.push_back(c);
+      }
+    }
+    if (options_.search) {
+      add_causes();
+      simplify();
+      drop_causes();
+    } else {
+      for (const auto c : options_.fixed) {
+        if (!contains(model_, c) && fit(with(model_, c)).usable) {
+          causes_.push_back(c);
+          model_.push_back(c);
+        }
+      }
+      current_ = fit(model_);
+    }
+    for (const auto c : reported()) result.causes.push_back(describe(c));
+    std::stable_sort(result.causes.begin(), result.causes.end(),
+                     [](const auto& a, const auto& b) { return a.score.gain > b.score.gain; });
+    result.model = model_;
+    result.last_scores = score_all();
+    find_limits(result);
+    result.final_heldout = current_.heldout();
+    return result;
+  }
+
+ private:
+  struct Trial {
+    CandidateScore score;
+    Eigen::VectorXd loss;  ///< held out, with the candidate
+  };
+
+  [[nodiscard]] BlockFit fit(const Ids& ids, std::size_t group = 1) const {
+    Columns columns = always_;
+    for (const auto c : ids) {
+      columns.insert(columns.end(), candidates_[c].columns.begin(), candidates_[c].columns.end());
+    }
+    return statistics_.fit(columns, group);
+  }
+
+  /// Position of a candidate's first column in the fit of `ids`.
+  [[nodiscard]] Eigen::Index position(const Ids& ids, std::size_t candidate) const {
+    auto at = static_cast<Eigen::Index>(always_.size());
+    for (const auto c : ids) {
+      if (c == candidate) break;
+      at += static_cast<Eigen::Index>(candidates_[c].columns.size());
+    }
+    return at;
+  }
+
+  /// Wald z of a candidate inside a fit, from the jackknife covariance; where that is smaller than
+  /// the catalogue's median dispersion allows (luck, or too few blocks), the median holds.
+  [[nodiscard]] double wald_z(const BlockFit& f, const Ids& ids, std::size_t candidate) const {
+    const auto at = position(ids, candidate);
+    const auto n = static_cast<Eigen::Index>(candidates_[candidate].columns.size());
+    const Eigen::VectorXd theta = f.estimate.segment(at, n);
+    Eigen::MatrixXd V = f.covariance.block(at, at, n, n);
+    const double dispersion =
+        (V.diagonal().array() / f.model_variance.segment(at, n).array()).mean();
+    if (dispersion < floor_) V *= floor_ / dispersion;
+    V += 1e-12 * V.trace() * Eigen::MatrixXd::Identity(n, n);
+    return equivalent_z(theta.dot(V.ldlt().solve(theta)), n);
+  }
+
+  /// A candidate against the model so far; for one that is in the model, against the model without.
+  [[nodiscard]] Trial test(std::size_t candidate) const {
+    Trial trial;
+    if (contains(model_, candidate)) {
+      const auto reduced = fit(without(model_, candidate));
+      trial.loss = current_.heldout_loss;
+      trial.score.z = wald_z(current_, model_, candidate);
+      trial.score.gain = (reduced.heldout() - current_.heldout()) / baseline_;
+      trial.score.t = advantage(candidate, reduced.heldout_loss, current_.heldout_loss);
+      return trial;
+    }
+    const auto extended_model = with(model_, candidate);
+    const auto extended = fit(extended_model);
+    trial.score.testable = extended.usable;
+    if (!extended.usable) return trial;
+    trial.loss = extended.heldout_loss;
+    trial.score.z = wald_z(extended, extended_model, candidate);
+    trial.score.gain = (current_.heldout() - extended.heldout()) / baseline_;
+    trial.score.t = advantage(candidate, current_.heldout_loss, extended.heldout_loss);
+    return trial;
+  }
+
+  /// Paired t of the blocks' held-out losses. A slip near an end of the log changes few blocks; it
+  /// is judged on the side of it where it shows most.
+  [[nodiscard]] double advantage(std::size_t candidate, const Eigen::VectorXd& without_it,
+                                 const Eigen::VectorXd& with_it) const {
+    double t = paired_t(without_it, with_it);
+    if (!candidates_[candidate].slip) return t;
+    const auto from = static_cast<Eigen::Index>(candidates_[candidate].columns.front().from_block);
+    const Eigen::Index n = without_it.size();
+    if (from >= 2) t = std::max(t, paired_t(without_it.head(from), with_it.head(from)));
+    if (n - from >= 2) t = std::max(t, paired_t(without_it.tail(n - from), with_it.tail(n - from)));
+    return t;
+  }
+
+  [[nodiscard]] bool enters(std::size_t candidate, const CandidateScore& s) const {
+    return s.testable && s.z > options_.z_enter && s.gain > options_.gain_floor &&
+           s.t > options_.t_enter && (!candidates_[candidate].temporal() || lasts(candidate));
+  }
+
+  /// Whether a cause in time also predicts stretches that lie far from what its fit has seen. Slow
+  /// noise follows any smooth curve into the next block, but not further.
+  [[nodiscard]] bool lasts(std::size_t candidate) const {
+    const auto rest = without(model_, candidate);
+    const auto plain = fit(rest, options_.far_group);
+    const auto extended_model = with(rest, candidate);
+    const auto extended = fit(extended_model, options_.far_group);
+    if (!plain.usable) return false;
+    if (!extended.usable) return candidates_[candidate].slip;  // near an end: one group holds it all
+    const auto z = wald_z(extended, extended_model, candidate);
+    return z > options_.z_far && (plain.heldout() - extended.heldout()) / baseline_ > options_.gain_floor;
+  }
+
+  [[nodiscard]] std::vector<CandidateScore> score_all() const {
+    std::vector<CandidateScore> scores(candidates_.size());
+    for (std::size_t c = 0; c < candidates_.size(); ++c) scores[c] = test(c).score;
+    return scores;
+  }
+
+  /// Nuisances that this log cannot tell from the offsets are not fitted.
+  void drop_dependent_nuisances(Selection& result) {
+    Ids kept;
+    for (const auto c : model_) {
+      if (fit(with(kept, c)).usable) {
+        kept.push_back(c);
+      } else {
+        result.not_testable.push_back(c);
+      }
+    }
+    model_ = kept;
+  }
+
+  void find_floor() {
+    std::vector<double> dispersions;
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      if (candidates_[c].generic() || candidates_[c].slip) continue;
+      const auto ids = contains(model_, c) ? model_ : with(model_, c);
+      const auto f = fit(ids);
+      if (!f.usable) continue;
+      const auto at = position(ids, c);
+      dispersions.push_back(f.covariance(at, at) / f.model_variance[at]);
+    }
+    if (dispersions.empty()) return;
+    const auto middle = dispersions.begin() + static_cast<std::ptrdiff_t>(dispersions.size() / 2);
+    std::nth_element(dispersions.begin(), middle, dispersions.end());
+    floor_ = *middle;
+  }
+
+  /// One step of the greedy search: the candidate that takes away most held-out loss, a generic
+  /// feature only where it beats every named cause clearly.
+  [[nodiscard]] std::optional<std::size_t> best_addition() const {
+    std::optional<std::size_t> named, generic;
+    Trial named_trial, generic_trial;
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      if (contains(model_, c) || blocked(c)) continue;
+      auto trial = test(c);
+      auto& best = candidates_[c].generic() ? generic : named;
+      auto& best_trial = candidates_[c].generic() ? generic_trial : named_trial;
+      // The dear test last.
+      if ((!best || trial.score.gain > best_trial.score.gain) && enters(c, trial.score)) {
+        best = c;
+        best_trial = std::move(trial);
+      }
+    }
+    if (!named) return generic;
+    if (generic && paired_t(named_trial.loss, generic_trial.loss) > options_.t_generic) {
+      return generic;
+    }
+    return named;
+  }
+
+  /// A cause that is already in the model, at another time or in another shape.
+  [[nodiscard]] bool blocked(std::size_t candidate) const {
+    return contains(dropped_, candidate) ||
+           std::any_of(causes_.begin(), causes_.end(), [&](std::size_t c) {
+             return same_cause(candidates_[c], candidates_[candidate]) && !candidates_[c].slip &&
+                    !candidates_[c].generic();
+           });
+  }
+
+  void add_causes() {
+    while (static_cast<int>(causes_.size()) < options_.max_causes) {
+      const auto best = best_addition();
+      if (!best) return;
+      causes_.push_back(*best);
+      model_.push_back(*best);
+      current_ = fit(model_);
+      drop_causes();
+    }
+  }
+
+  /// Causes that later ones have made superfluous.
+  void drop_causes() {
+    for (bool again = true; again;) {
+      again = false;
+      for (const auto c : causes_) {
+        if (enters(c, test(c).score)) continue;
+        remove(c);
+        dropped_.push_back(c);
+        again = true;
+        break;
+      }
+    }
+  }
+
+  void remove(std::size_t c) {
+    std::erase(causes_, c);
+    std::erase(model_, c);
+    current_ = fit(model_);
+  }
+
+  /// Whether a nuisance is clearly larger than what one puts up with.
+  [[nodiscard]] bool beyond_tolerance(std::size_t c) const {
+    if (candidates_[c].tolerance <= 0.0) return true;
+    const auto at = position(model_, c);
+    for (std::size_t i = 0; i < candidates_[c].columns.size(); ++i) {
+      const auto k = at + static_cast<Eigen::Index>(i);
+      const double sd = std::sqrt(current_.covariance(k, k));
+      if (std::abs(current_.estimate[k]) - 2.0 * sd > candidates_[c].tolerance) return true;
+    }
+    return false;
+  }
+
+  /// Causes and nuisances that the data asks for.
+  [[nodiscard]] Ids reported() const {
+    Ids list;
+    for (const auto c : model_) {
+      if (contains(causes_, c) || (enters(c, test(c).score) && beyond_tolerance(c))) list.push_back(c);
+    }
+    return list;
+  }
+
+  /// One cause outside the baseline can look like several nuisances inside it. Where one candidate
+  /// makes two or more reported causes superfluous and the fit stays as good, it replaces them.
+  void simplify() {
+    for (int round = 0; round < 3; ++round) {
+      const auto list = reported();
+      if (list.size() < 2) return;
+      std::optional<std::size_t> best;
+      Ids best_killed;
+      double best_loss = 0.0;
+      for (std::size_t a = 0; a < candidates_.size(); ++a) {
+        if (contains(model_, a) || candidates_[a].generic() || blocked(a)) continue;
+        const auto extended_model = with(model_, a);
+        const auto extended = fit(extended_model);
+        if (!extended.usable) continue;
+        Ids killed;
+        for (const auto c : list) {
+          if (wald_z(extended, extended_model, c) < options_.z_same) killed.push_back(c);
+        }
+        if (killed.size() < 2) continue;
+        auto reduced_model = extended_model;
+        for (const auto c : killed) std::erase(reduced_model, c);
+        const auto reduced = fit(reduced_model);
+        if (!reduced.usable ||
+            paired_t(reduced.heldout_loss, current_.heldout_loss) > options_.t_same) {
+          continue;
+        }
+        if (!best || killed.size() > best_killed.size() ||
+            (killed.size() == best_killed.size() && reduced.heldout() < best_loss)) {
+          best = a;
+          best_killed = killed;
+          best_loss = reduced.heldout();
+        }
+      }
+      if (!best) return;
+      for (const auto c : best_killed) remove(c);
+      causes_.push_back(*best);
+      model_.push_back(*best);
+      current_ = fit(model_);
+    }
+  }
+
+  /// The class of a cause: every candidate that explains it away and, in its place, is not clearly
+  /// worse on held-out blocks. The one that does best is listed first.
+  [[nodiscard]] SelectedCause describe(std::size_t cause) const {
+    SelectedCause result{cause, test(cause).score, {}};
+    if (candidates_[cause].generic()) return result;
+    const auto rest = without(model_, cause);
+    std::vector<std::pair<double, std::size_t>> same;
+    for (std::size_t a = 0; a < candidates_.size(); ++a) {
+      if (contains(model_, a) || candidates_[a].generic() ||
+          same_cause(candidates_[a], candidates_[cause])) {
+        continue;
+      }
+      const auto both_model = with(model_, a);
+      const auto both = fit(both_model);
+      const auto instead = fit(with(rest, a));
+      if (!instead.usable) continue;
+      // Exactly aliased: together they cannot be fitted at all.
+      if (both.usable && wald_z(both, both_model, cause) > options_.z_same) continue;
+      if (paired_t(instead.heldout_loss, current_.heldout_loss) > options_.t_same) continue;
+      same.emplace_back(instead.heldout(), a);
+    }
+    std::sort(same.begin(), same.end());
+    for (const auto& [loss, a] : same) {
+      const bool listed = std::any_of(result.same.begin(), result.same.end(), [&](std::size_t b) {
+        return same_cause(candidates_[a], candidates_[b]);
+      });
+      if (!listed) result.same.push_back(a);
+    }
+    if (!same.empty() && same.front().first < current_.heldout()) {
+      std::swap(result.candidate, result.same.front());
+    }
+    return result;
+  }
+
+  void find_limits(Selection& result) const {
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      if (candidates_[c].generic() || candidates_[c].slip || contains(causes_, c)) continue;
+      const auto ids = contains(model_, c) ? model_ : with(model_, c);
+      const auto f = fit(ids);
+      if (!f.usable) continue;
+      const auto at = position(ids, c);
+      Limit limit{c, {}};
+      for (std::size_t i = 0; i < candidates_[c].columns.size(); ++i) {
+        const auto k = at + static_cast<Eigen::Index>(i);
+        const double variance = std::max(f.covariance(k, k), floor_ * f.model_variance[k]);
+        limit.limit.push_back(std::abs(f.estimate[k]) + 1.96 * std::sqrt(variance));
+      }
+      result.limits.push_back(std::move(limit));
+    }
+  }
+
+  const BlockStatistics& statistics_;
+  const Columns& always_;
+  const std::vector<Candidate>& candidates_;
+  const SelectionOptions& options_;
+  Ids model_;    ///< candidates in the fit: nuisances, then causes
+  Ids causes_;   ///< those that were added
+  Ids dropped_;  ///< and those that were dropped again: not tried twice
+  BlockFit current_;
+  double baseline_ = 1.0;
+  double floor_ = 0.0;
+};
+
+}  // namespace
+
+std::string Candidate::description() const {
+  std::string text = generic() ? "unexplained " + variable : name;
+  if (!target.joint.empty()) text += (generic() ? " on " : " of ") + target.joint;
+  if (!target.source.empty()) text += (target.joint.empty() ? " " : " with ") + target.source;
+  return text;
+}
+
+Selection select_causes(const BlockStatistics& statistics, const Columns& always,
+                        const std::vector<Candidate>& candidates,
+                        const SelectionOptions& options) {
+  return Selector(statistics, always, candidates, options).run();
+}
+
+}  // namespace bodyschema

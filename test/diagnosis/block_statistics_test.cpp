@@ -1,0 +1,132 @@
+#include "bodyschema/diagnosis/block_statistics.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "diagnosis/trial_robot.hpp"
+
+namespace bodyschema {
+namespace {
+
+/// Rows of an ordinary regression, gathered into blocks.
+struct Regression {
+  Eigen::MatrixXd X;
+  Eigen::VectorXd y;
+  Eigen::Index blocks;
+
+  [[nodiscard]] BlockStatistics statistics() const {
+    std::vector<BlockStatistics::Block> list;
+    const Eigen::Index n = X.rows() / blocks;
+    for (Eigen::Index b = 0; b < blocks; ++b) {
+      const Eigen::MatrixXd x = X.middleRows(b * n, n);
+      const Eigen::VectorXd r = y.segment(b * n, n);
+      list.push_back({x.transpose() * x, x.transpose() * r, r.squaredNorm(), static_cast<double>(n)});
+    }
+    return BlockStatistics(std::move(list));
+  }
+};
+
+Regression regression(std::uint64_t seed, double noise, double block_noise) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  Regression r{Eigen::MatrixXd(400, 3), Eigen::VectorXd(400), 20};
+  for (Eigen::Index i = 0; i < 400; ++i) {
+    r.X.row(i) << 1.0, normal(random), normal(random);
+    r.y[i] = 2.0 - r.X(i, 1) + 0.5 * r.X(i, 2) + noise * normal(random);
+  }
+  for (Eigen::Index b = 0; b < 20; ++b) {
+    r.y.segment(b * 20, 20).array() += block_noise * normal(random);
+  }
+  return r;
+}
+
+TEST(BlockStatistics, FitsLikeOrdinaryLeastSquares) {
+  const auto r = regression(test::seed(), 0.3, 0.0);
+  const auto fit = r.statistics().fit({{0}, {1}, {2}});
+  ASSERT_TRUE(fit.usable);
+  const Eigen::VectorXd expected = r.X.colPivHouseholderQr().solve(r.y);
+  EXPECT_LT((fit.estimate - expected).norm(), 1e-9);
+  EXPECT_NEAR(fit.loss, (r.y - r.X * expected).squaredNorm(), 1e-8);
+}
+
+TEST(BlockStatistics, HoldsOutWhatItSaysItHoldsOut) {
+  const auto r = regression(test::seed(), 0.3, 0.2);
+  const auto fit = r.statistics().fit({{0}, {1}, {2}});
+  ASSERT_TRUE(fit.usable);
+  for (const Eigen::Index b : {0, 7, 19}) {
+    Eigen::MatrixXd X(380, 3);
+    Eigen::VectorXd y(380);
+    X << r.X.topRows(b * 20), r.X.bottomRows(380 - b * 20);
+    y << r.y.head(b * 20), r.y.tail(380 - b * 20);
+    const Eigen::VectorXd without = X.colPivHouseholderQr().solve(y);
+    EXPECT_LT((fit.replicas.col(b) - without).norm(), 1e-9);
+    EXPECT_NEAR(fit.heldout_loss[b],
+                (r.y.segment(b * 20, 20) - r.X.middleRows(b * 20, 20) * without).squaredNorm(), 1e-8);
+  }
+}
+
+TEST(BlockStatistics, JackknifeSeesNoiseThatBlocksShare) {
+  // The constant's error is that of 20 block means, not of 400 rows.
+  double honest = 0.0, naive = 0.0;
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    const auto fit = regression(test::seed() + i, 0.1, 0.5).statistics().fit({{0}, {1}, {2}});
+    honest += std::sqrt(fit.covariance(0, 0)) / 20;
+    naive += 0.1 * std::sqrt(fit.model_variance[0]) / 20;
+  }
+  EXPECT_NEAR(honest, 0.5 / std::sqrt(20.0), 0.03);
+  EXPECT_LT(naive, 0.3 * honest);
+}
+
+TEST(BlockStatistics, DuplicatedRowsSharpenNothing) {
+  const auto r = regression(test::seed(), 0.3, 0.2);
+  auto twice = r;
+  twice.X.resize(800, 3);
+  twice.y.resize(800);
+  for (Eigen::Index b = 0; b < 20; ++b) {
+    for (const Eigen::Index copy : {0, 1}) {
+      twice.X.middleRows(b * 40 + copy * 20, 20) = r.X.middleRows(b * 20, 20);
+      twice.y.segment(b * 40 + copy * 20, 20) = r.y.segment(b * 20, 20);
+    }
+  }
+  const auto one = r.statistics().fit({{0}, {1}, {2}}), two = twice.statistics().fit({{0}, {1}, {2}});
+  EXPECT_LT((one.covariance - two.covariance).norm(), 1e-9 * one.covariance.norm() + 1e-12);
+}
+
+TEST(BlockStatistics, RefusesColumnsThatAreNotIndependent) {
+  auto r = regression(test::seed(), 0.3, 0.0);
+  r.X.col(2) = 2.0 * r.X.col(0) - r.X.col(1);
+  EXPECT_FALSE(r.statistics().fit({{0}, {1}, {2}}).usable);
+  r.X.col(2).setZero();
+  EXPECT_FALSE(r.statistics().fit({{0}, {2}}).usable);
+  // A column that lives in one block cannot be judged on that block.
+  r.X.col(2).head(20).setOnes();
+  EXPECT_FALSE(r.statistics().fit({{0}, {2}}).usable);
+}
+
+TEST(BlockStatistics, AColumnCanBeginWithABlock) {
+  auto r = regression(test::seed(), 0.1, 0.0);
+  r.y.tail(200).array() += 3.0;
+  const auto fit = r.statistics().fit({{0}, {1}, {2}, {0, 10}});
+  ASSERT_TRUE(fit.usable);
+  EXPECT_NEAR(fit.estimate[3], 3.0, 0.05);
+}
+
+TEST(EquivalentZ, AgreesWithChiSquareTables) {
+  EXPECT_DOUBLE_EQ(equivalent_z(9.0, 1), 3.0);
+  EXPECT_NEAR(equivalent_z(5.991, 2), 1.645, 0.02);   // 95 % one-sided
+  EXPECT_NEAR(equivalent_z(11.070, 5), 1.645, 0.02);
+  EXPECT_NEAR(equivalent_z(13.816, 2), 3.09, 0.05);   // 99.9 %
+  EXPECT_LT(equivalent_z(100.0, 6), 10.0);
+  EXPECT_GT(equivalent_z(100.0, 6), 6.0);
+}
+
+TEST(PairedT, IsTheUsualOne) {
+  Eigen::VectorXd a(4), b = Eigen::VectorXd::Zero(4);
+  a << 1, 2, 3, 4;
+  EXPECT_NEAR(paired_t(a, b), 2.5 / (1.2909944 / 2.0), 1e-6);
+  EXPECT_EQ(paired_t(b, b), 0.0);
+}
+
+}  // namespace
+}  // namespace bodyschema

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdlib>
+#include <iostream>
+#include <random>
+#include <string>
+
+#include "bodyschema/core/configuration.hpp"
+#include "bodyschema/diagnosis/trials.hpp"
+
+namespace bodyschema::test {
+
+/// This project's own robot.
+inline const TrialRobot& robot() {
+  static const TrialRobot shared = [] {
+    const auto configuration =
+        Configuration::load(std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/robot.yaml");
+    TrialRobot r;
+    r.setup = RobotSetup::from(configuration.section("robot"));
+    r.rig = StereoRig::from(configuration.section("cameras"));
+    r.model = r.setup.load();
+    return r;
+  }();
+  return shared;
+}
+
+/// A fresh seed each run, or BODYSCHEMA_SEED; printed, so that a failure can be repeated.
+inline std::uint64_t seed() {
+  static const std::uint64_t value = [] {
+    const char* given = std::getenv("BODYSCHEMA_SEED");
+    const std::uint64_t s = given ? std::strtoull(given, nullptr, 10) : std::random_device{}();
+    std::cout << "BODYSCHEMA_SEED=" << s << std::endl;
+    return s;
+  }();
+  return value;
+}
+
+inline DiagnosisOptions usual_options(const MeasurementSource& source) {
+  DiagnosisOptions options;
+  options.nuisances = usual_nuisances(source.roles());
+  return options;
+}
+
+}  // namespace bodyschema::test
