@@ -18,7 +18,7 @@ void add_diagnose(CLI::App& app) {
   };
   auto a = std::make_shared<Arguments>();
   CLI::App* command =
-      app.add_subcommand("diagnose", "Say what the model of the robot gets wrong, from a recorded log");
+      app.add_subcommand("diagnose", "Say what the model of the robot gets wrong, from a recorded log (experimental)");
   command->footer(
       "Example:\n  bodyschema diagnose babble.log --config config/icub_right/estimator.yaml --out out/diagnosis");
   command->add_option("log", a->log, "LCM log")->required();
