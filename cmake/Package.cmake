@@ -17,11 +17,8 @@ set(CPACK_DEBIAN_PACKAGE_DESCRIPTION
 silhouettes its own cameras see. Speaks LCM. With a simulated iCub, replay
 and evaluation of recorded logs, and the libraries to link against.")
 # Libraries by what the programs link; rendering is opened at run time, so it is named here.
-find_program(BODYSCHEMA_DPKG_SHLIBDEPS dpkg-shlibdeps)
-mark_as_advanced(BODYSCHEMA_DPKG_SHLIBDEPS)
-if(BODYSCHEMA_DPKG_SHLIBDEPS)
-  set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-endif()
+# Needs dpkg-shlibdeps and file (packages dpkg-dev, file).
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "libegl1, libegl-mesa0 | libegl-vendor, libgl1-mesa-dri")
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "liblcm-bin")
 # For those who link against the libraries.

@@ -44,6 +44,12 @@ if(BUILD_TYPE STREQUAL "Release")
   endforeach()
 endif()
 
+# The libraries that the programs link are dependencies; found by dpkg-shlibdeps.
+file(STRINGS ${SCRATCH_DIR}/control/control depends REGEX "^Depends:")
+if(NOT depends MATCHES "libyaml-cpp" OR NOT depends MATCHES "libc6")
+  message(SEND_ERROR "the package does not depend on what its programs link: ${depends}")
+endif()
+
 # The two files in /etc survive upgrades.
 file(STRINGS ${SCRATCH_DIR}/control/conffiles conffiles)
 if(NOT conffiles STREQUAL "/etc/bodyschema/estimator.yaml;/etc/default/bodyschemad")
