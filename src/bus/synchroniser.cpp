@@ -198,12 +198,16 @@ void Synchroniser::resolve(bool finishing) {
       camera.utime = instant.images[c]->utime;
       answer = history_.interpolate(camera.utime, camera.joints);
     }
-    if (answer.verdict != Verdict::kReady) statistics_.blocking_joint = answer.joint;
+    // Every joint is "not yet" for a moment; only one that costs an instant is to blame.
+    if (answer.verdict != Verdict::kReady && answer.verdict != Verdict::kNotYet) {
+      statistics_.blocking_joint = answer.joint;
+    }
     switch (answer.verdict) {
       case Verdict::kReady:
         break;
       case Verdict::kNotYet: {
         if (!finishing && newest_image_ - utime <= options_.encoder_wait) return;
+        statistics_.blocking_joint = answer.joint;
         // One joint stopped while others go on, or all encoders are late?
         const bool others_go_on = history_.newest() - history_.newest(answer.joint) > options_.joints.max_gap;
         drop(instant, others_go_on ? DropReason::kMissingJoint : DropReason::kNoEncoders);

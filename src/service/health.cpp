@@ -110,6 +110,10 @@ std::optional<std::string> error(const HealthFacts& f) {
   }
   if (f.estimated_since_last == 0 && !(f.estimate_age_ms >= 0.0 && f.estimate_age_ms < kStale_ms)) {
     if (const auto why = refused(f)) return why;
+    if (f.shed_since_last > 0) {
+      return fmt::format("{} frames of the last second shed and none worked on: the machine is overloaded",
+                         f.shed_since_last);
+    }
     if (const auto why = dropped(f)) return why;
     if (!f.missing_joints.empty()) {
       return fmt::format("no reading of {}: publish it or set robot.fixed_joints_deg", list(f.missing_joints));
@@ -146,6 +150,9 @@ std::optional<std::string> camera_warning(const HealthFacts& f) {
 }
 
 std::optional<std::string> warning(const HealthFacts& f) {
+  if (f.since_last.synchroniser.clock_steps > 0) {
+    return std::string("the clock of the time stamps stepped back; started anew");
+  }
   if (const auto camera = camera_warning(f)) return camera;
   if (f.estimate.state == EstimatorState::kLearningBackground) {
     return std::string("learning the background: keep the arm out of view or moving");

@@ -173,6 +173,20 @@ TEST(Health, Overload) {
   expect(facts, HealthLevel::kWarn, "12 frames of the last second shed");
 }
 
+TEST(Health, ClockStep) {
+  HealthFacts facts = well();
+  facts.since_last.synchroniser.clock_steps = 1;  // nothing need have been dropped for it
+  expect(facts, HealthLevel::kWarn, "the clock of the time stamps stepped back");
+}
+
+TEST(Health, OverloadWithNothingLeft) {
+  HealthFacts facts = well();
+  facts.shed_since_last = 29;
+  facts.estimated_since_last = 0;
+  facts.estimate_age_ms = 1200.0;
+  expect(facts, HealthLevel::kError, "29 frames of the last second shed and none worked on: the machine is overloaded");
+}
+
 TEST(Health, StuckEstimator) {
   HealthFacts facts = well();
   facts.busy_ms = 2400.0;
