@@ -484,7 +484,6 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(contour_engine("contour", 2, ""),
                     contour_engine("contour_baseline", 1, "baseline"),
                     atlas_engine("atlas_compute_egl_device", "egl_device", AtlasPass::kCompute),
-                    atlas_engine("atlas_compute_egl_surfaceless", "egl_surfaceless", AtlasPass::kCompute),
                     atlas_engine("atlas_compute_osmesa", "osmesa", AtlasPass::kCompute),
                     atlas_engine("atlas_raster_egl_device", "egl_device", AtlasPass::kRaster),
                     atlas_engine("atlas_raster_osmesa", "osmesa", AtlasPass::kRaster),
