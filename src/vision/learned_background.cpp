@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "bodyschema/vision/mask_operations.hpp"
+
 namespace bodyschema {
 namespace {
 
@@ -18,6 +20,8 @@ constexpr float kPriorSightings = 20.0f;
 constexpr std::size_t kStillFrames = 12;
 constexpr int kChangeGrid = 4;
 constexpr std::uint8_t kUndecided = 255;
+// Pixels with a clear majority are believed in patches of at least this share of the picture.
+constexpr double kLeastPatch = 0.02;
 
 /// The gate for squared distances over all channels, in variances of one channel.
 constexpr float gate_squared(int channels) {
@@ -186,16 +190,28 @@ void LearnedBackground::choose(std::size_t frame_count, const std::vector<Candid
     return static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
            static_cast<std::size_t>(u);
   };
-  // Plain majorities first.
+  // Plain majorities first, where many pixels agree: a small patch of them is more likely a part of
+  // the robot that never moved out of the way, such as a forearm at the border of the picture.
+  BinaryMask clear(width, height);
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      const auto& best = candidates[at(u, v)];
+      const int first = std::popcount(best[0].seen);
+      const int second = std::popcount(best[1].seen);
+      clear.set(u, v, 5 * first >= 3 * static_cast<int>(frame_count) && 2 * first >= 5 * second);
+    }
+  }
+  const double least_patch = kLeastPatch * static_cast<double>(candidates.size());
+  ComponentFilter().remove_small(clear, static_cast<int>(least_patch));
   choice.assign(candidates.size(), kUndecided);
   std::vector<std::size_t> undecided;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const int first = std::popcount(candidates[i][0].seen);
-    const int second = std::popcount(candidates[i][1].seen);
-    if (5 * first >= 3 * static_cast<int>(frame_count) && 2 * first >= 5 * second) {
-      choice[i] = 0;
-    } else {
-      undecided.push_back(i);
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      if (clear.at(u, v)) {
+        choice[at(u, v)] = 0;
+      } else {
+        undecided.push_back(at(u, v));
+      }
     }
   }
   // From their borders inwards: a neighbour uncovers and is covered at almost the same frames.

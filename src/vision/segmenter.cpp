@@ -12,6 +12,7 @@
 #include "bodyschema/vision/mask_picture.hpp"
 #include "coverage.hpp"
 #include "learned_background.hpp"
+#include "region_statistics.hpp"
 #include "single_colour_background.hpp"
 
 namespace bodyschema {
@@ -91,6 +92,10 @@ struct Segmenter::Impl {
   [[nodiscard]] const BackgroundModel& background() const;
   void detect(const Image& image, const BackgroundModel& model);
   void detect_hard(const Image& image, const BackgroundModel& model);
+  /// Refines `detected` and `sure` to coverage and cleans up.
+  void refine(const Image& image, const BackgroundModel& model, BinaryMask& mask, BinaryMask& valid,
+              std::vector<std::uint8_t>& coverage);
+  void soften(BinaryMask& mask, std::vector<std::uint8_t>& coverage) const;
   void mark_valid(const BackgroundModel& model, BinaryMask& valid);
 
   VisionSetup setup;
@@ -103,9 +108,10 @@ struct Segmenter::Impl {
   LearnedBackground learned;
   BackgroundModel given;
   bool given_noise_known = false;
+  RegionStatistics statistics;
+  BackgroundModel local;  // statistics: of the last frame, next to the robot
   FrameSelection selection;
   bool learned_offline = false;
-  int frames = 0;
 
   CoverageEstimator coverage_estimator;
   ComponentFilter components;
@@ -138,8 +144,8 @@ const BackgroundModel& Segmenter::Impl::background() const {
   switch (setup.method) {
     case SegmentationMethod::kSingleColour: return single_colour.model();
     case SegmentationMethod::kBackgroundPicture: return given;
-    case SegmentationMethod::kLearnedBackground:
-    case SegmentationMethod::kStatistics: break;
+    case SegmentationMethod::kStatistics: return local;
+    case SegmentationMethod::kLearnedBackground: break;
   }
   return learned.model();
 }
@@ -241,6 +247,48 @@ void Segmenter::Impl::mark_valid(const BackgroundModel& model, BinaryMask& valid
   }
 }
 
+void Segmenter::Impl::refine(const Image& image, const BackgroundModel& model, BinaryMask& mask,
+                             BinaryMask& valid, std::vector<std::uint8_t>& coverage) {
+  coverage_estimator.estimate(image, model, detected, sure,
+                              static_cast<float>(setup.least_contrast_sigma), mask, uncertain,
+                              coverage);
+  if (setup.method == SegmentationMethod::kStatistics) {
+    soften(mask, coverage);
+  } else {
+    for (int v = 0; v < height; ++v) {
+      for (int w = 0; w < valid.words_per_row(); ++w) valid.row(v)[w] &= ~uncertain.row(v)[w];
+    }
+  }
+  components.remove_small(mask, setup.min_component_px);
+  components.fill_small_holes(mask, setup.max_hole_px);
+  // What the clean-up changed, it changed wholly.
+  std::size_t i = 0;
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u, ++i) {
+      if (mask.at(u, v) != (coverage[i] >= 128)) coverage[i] = mask.at(u, v) ? 255 : 0;
+    }
+  }
+}
+
+/// Where colours do not tell how much of a pixel is robot, the decision itself, smoothed.
+void Segmenter::Impl::soften(BinaryMask& mask, std::vector<std::uint8_t>& coverage) const {
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      if (!uncertain.at(u, v)) continue;
+      int sum = 0;
+      for (int dv = -1; dv <= 1; ++dv) {
+        for (int du = -1; du <= 1; ++du) {
+          const int a = std::clamp(u + du, 0, width - 1), b = std::clamp(v + dv, 0, height - 1);
+          sum += sure.at(a, b) ? (2 - std::abs(du)) * (2 - std::abs(dv)) : 0;
+        }
+      }
+      coverage[static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
+               static_cast<std::size_t>(u)] = static_cast<std::uint8_t>(std::min(sum * 16, 255));
+      mask.set(u, v, sum >= 8);
+    }
+  }
+}
+
 Segmenter::Segmenter(const VisionSetup& setup, const std::string& camera, int width, int height)
     : impl_(std::make_unique<Impl>(setup, camera, std::max(width, 0), std::max(height, 0))) {
   if (width <= 0 || height <= 0) {
@@ -297,6 +345,21 @@ void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
   fit(mask);
   fit(valid);
   const bool learning = self.setup.method == SegmentationMethod::kLearnedBackground;
+  if (self.setup.method == SegmentationMethod::kStatistics) {
+    valid.fill(predicted != nullptr);
+    if (predicted == nullptr) {
+      mask.fill(false);
+      coverage.assign(image.data.size() / static_cast<std::size_t>(self.channels), 0);
+      return;
+    }
+    self.statistics.separate(image, *predicted, self.setup, self.sure, self.local);
+    self.components.remove_small(self.sure, self.setup.min_component_px);
+    self.components.fill_small_holes(self.sure, self.setup.max_hole_px);
+    self.detected = self.sure;
+    self.morphology.dilate(self.detected);
+    self.refine(image, self.local, mask, valid, coverage);
+    return;
+  }
   if (!ready()) {
     self.learned.update(image, nullptr, true);
     mask.fill(false);
@@ -335,21 +398,7 @@ void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
       }
     }
     self.components.fill_small_holes(self.sure, std::max(self.setup.max_hole_px, 4));
-    self.coverage_estimator.estimate(image, model, self.detected, self.sure,
-                                     static_cast<float>(self.setup.least_contrast_sigma), mask,
-                                     self.uncertain, coverage);
-    for (int v = 0; v < self.height; ++v) {
-      for (int w = 0; w < valid.words_per_row(); ++w) valid.row(v)[w] &= ~self.uncertain.row(v)[w];
-    }
-    self.components.remove_small(mask, self.setup.min_component_px);
-    self.components.fill_small_holes(mask, self.setup.max_hole_px);
-    // What the clean-up changed, it changed wholly.
-    std::size_t i = 0;
-    for (int v = 0; v < self.height; ++v) {
-      for (int u = 0; u < self.width; ++u, ++i) {
-        if (mask.at(u, v) != (coverage[i] >= 128)) coverage[i] = mask.at(u, v) ? 255 : 0;
-      }
-    }
+    self.refine(image, model, mask, valid, coverage);
   }
 
   if (learning) {
@@ -358,7 +407,6 @@ void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
     self.morphology.dilate(self.robot, predicted != nullptr ? 6 : 3);
     self.learned.update(image, &self.robot, false);
   }
-  ++self.frames;
 }
 
 }  // namespace bodyschema

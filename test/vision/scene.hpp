@@ -47,6 +47,7 @@ struct Scene {
   double noise_levels = 2.5;
   int channels = 3;
   int supersampling = 6;                  ///< per pixel and axis
+  double shift_u = 0;                     ///< of the clutter, px: another place of the same room
   std::vector<Capsule> shapes;
 
   double distance(double u, double v) const {
@@ -60,6 +61,7 @@ struct Scene {
       for (int c = 0; c < 3; ++c) colour[c] *= 0.85 + 0.3 * u / width - 0.1 * v / height;
     }
     if (texture == Texture::kClutter) {
+      u += shift_u;
       // Tiles of random colour, 11 px wide, with stripes on some.
       const auto tile = static_cast<std::uint32_t>(std::floor(u / 11.0) + 100) * 7919u +
                         static_cast<std::uint32_t>(std::floor(v / 13.0) + 100) * 104729u;

@@ -272,6 +272,40 @@ TEST(Segmenter, WhatMovedInTheBackgroundIsLearnedAnewOutsideThePrediction) {
   EXPECT_EQ(out.mask.count(), 0u);
 }
 
+TEST(Segmenter, StatisticsFollowThePredictionOnAMovingBackground) {
+  // Every frame shows another part of the clutter; the prediction is four pixels off.
+  auto setup = setup_for(SegmentationMethod::kStatistics);
+  std::mt19937 random(14);
+  Scene scene;
+  scene.texture = Texture::kClutter;
+  scene.ambient = 0.7;
+  Segmenter segmenter(setup, "left", scene.width, scene.height);
+  Output out;
+  double predicted_iou = 0.0, seen_iou = 0.0;
+  constexpr int kFrames = 6;
+  for (int i = 0; i < kFrames; ++i) {
+    scene.shift_u = 37.0 * i;
+    scene.shapes = test::hand(78.0 + 2.0 * i, 62.0);
+    Scene believed = scene;
+    believed.shapes = test::hand(78.0 + 2.0 * i + 3.0, 62.0 - 3.0);
+    const auto prediction = believed.true_mask();
+    segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage, &prediction);
+    predicted_iou += iou(prediction, scene.true_mask()) / kFrames;
+    seen_iou += iou(out.mask, scene.true_mask()) / kFrames;
+  }
+  std::printf("    IoU with the truth: prediction %.3f, mask %.3f\n", predicted_iou, seen_iou);
+  EXPECT_LT(predicted_iou, 0.8);
+  EXPECT_GT(seen_iou, 0.93);
+  // Without a prediction there is nothing to go by.
+  segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
+  EXPECT_EQ(out.mask.count(), 0u);
+  EXPECT_EQ(out.valid.count(), 0u);
+  const BinaryMask nowhere(scene.width, scene.height);
+  segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage, &nowhere);
+  EXPECT_EQ(out.mask.count(), 0u);
+  EXPECT_EQ(out.valid.count(), static_cast<std::size_t>(scene.width * scene.height));
+}
+
 TEST(Segmenter, RefusesPicturesThatDoNotFit) {
   Segmenter segmenter(setup_for(SegmentationMethod::kSingleColour), "left", 32, 24);
   Output out;
