@@ -109,12 +109,11 @@ void RegionStatistics::decide(const Image& image, int reach, BinaryMask& robot) 
   evidence_.resize(kBins);
   const float robot_scale = 1.0f / (robot_count + 1.0f);
   const float background_scale = 1.0f / (background_count + 1.0f);
-  // A colour that neither side has shown is more likely the room's than the robot's.
-  constexpr float kRobotFloor = 1e-4f;
-  constexpr float kBackgroundFloor = 3e-4f;
+  // A colour that neither side has shown says nothing.
+  constexpr float kFloor = 1e-4f;
   for (std::size_t i = 0; i < kBins; ++i) {
-    const float odds = (robot_histogram_[i] * robot_scale + kRobotFloor) /
-                       (background_histogram_[i] * background_scale + kBackgroundFloor);
+    const float odds = (robot_histogram_[i] * robot_scale + kFloor) /
+                       (background_histogram_[i] * background_scale + kFloor);
     evidence_[i] = std::clamp(std::log(odds), -kMostEvidence, kMostEvidence);
   }
 

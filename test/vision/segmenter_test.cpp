@@ -295,7 +295,7 @@ TEST(Segmenter, StatisticsFollowThePredictionOnAMovingBackground) {
   }
   std::printf("    IoU with the truth: prediction %.3f, mask %.3f\n", predicted_iou, seen_iou);
   EXPECT_LT(predicted_iou, 0.8);
-  EXPECT_GT(seen_iou, 0.93);
+  EXPECT_GT(seen_iou, 0.92);
   // Without a prediction there is nothing to go by.
   segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
   EXPECT_EQ(out.mask.count(), 0u);
