@@ -214,12 +214,17 @@ void Rasterizer::draw(std::span<const Eigen::Isometry3f> X_CB, const CameraModel
       };
       if (all_in_front || (points_C_[t[0]].z() >= kNear_m && points_C_[t[1]].z() >= kNear_m &&
                            points_C_[t[2]].z() >= kNear_m)) {
-        std::array<Corner, 3> corner;
-        for (std::size_t k = 0; k < 3; ++k) {
-          corner[k] = projected_[t[k]];
-          corner[k].shade = shade(k);
+        // Most triangles face away or fall between samples: out before anything is worked out.
+        const Corner& a = projected_[t[0]];
+        const Corner& b = projected_[t[1]];
+        const Corner& c = projected_[t[2]];
+        if (part.cull_back && (b.x - a.x) * (c.y - a.y) > (c.x - a.x) * (b.y - a.y)) continue;
+        if (std::ceil(std::min({a.x, b.x, c.x})) > std::floor(std::max({a.x, b.x, c.x})) ||
+            std::ceil(std::min({a.y, b.y, c.y})) > std::floor(std::max({a.y, b.y, c.y}))) {
+          continue;
         }
-        draw_triangle(corner[0], corner[1], corner[2], part.cull_back, static_cast<std::uint32_t>(p));
+        draw_triangle({a.x, a.y, a.w, shade(0)}, {b.x, b.y, b.w, shade(1)}, {c.x, c.y, c.w, shade(2)},
+                      part.cull_back, static_cast<std::uint32_t>(p));
         continue;
       }
       // Cut at the near plane (Sutherland-Hodgman): three or four corners remain.
