@@ -2,7 +2,7 @@
 #   bin/                        every program of apps/
 #   lib/, include/bodyschema/   one static library and one folder of headers per storey
 #   lib/cmake/bodyschema/       find_package(bodyschema COMPONENTS robot silhouette ...)
-#   share/bodyschema/           config/ and meshes/, side by side as in the source tree, so that the
+#   share/bodyschema/           config/, meshes/ and workflow/, side by side as in the source tree, so that the
 #                               relative paths inside the configurations hold in both places
 # Nothing installed holds an absolute path: the prefix may be moved.
 include(CMakePackageConfigHelpers)
@@ -147,7 +147,7 @@ if(EXISTS ${PROJECT_SOURCE_DIR}/apps/CMakeLists.txt)
     endif()
   endforeach()
 endif()
-foreach(folder IN ITEMS config meshes)
+foreach(folder IN ITEMS config meshes workflow)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${folder})
     install(DIRECTORY ${folder}/ DESTINATION ${BODYSCHEMA_INSTALL_SHAREDIR}/${folder}
             PATTERN "CMakeLists.txt" EXCLUDE PATTERN "__pycache__" EXCLUDE

@@ -92,16 +92,16 @@ def completion(program, pages):
     function = "_" + re.sub(r"\W", "_", program)
     cases = []
     for page in pages:
-        key = " ".join(page.words[1:]) or "''"
+        key = f"'{' '.join(page.words[1:])}'"
         words = " ".join(sorted(set(page.options())) + page.subcommands())
         cases.append(f"    {key}) words='{words}' ;;")
-    subcommands = "|".join(" ".join(p.words[1:]) for p in pages if len(p.words) > 1) or "--none--"
+    subcommands = "|".join(f"'{' '.join(p.words[1:])}'" for p in pages if len(p.words) > 1) or "--none--"
     return "\n".join([
         f"# bash completion of {program}; generated from its --help",
         f"{function}() {{",
         "  local words='' sub='' word",
         '  for word in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do',
-        f"    case $word in {subcommands}) sub=$word; break ;; esac",
+        f"    case \"${{sub:+$sub }}$word\" in {subcommands}) sub=\"${{sub:+$sub }}$word\" ;; esac",
         "  done",
         "  case $sub in", *cases, "  esac",
         '  mapfile -t COMPREPLY < <(compgen -W "$words" -- "${COMP_WORDS[COMP_CWORD]}")',

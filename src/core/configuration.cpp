@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/installation.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 
 namespace bodyschema {
@@ -110,6 +111,16 @@ void merge_into(Entry& base, Entry&& top) {
   }
 }
 
+/// Beside the including file, or one that is installed: `config/estimator.yaml` from anywhere.
+fs::path included(const fs::path& path, const fs::path& directory) {
+  if (path.is_absolute()) return path;
+  std::error_code ignored;
+  const fs::path beside = directory / path;
+  if (fs::exists(beside, ignored)) return beside;
+  const fs::path installed = data_directory() / path;
+  return fs::exists(installed, ignored) ? installed : beside;
+}
+
 class Reader {
  public:
   Entry read_file(const fs::path& file) {
@@ -171,7 +182,7 @@ class Reader {
       }
       for (const auto& name : names) {
         const fs::path path = substitute_environment(name, where(include));
-        merge_into(merged, read_file(path.is_absolute() ? path : file.parent_path() / path));
+        merge_into(merged, read_file(included(path, file.parent_path())));
       }
       break;
     }

@@ -11,6 +11,7 @@
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/diagnosis/image_measurement.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
+#include "joint_stream.hpp"
 
 namespace bodyschema {
 namespace {
@@ -18,57 +19,6 @@ namespace {
 /// Frames with the estimator before its offsets are taken as the start of the fit.
 constexpr int kMostStartFrames = 150;
 constexpr int kFramesAfterConvergence = 10;
-
-/// Joint messages of a log as samples of all joints, in order of time.
-class StreamRecorder {
- public:
-  StreamRecorder(const RobotModel& robot, const RobotSetup& setup, const BusOptions& bus)
-      : limits_(bus.limits) {
-    for (const auto& joint : robot.joints()) {
-      const auto i = static_cast<Eigen::Index>(index_.size());
-      index_[joint.name] = i;
-    }
-    now_.q = setup.default_joints(robot);
-    now_.qdot.setZero(robot.joint_count());
-  }
-  void take(Bytes message) {
-    if (!decode(message, joints_, limits_).ok()) return;
-    bool known = false;
-    for (std::size_t i = 0; i < joints_.names.size() && i < joints_.position_rad.size(); ++i) {
-      const auto at = index_.find(joints_.names[i]);
-      if (at == index_.end()) continue;
-      now_.q[at->second] = static_cast<double>(joints_.position_rad[i]);
-      known = true;
-    }
-    if (!known || (!stream_.empty() && joints_.utime <= stream_.back().utime)) return;
-    now_.utime = joints_.utime;
-    stream_.push_back(now_);
-  }
-  /// Velocities from the positions themselves, over 60 ms: publishers differ in theirs.
-  std::vector<JointSample> finish() {
-    constexpr Microseconds kHalfWindow = 30'000;
-    std::size_t a = 0, b = 0;
-    for (std::size_t i = 0; i < stream_.size(); ++i) {
-      while (a < i && stream_[a].utime < stream_[i].utime - kHalfWindow) ++a;
-      b = std::max(b, i);
-      while (b + 1 < stream_.size() && stream_[b + 1].utime <= stream_[i].utime + kHalfWindow) ++b;
-      const std::size_t low = a == i && i > 0 ? i - 1 : a;
-      const std::size_t high = b == i && i + 1 < stream_.size() ? i + 1 : b;
-      if (high > low) {
-        stream_[i].qdot = (stream_[high].q - stream_[low].q) /
-                          seconds(stream_[high].utime - stream_[low].utime);
-      }
-    }
-    return std::move(stream_);
-  }
-
- private:
-  DecodeLimits limits_;
-  std::map<std::string, Eigen::Index> index_;
-  JointStateMessage joints_;
-  JointSample now_;
-  std::vector<JointSample> stream_;
-};
 
 class LogDiagnosis {
  public:
@@ -97,7 +47,7 @@ class LogDiagnosis {
 
  private:
   template <class Action>
-  void for_each(const std::string& label, StreamRecorder* recorder, Action action) {
+  void for_each(const std::string& label, diagnosis::JointStream* recorder, Action action) {
     LogReader log(options_.log);
     auto stream = pipeline_.make_stream();
     const auto channels = stream.channels();
@@ -126,7 +76,7 @@ class LogDiagnosis {
   }
 
   void read() {
-    StreamRecorder recorder(pipeline_.robot(), pipeline_.setup(), pipeline_.bus());
+    diagnosis::JointStream recorder(pipeline_.robot(), pipeline_.setup(), pipeline_.bus());
     const auto period = microseconds(1.0 / options_.picture_rate_hz);
     Microseconds due = -1;
     int frames = 0, converged = 0;

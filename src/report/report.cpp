@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "bodyschema/core/base64.hpp"
 #include "bodyschema/core/error.hpp"
 #include "chart_js.hpp"
 
@@ -62,21 +63,6 @@ std::string script_json(const Json& json) {
 bool looks_like_a_number(const std::string& cell) {
   return !cell.empty() && cell.find_first_not_of("0123456789+-.eE %") == std::string::npos &&
          cell.find_first_of("0123456789") != std::string::npos;
-}
-
-std::string base64(const std::vector<std::uint8_t>& bytes) {
-  static const char* const kAlphabet =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t left = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t word = 0;
-    for (std::size_t k = 0; k < 3; ++k) word = (word << 8) | (k < left ? bytes[i + k] : 0u);
-    for (std::size_t k = 0; k < 4; ++k) {
-      out += k <= left ? kAlphabet[(word >> (18 - 6 * k)) & 63u] : '=';
-    }
-  }
-  return out;
 }
 
 Json dataset(const ChartSeries& series, Chart::Kind kind, std::size_t index) {

@@ -120,6 +120,21 @@ TEST_F(ConfigurationFiles, IncludesOverridesAndPathsResolve) {
   EXPECT_EQ(Configuration::load(file).section("robot").number("scale"), 2.0);
 }
 
+TEST_F(ConfigurationFiles, InstalledFilesCanBeIncludedFromAnywhere) {
+  std::filesystem::create_directories(directory_ / "share/config");
+  std::filesystem::create_directories(directory_ / "mine/config");
+  write("share/config/defaults.yaml", "scale: 3\n");
+  write("share/config/both.yaml", "scale: 3\n");
+  write("mine/config/both.yaml", "scale: 4\n");
+  setenv("BODYSCHEMA_SHARE", (directory_ / "share").c_str(), 1);
+  EXPECT_EQ(Configuration::load(write("mine/a.yaml", "include: config/defaults.yaml\n")).number("scale"), 3.0);
+  EXPECT_EQ(Configuration::load(write("mine/b.yaml", "include: config/both.yaml\n")).number("scale"), 4.0)
+      << "a file beside the including one comes first";
+  EXPECT_THAT(error_of([&] { Configuration::load(write("mine/c.yaml", "include: config/none.yaml\n")); }),
+              HasSubstr("mine/config/none.yaml: no such configuration file"));
+  unsetenv("BODYSCHEMA_SHARE");
+}
+
 TEST_F(ConfigurationFiles, IncludeCycleAndMissingFileAreErrors) {
   const auto file = write("a.yaml", "include: b.yaml\n");
   write("b.yaml", "include: a.yaml\n");

@@ -55,3 +55,18 @@ file(STRINGS ${SCRATCH_DIR}/control/conffiles conffiles)
 if(NOT conffiles STREQUAL "/etc/bodyschema/estimator.yaml;/etc/default/bodyschemad")
   message(SEND_ERROR "conffiles: ${conffiles}")
 endif()
+
+# The package alone is enough: what it unpacked to checks itself, with nothing but its own files.
+execute_process(COMMAND ${CMAKE_COMMAND} -E env --unset=BODYSCHEMA_SHARE --unset=BODYSCHEMA_DATA
+                        ${SCRATCH_DIR}/content/usr/bin/bodyschema selftest
+                WORKING_DIRECTORY / RESULT_VARIABLE result OUTPUT_VARIABLE output)
+message("${output}")
+if(NOT output MATCHES "OK +files +[^\n]* ${SCRATCH_DIR}/content/usr/share/bodyschema\n")
+  message(SEND_ERROR "the unpacked program does not read its own files")
+endif()
+if(NOT output MATCHES "(OK|WARN) +reach " OR output MATCHES "FAIL +(version|files|robot|opengl|engine)")
+  message(SEND_ERROR "the unpacked package does not pass its self-test")
+endif()
+if(output MATCHES "FAIL" AND result EQUAL 0)
+  message(SEND_ERROR "a failed check must show in the exit status")
+endif()

@@ -8,26 +8,8 @@ import random
 import select
 import subprocess
 import sys
-import venv
 
-SKIPPED = 77
-
-
-def python_with_lcm(directory):
-    """An interpreter that has PyPI's lcm, or None where it cannot be had."""
-    python = directory / "bin" / "python"
-    if python.exists() and subprocess.run([python, "-c", "import lcm"], capture_output=True,
-                                          check=False).returncode == 0:
-        return python
-    try:
-        venv.create(directory, with_pip=True, clear=True)
-        subprocess.run([python, "-m", "pip", "install", "-q", "--timeout", "10", "--retries", "1",
-                        "lcm"], check=True, timeout=120)
-    except (subprocess.SubprocessError, OSError) as error:
-        print(f"no PyPI lcm here, skipped: {error}")
-        return None
-    return python
-
+from python_packages import SKIPPED, python_with
 
 SEND = """
 import lcm, math, sys, time
@@ -47,7 +29,7 @@ while True:
 
 def main():
     listen, types, directory = (pathlib.Path(a) for a in sys.argv[1:4])
-    python = python_with_lcm(directory)
+    python = python_with(directory, "lcm")
     if python is None:
         return SKIPPED
     environment = dict(os.environ, PYTHONPATH=str(types), PYTHONDONTWRITEBYTECODE="1",

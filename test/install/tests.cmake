@@ -18,6 +18,14 @@ if(TARGET lcmtypes_python AND Python3_FOUND)
       ${PROJECT_BINARY_DIR}/lcmtypes-python ${PROJECT_BINARY_DIR}/venv-lcm)
   set_tests_properties(install.python_example PROPERTIES LABELS install TIMEOUT 240
     SKIP_RETURN_CODE 77)
+
+  # Skipped where PyPI's mcap, the official reader, cannot be installed.
+  add_test(NAME install.mcap_reads_back
+    COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/install/mcap_reads_back.py
+      $<TARGET_FILE:bodyschema> ${PROJECT_BINARY_DIR}/lcmtypes-python
+      ${PROJECT_BINARY_DIR}/venv-mcap ${PROJECT_BINARY_DIR}/test-mcap)
+  set_tests_properties(install.mcap_reads_back PROPERTIES LABELS install TIMEOUT 300
+    SKIP_RETURN_CODE 77 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endif()
 
 find_program(BODYSCHEMA_DPKG_DEB dpkg-deb)
@@ -49,6 +57,34 @@ add_test(NAME docs.pages_agree_with_the_tree
   COMMAND ${CMAKE_COMMAND} -D SOURCE_DIR=${PROJECT_SOURCE_DIR} -D "STOREYS=${BODYSCHEMA_STOREYS}"
     -P ${PROJECT_SOURCE_DIR}/test/install/docs.cmake)
 set_tests_properties(docs.pages_agree_with_the_tree PROPERTIES LABELS docs TIMEOUT 60)
+
+if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
+  # Every page with commands; a new page's name joins this list.
+  foreach(page IN ITEMS apply_the_result calibrate_my_robot first_run record_a_good_log)
+    add_test(NAME docs.${page}
+      COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/docs/run_page.py
+        ${PROJECT_SOURCE_DIR}/docs/${page}.md ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_SOURCE_DIR}
+        ${PROJECT_BINARY_DIR}/test-docs/${page})
+    set_tests_properties(docs.${page} PROPERTIES LABELS docs TIMEOUT 300)
+  endforeach()
+endif()
+
+if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
+  foreach(program IN LISTS BODYSCHEMA_PROGRAMS)
+    list(APPEND help_programs $<TARGET_FILE:${program}>)
+  endforeach()
+  add_test(NAME install.help_has_examples
+    COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/install/help.py
+      ${PROJECT_SOURCE_DIR}/cmake/manual.py ${PROJECT_BINARY_DIR}/test-help ${help_programs})
+  set_tests_properties(install.help_has_examples PROPERTIES LABELS install TIMEOUT 120
+    ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+
+  # Skipped where snakemake is not installed.
+  add_test(NAME fleet.workflow
+    COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/fleet/workflow.py
+      ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/test-fleet)
+  set_tests_properties(fleet.workflow PROPERTIES LABELS integration TIMEOUT 600 SKIP_RETURN_CODE 77)
+endif()
 
 find_program(BODYSCHEMA_JAVA java)
 mark_as_advanced(BODYSCHEMA_JAVA)

@@ -14,8 +14,9 @@ namespace bodyschema {
 
 /// A strict view of one YAML document: a mapping whose every key must be known to some reader.
 ///
-/// A document may begin with `include: [file, ...]` (paths relative to the including file); later
-/// files and the including file itself override earlier ones, mapping by mapping. `${NAME}` and
+/// A document may begin with `include: [file, ...]` (paths relative to the including file, or to the
+/// installed data, as `config/estimator.yaml`); later files and the including file itself override
+/// earlier ones, mapping by mapping. `${NAME}` and
 /// `${NAME:-default}` in a string are replaced by environment variables. `overrides` are
 /// `dotted.key=value` pairs, as given by `--set` on the command line.
 ///

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bodyschema/core/time.hpp"
+
+namespace bodyschema {
+
+/// How regularly something came: from its own stamps where it has some, else from the log's.
+struct Regularity {
+  std::uint64_t count = 0;
+  double rate_hz = 0.0;       ///< over the time between the first and the last; 0 for fewer than two
+  std::uint64_t gaps = 0;     ///< intervals of more than three times the usual (median) one
+  double longest_gap_s = 0.0; ///< longest interval of all
+  std::uint64_t backwards = 0;  ///< stamps before the one before
+};
+
+struct ChannelSummary {
+  std::string channel;
+  std::string type;  ///< "bot_core.joint_state_t", "?" for types this project does not know
+  Regularity arrivals;
+  std::uint64_t bytes = 0;
+  std::uint64_t unreadable = 0;  ///< messages of a known type that do not decode
+};
+
+struct PicturesSummary {
+  std::string channel;
+  std::string camera;    ///< "left", "right", or "camera 7"
+  std::string encoding;  ///< "RGB", "BGR", "gray", "JPEG"
+  int width = 0;         ///< px
+  int height = 0;        ///< px
+  Regularity stamps;
+};
+
+/// How a joint moved, as its encoder told.
+struct JointMotion {
+  std::string name;
+  std::uint64_t readings = 0;
+  double lowest_rad = 0.0;
+  double highest_rad = 0.0;
+  double fastest_rad_s = 0.0;  ///< over 50 ms
+  int turns = 0;               ///< changes of direction, each after at least half a degree
+};
+
+/// What a log holds, whoever recorded it: message types are told by their LCM fingerprints.
+struct LogSummary {
+  std::string file;
+  std::uint64_t bytes = 0;
+  std::uint64_t messages = 0;
+  std::uint64_t damaged_places = 0;
+  Microseconds begin = 0;  ///< arrival of the first message, us since the Unix epoch
+  double duration_s = 0.0; ///< between the first and the last message
+  std::vector<ChannelSummary> channels;    ///< by name
+  std::vector<PicturesSummary> pictures;   ///< by channel and camera; one entry per size and encoding
+  std::vector<std::string> joint_channels;
+  Regularity joint_readings;               ///< stamps of all joint messages
+  std::vector<JointMotion> joints;         ///< in the order of their first appearance
+
+  /// For people.
+  [[nodiscard]] std::string text() const;
+  [[nodiscard]] std::string json() const;
+};
+
+/// Reads a log from end to end. Throws FileError when it is none.
+LogSummary summarise_log(const std::filesystem::path& log);
+
+}  // namespace bodyschema

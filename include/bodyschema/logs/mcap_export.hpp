@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+
+namespace bodyschema {
+
+struct McapExportOptions {
+  std::filesystem::path log;
+  std::filesystem::path out;
+  int jpeg_quality = 90;  ///< of pictures that were not compressed already
+};
+
+struct McapExportSummary {
+  std::map<std::string, std::uint64_t> messages;  ///< written, by topic
+  std::uint64_t unreadable = 0;  ///< messages and pictures left out because they do not decode
+  std::uint64_t unknown = 0;     ///< messages of types this project does not know, left out
+  std::uint64_t bytes = 0;       ///< of the file written
+};
+
+/// Rewrites a log as MCAP for Foxglove and PlotJuggler: joint states, offsets and status as JSON
+/// with a schema (angles in degrees, by joint name), pictures as JPEG in foxglove.CompressedImage.
+/// A topic is "/" and the channel's name, with "/left" or "/right" for pictures. Log time is when a
+/// message was recorded, publish time its own stamp. The file appears under its name when it is
+/// complete. Throws FileError, DataError when there is nothing to write.
+McapExportSummary export_mcap(const McapExportOptions& options);
+
+}  // namespace bodyschema

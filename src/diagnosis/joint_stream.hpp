@@ -1,0 +1,33 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bodyschema/bus/bus_options.hpp"
+#include "bodyschema/bus/messages.hpp"
+#include "bodyschema/observation/observation.hpp"
+#include "bodyschema/robot/robot_model.hpp"
+#include "bodyschema/robot/robot_setup.hpp"
+
+namespace bodyschema::diagnosis {
+
+/// Joint messages of a log as samples of all joints, in order of time.
+class JointStream {
+ public:
+  JointStream(const RobotModel& robot, const RobotSetup& setup, const BusOptions& bus);
+  /// A message that does not decode or names none of the robot's joints is left out.
+  void take(Bytes message);
+  /// The samples, with velocities from the positions themselves, over 60 ms: publishers differ in
+  /// theirs.
+  std::vector<JointSample> finish();
+
+ private:
+  DecodeLimits limits_;
+  std::map<std::string, Eigen::Index> index_;
+  JointStateMessage joints_;
+  JointSample now_;
+  std::vector<JointSample> stream_;
+};
+
+}  // namespace bodyschema::diagnosis

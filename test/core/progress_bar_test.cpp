@@ -1,0 +1,79 @@
+#include "bodyschema/core/progress_bar.hpp"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <string>
+#include <thread>
+
+namespace bodyschema {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+/// What work of `duration` in 20 steps writes to a standard error that is this descriptor.
+std::string shown_on(int reader, int writer, std::chrono::milliseconds duration) {
+  const pid_t child = fork();
+  if (child == 0) {
+    dup2(writer, STDERR_FILENO);
+    {
+      ProgressBar bar("work", 20);
+      for (int i = 0; i < 20; ++i) {
+        std::this_thread::sleep_for(duration / 20);
+        bar.advance();
+      }
+    }
+    _exit(0);
+  }
+  close(writer);
+  std::string text;
+  std::array<char, 4096> buffer{};
+  for (ssize_t n; (n = read(reader, buffer.data(), buffer.size())) > 0;) text.append(buffer.data(), static_cast<std::size_t>(n));
+  waitpid(child, nullptr, 0);
+  close(reader);
+  return text;
+}
+
+std::string shown_on_pipe(std::chrono::milliseconds duration) {
+  std::array<int, 2> ends{};
+  EXPECT_EQ(pipe(ends.data()), 0);
+  return shown_on(ends[0], ends[1], duration);
+}
+
+std::string shown_on_terminal(std::chrono::milliseconds duration) {
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
+  EXPECT_GE(terminal, 0);
+  EXPECT_EQ(grantpt(terminal), 0);
+  EXPECT_EQ(unlockpt(terminal), 0);
+  return shown_on(terminal, open(ptsname(terminal), O_RDWR | O_NOCTTY), duration);
+}
+
+TEST(ProgressBar, ABarWithTimeLeftOnATerminal) {
+  const std::string text = shown_on_terminal(std::chrono::milliseconds(2600));
+  EXPECT_THAT(text, HasSubstr("\r\033[Kwork [")) << text;
+  EXPECT_THAT(text, HasSubstr("#....")) << text;
+  EXPECT_THAT(text, HasSubstr(" left")) << text;
+}
+
+TEST(ProgressBar, PlainLinesElsewhere) {
+  const std::string text = shown_on_pipe(std::chrono::milliseconds(2600));
+  EXPECT_THAT(text, HasSubstr("work: 90 %, 0:0")) << text;
+  EXPECT_THAT(text, HasSubstr("work: ended after 0:0")) << text;
+  EXPECT_THAT(text, Not(HasSubstr("\r"))) << text;
+  EXPECT_THAT(text, Not(HasSubstr("\033"))) << text;
+}
+
+TEST(ProgressBar, SilentForShortWork) {
+  EXPECT_EQ(shown_on_pipe(std::chrono::milliseconds(200)), "");
+  EXPECT_EQ(shown_on_terminal(std::chrono::milliseconds(200)), "");
+}
+
+}  // namespace
+}  // namespace bodyschema

@@ -1,0 +1,63 @@
+#!/usr/bin/env python3
+"""Runs the commands of one page of docs/ as its reader would: every block fenced as `sh`, in order, in
+one shell, in an empty folder. A command that fails fails the page. A block fenced as `yaml file=NAME`
+is a file that the page tells the reader to write. A `text` block that follows an `sh` block is what the
+page says is printed: every line of it must appear in the output, where `...` stands for anything.
+
+usage: run_page.py PAGE BIN_DIR SOURCE_DIR SCRATCH_DIR
+/usr/share/bodyschema (configurations, robots) and /usr/share/doc/bodyschema stand for the source tree.
+"""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+BLOCK = re.compile(r"^```(sh|text|yaml file=(\S+))\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def matches(expected, output):
+    pattern = r"[^\n]*".join(re.escape(part) for part in re.split(r"\.\.\.", expected.strip()))
+    return re.search(re.sub(r"(\\ )+", r"[ \\t]+", pattern), output) is not None
+
+
+def main():
+    page, programs, source, scratch = (pathlib.Path(a).resolve() for a in sys.argv[1:5])
+    shutil.rmtree(scratch, ignore_errors=True)
+    scratch.mkdir(parents=True)
+    # A network of its own, so that tests beside it are not disturbed.
+    environment = dict(os.environ, PATH=f"{programs}:{os.environ['PATH']}",
+                       LCM_DEFAULT_URL=f"udpm://239.255.76.67:{20000 + os.getpid() % 20000}?ttl=0")
+    environment.pop("BODYSCHEMA_SHARE", None)
+    output, runs = "", 0
+    for kind, name, content in BLOCK.findall(page.read_text(encoding="utf-8")):
+        content = content.replace("/usr/share/doc/bodyschema", str(source / "docs"))
+        content = content.replace("/usr/share/bodyschema", str(source))
+        if name:
+            (scratch / name).parent.mkdir(parents=True, exist_ok=True)
+            (scratch / name).write_text(content, encoding="utf-8")
+        elif kind == "sh":
+            runs += 1
+            print(content, flush=True)
+            done = subprocess.run(["bash", "-euo", "pipefail", "-c", content], cwd=scratch, text=True,
+                                  env=environment, stdin=subprocess.DEVNULL, check=False,
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=240)
+            output = done.stdout
+            print(output, flush=True)
+            if done.returncode != 0:
+                print(f"{page.name}: status {done.returncode} of\n{content}")
+                return 1
+        else:
+            missing = [line for line in content.splitlines() if line.strip() and not matches(line, output)]
+            if missing:
+                print(f"{page.name} promises what was not printed:\n" + "\n".join(missing))
+                return 1
+    if runs == 0:
+        print(f"{page.name}: no command to run")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,103 @@
+#include "bodyschema/fleet/fleet_report.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "bodyschema/core/error.hpp"
+
+namespace bodyschema {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr Microseconds kBegin = 1'700'000'000'000'000;
+constexpr Microseconds kWeek = 7ll * 24 * 3600 * 1'000'000;
+
+class FleetReport : public testing::Test {
+ protected:
+  void SetUp() override {
+    fs::remove_all(results_);
+    fs::create_directories(results_);
+  }
+  void write(const std::string& name, const std::string& content) const {
+    const auto file = results_ / name;
+    fs::create_directories(file.parent_path());
+    std::ofstream(file) << content;
+  }
+  void add_log(const std::string& log, Microseconds begin, const std::string& outcome, const std::string& report) const {
+    write(log + "/info.json", "{\"begin_utime\": " + std::to_string(begin) + ", \"duration_s\": 61.5}");
+    write(log + "/outcome.txt", outcome + "\n");
+    if (!report.empty()) write(log + "/report.json", report);
+  }
+  static std::string backlash(double estimate, double elbow) {
+    nlohmann::json j = {{"verdict", "named"}, {"sentence", "backlash of r_elbow"},
+                        {"causes", {{{"name", "backlash"}, {"joint", "r_elbow"}, {"parameter", "backlash"},
+                                     {"unit", "deg"}, {"estimate", estimate}, {"ci95", {estimate - 0.1, estimate + 0.1}}}}},
+                        {"offsets_deg", {{"before", {{"r_elbow", 9.0}}}, {"after", {{"r_elbow", elbow}}}}}};
+    return j.dump();
+  }
+  const fs::path results_ = fs::path(testing::TempDir()) / "bodyschema-fleet";
+};
+
+TEST_F(FleetReport, FollowsACauseOverWeeks) {
+  // Names sort against the dates: the dates count.
+  add_log("alpha/c", kBegin, "diagnosed", backlash(0.8, 1.0));
+  add_log("alpha/b", kBegin + kWeek, "diagnosed", backlash(1.0, 1.5));
+  add_log("alpha/a", kBegin + 3 * kWeek, "diagnosed", backlash(1.4, 2.5));
+  add_log("beta/only", kBegin, "diagnosed", R"({"verdict": "none", "sentence": "fine", "causes": []})");
+  const auto robots = gather_fleet(results_);
+  ASSERT_EQ(robots.size(), 2u);
+  EXPECT_EQ(robots[0].name, "alpha");
+  ASSERT_EQ(robots[0].logs.size(), 3u);
+  EXPECT_EQ(robots[0].logs[0].name, "c");
+  ASSERT_EQ(robots[0].causes.size(), 1u);
+  EXPECT_EQ(robots[0].causes[0].name, "backlash of r_elbow");
+  EXPECT_THAT(robots[0].causes[0].week, testing::ElementsAre(0.0, 1.0, 3.0));
+  EXPECT_NEAR(robots[0].causes[0].per_week, 0.2, 1e-9);
+  EXPECT_NEAR(robots[0].offsets.at(0).per_week, 0.5, 1e-9);
+  EXPECT_EQ(robots[0].sentence(), "3 of 3 logs diagnosed; backlash of r_elbow in 3 (0.8 to 1.4 deg, +0.2 a week)");
+  EXPECT_EQ(robots[1].sentence(), "1 of 1 logs diagnosed; nothing wrong beside the offsets");
+}
+
+TEST_F(FleetReport, SaysWhyALogWasNotDiagnosed) {
+  add_log("alpha/short", kBegin, "short.lcmlog: 4.0 s, at least 10 s are needed", "");
+  add_log("alpha/broken", kBegin + 1, "diagnosed", "{\"verdict\": \"na");
+  add_log("alpha/other", kBegin + 2, "diagnosed", R"({"something": "else"})");
+  write("alpha/empty/info.json", "[]");
+  const auto robots = gather_fleet(results_);
+  ASSERT_EQ(robots.at(0).logs.size(), 4u);
+  for (const auto& log : robots[0].logs) EXPECT_EQ(log.verdict, "not diagnosed") << log.name;
+  EXPECT_THAT(robots[0].logs[1].sentence, HasSubstr("at least 10 s are needed"));
+  EXPECT_THAT(robots[0].logs[2].sentence, HasSubstr("report.json: not valid JSON"));
+  EXPECT_THAT(robots[0].logs[3].sentence, HasSubstr("no 'verdict'"));
+  EXPECT_EQ(robots[0].sentence(), "0 of 4 logs diagnosed");
+}
+
+TEST_F(FleetReport, WritesOnePageForPeopleAndOneFileForPrograms) {
+  add_log("alpha/a", kBegin, "diagnosed", backlash(0.8, 1.0));
+  add_log("alpha/b", kBegin + kWeek, "diagnosed", backlash(1.0, 1.5));
+  const auto out = results_.string() + "-report";
+  const std::string lines = write_fleet_report(gather_fleet(results_), out);
+  EXPECT_THAT(lines, HasSubstr("alpha: 2 of 2 logs diagnosed"));
+  std::stringstream page;
+  page << std::ifstream(fs::path(out) / "report.html").rdbuf();
+  EXPECT_THAT(page.str(), HasSubstr("backlash of r_elbow: 0.8 deg (0.7 to 0.9)"));
+  EXPECT_THAT(page.str(), HasSubstr("2023-11-14 22:13"));
+  std::ifstream file(fs::path(out) / "fleet.json");
+  const auto json = nlohmann::json::parse(file);
+  EXPECT_EQ(json["robots"][0]["logs"][1]["causes"][0]["estimate"], 1.0);
+  EXPECT_NEAR(json["robots"][0]["causes"][0]["per_week"].get<double>(), 0.2, 1e-9);
+}
+
+TEST_F(FleetReport, RefusesAFolderWithoutResults) {
+  EXPECT_THROW((void)gather_fleet(results_), FileError);
+  EXPECT_THROW((void)gather_fleet("/nonexistent"), FileError);
+}
+
+}  // namespace
+}  // namespace bodyschema

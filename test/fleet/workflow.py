@@ -1,0 +1,70 @@
+"""Runs workflow/Snakefile on a small fleet: one log that can be diagnosed, one that is too short, one
+that comes later. Exit 77 means skipped.
+
+usage: workflow.py BIN_DIR SOURCE_DIR SCRATCH_DIR
+"""
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+SKIPPED = 77
+
+
+def main():
+    programs, source, scratch = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
+    if shutil.which("snakemake") is None:
+        print("snakemake is not installed (scripts/setup --all brings it), skipped")
+        return SKIPPED
+    shutil.rmtree(scratch, ignore_errors=True)
+    logs, out = scratch / "logs", scratch / "fleet"
+    for robot in ("left_lab", "right_lab"):
+        (logs / robot).mkdir(parents=True)
+    environment = dict(os.environ, PATH=f"{programs}:{os.environ['PATH']}", HOME=str(scratch),
+                       XDG_CACHE_HOME=str(scratch / "cache"))
+
+    def simulate(file, *motion):
+        subprocess.run(["bodyschema-sim", "--config", "config/icub_right/simulator.yaml", *motion, "--log", file],
+                       check=True, env=environment, stderr=subprocess.DEVNULL, timeout=120)
+
+    def workflow(*more):
+        done = subprocess.run(["snakemake", "-s", source / "workflow/Snakefile", "--cores", "2", "--config",
+                               f"logs={logs}", f"out={out}", *more], cwd=scratch, env=environment, text=True,
+                              check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=400)
+        print(done.stdout)
+        return done
+
+    simulate(logs / "left_lab" / "monday.lcmlog", "--babble", "14", "--set", "simulator.cameras.rate_hz=5")
+    simulate(logs / "right_lab" / "short.lcmlog", "--reach", "--frames", "30")
+
+    # A wrong configuration is not a result: it fails, and the next run goes on from there.
+    wrong = workflow("config=/nonexistent.yaml")
+    assert wrong.returncode != 0 and "/nonexistent.yaml" in wrong.stdout
+    assert not (out / "report.html").exists()
+
+    done = workflow()
+    assert done.returncode == 0
+    fleet = {r["robot"]: r for r in json.loads((out / "fleet.json").read_text())["robots"]}
+    assert set(fleet) == {"left_lab", "right_lab"}
+    monday, = fleet["left_lab"]["logs"]
+    assert monday["verdict"] in ("none", "named", "class", "unexplained"), monday
+    assert monday["begin_utime"] > 1_500_000_000_000_000
+    short, = fleet["right_lab"]["logs"]
+    assert short["verdict"] == "not diagnosed" and " s" in short["sentence"], short
+    page = (out / "report.html").read_text()
+    assert "left_lab" in page and "monday" in page and "not diagnosed" in page
+
+    # Nothing is done twice; a new log alone is.
+    assert "Nothing to be done" in workflow().stdout
+    shutil.copy(logs / "right_lab" / "short.lcmlog", logs / "left_lab" / "tuesday.lcmlog")
+    again = workflow()
+    assert again.returncode == 0
+    assert again.stdout.count("rule diagnose:") == 1, "only the new log is diagnosed"
+    assert len(json.loads((out / "fleet.json").read_text())["robots"][0]["logs"]) == 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

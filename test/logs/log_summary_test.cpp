@@ -1,0 +1,99 @@
+#include "bodyschema/logs/log_summary.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/geometry/pose.hpp"
+#include "recorded_log.hpp"
+
+namespace bodyschema {
+namespace {
+
+using testing::HasSubstr;
+using testing_logs::kBegin;
+
+TEST(LogSummary, CountsChannelsRatesAndGaps) {
+  const auto summary = summarise_log(testing_logs::swinging_log("summary.lcmlog"));
+  EXPECT_EQ(summary.messages, 430u);
+  EXPECT_EQ(summary.begin, kBegin + 500);
+  EXPECT_NEAR(summary.duration_s, 3.99, 0.02);
+  ASSERT_EQ(summary.channels.size(), 2u);
+  EXPECT_EQ(summary.channels[0].channel, "ICUB_CAMERAS");
+  EXPECT_EQ(summary.channels[0].type, "bot_core.images_t");
+  EXPECT_EQ(summary.channels[0].arrivals.count, 30u);
+  EXPECT_EQ(summary.channels[1].type, "bot_core.joint_state_t");
+  EXPECT_NEAR(summary.channels[1].arrivals.rate_hz, 100.0, 0.01);
+  EXPECT_EQ(summary.channels[1].arrivals.gaps, 0u);
+
+  ASSERT_EQ(summary.pictures.size(), 2u);
+  const auto& left = summary.pictures[0];
+  EXPECT_EQ(left.camera, "left");
+  EXPECT_EQ(left.encoding, "RGB");
+  EXPECT_EQ(left.width, 32);
+  EXPECT_EQ(left.height, 24);
+  EXPECT_EQ(left.stamps.count, 30u);
+  EXPECT_EQ(left.stamps.gaps, 1u);
+  EXPECT_NEAR(left.stamps.longest_gap_s, 1.1, 1e-6);
+  EXPECT_EQ(summary.pictures[1].camera, "right");
+  EXPECT_EQ(summary.pictures[1].encoding, "JPEG");
+}
+
+TEST(LogSummary, TellsHowJointsMoved) {
+  const auto summary = summarise_log(testing_logs::swinging_log("motion.lcmlog"));
+  ASSERT_EQ(summary.joints.size(), 2u);
+  const auto& elbow = summary.joints[0];
+  EXPECT_EQ(elbow.name, "elbow");
+  EXPECT_NEAR(degrees(elbow.highest_rad - elbow.lowest_rad), 30.0, 0.01);
+  EXPECT_NEAR(degrees(elbow.fastest_rad_s), 15.0 * 2.0 * kPi, 1.0);
+  EXPECT_EQ(elbow.turns, 7);
+  EXPECT_EQ(summary.joints[1].turns, 0);
+  const std::string text = summary.text();
+  EXPECT_THAT(text, HasSubstr("elbow"));
+  EXPECT_THAT(text, HasSubstr("1 joint moved by less than 0.5 deg"));
+  EXPECT_THAT(text, HasSubstr("1 gap, the longest 1100 ms"));
+}
+
+TEST(LogSummary, CountsWhatCannotBeReadAndKeepsOtherPeoplesMessages) {
+  const auto file = testing_logs::scratch_file("damaged.lcmlog");
+  {
+    LogWriter writer(file);
+    const auto good = encode(testing_logs::joints(kBegin, 0.1f, 0.2f));
+    const std::vector<std::uint8_t> half(good.begin(), good.begin() + 30);
+    writer.publish("ICUB_JOINT_STATE", kBegin, good);
+    writer.publish("ICUB_JOINT_STATE", kBegin + 1, half);
+    writer.publish("ICUB_JOINT_STATE", kBegin + 2, std::vector<std::uint8_t>{});
+    writer.publish("OTHERS", kBegin + 3, std::vector<std::uint8_t>(17, 0xA5));
+  }
+  {
+    std::ofstream stream(file, std::ios::app | std::ios::binary);
+    stream << "\xED\xA1\xDA\x01 cut short";
+  }
+  const auto summary = summarise_log(file);
+  ASSERT_EQ(summary.channels.size(), 2u);
+  EXPECT_EQ(summary.channels[0].unreadable, 2u);
+  EXPECT_EQ(summary.channels[1].type, "?");
+  EXPECT_EQ(summary.channels[1].unreadable, 0u);
+  EXPECT_EQ(summary.damaged_places, 1u);
+  EXPECT_THAT(summary.text(), HasSubstr("damaged at 1 place"));
+}
+
+TEST(LogSummary, JsonHoldsTheSame) {
+  const auto summary = summarise_log(testing_logs::swinging_log("json.lcmlog"));
+  const auto json = nlohmann::json::parse(summary.json());
+  EXPECT_EQ(json["messages"], 430);
+  EXPECT_EQ(json["begin_utime"], kBegin + 500);
+  EXPECT_EQ(json["pictures"][0]["stamps"]["gaps"], 1);
+  EXPECT_EQ(json["joints"][0]["turns"], 7);
+}
+
+TEST(LogSummary, RefusesWhatIsNoLog) {
+  EXPECT_THROW(summarise_log("/nonexistent.lcmlog"), FileError);
+  EXPECT_THROW(summarise_log(BODYSCHEMA_SOURCE_DIR "/README.md"), FileError);
+}
+
+}  // namespace
+}  // namespace bodyschema
