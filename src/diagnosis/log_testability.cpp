@@ -30,7 +30,9 @@ class Motion final : public MeasurementSource {
 
   void add(const Observation& observation) {
     if (!views_.empty() && observation.utime < due_) return;
-    due_ = observation.utime + kPicturePeriod;
+    // Keep to the raster, as the diagnosis does.
+    due_ = views_.empty() || observation.utime > due_ + kPicturePeriod ? observation.utime + kPicturePeriod
+                                                                      : due_ + kPicturePeriod;
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
       if (observation.cameras[c]) views_.push_back({observation.cameras[c]->joints, c});
     }
@@ -62,8 +64,10 @@ class Motion final : public MeasurementSource {
   Microseconds due_ = 0;
 };
 
-std::string joints_text(const std::set<std::string>& joints) {
-  return joints.empty() ? "" : fmt::format(" ({})", fmt::join(joints, ", "));
+std::string joints_text(const std::set<std::string>& joints, const std::vector<std::string>& arm) {
+  if (joints.empty()) return "";
+  const bool whole = std::all_of(arm.begin(), arm.end(), [&](const auto& name) { return joints.contains(name); });
+  return whole && joints.size() == arm.size() ? " of every arm joint" : fmt::format(" of {}", fmt::join(joints, ", "));
 }
 
 }  // namespace
@@ -100,6 +104,9 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
   result.duration_s = seconds(views.back().joints.utime - views.front().joints.utime);
   result.shortest_s = DiagnosisOptions{}.shortest_log_s;
   result.pictures = views.size();
+  for (const auto joint : motion.roles().arm) {
+    result.arm_joints.push_back(motion.roles().names[static_cast<std::size_t>(joint)]);
+  }
   result.not_testable = diagnosis::untestable(motion, motion.instants());
   for (const auto& name : effect_names()) {
     if (name == "joint_offset") continue;  // always fitted, never a finding
@@ -126,7 +133,7 @@ std::string LogTestability::text() const {
     // A pair or a camera does not help to decide what to move.
     if (!cause.joint.empty() && cause.source.empty()) on.insert(cause.joint);
   }
-  for (const auto& [name, on] : by_cause) out += "  " + name + joints_text(on) + '\n';
+  for (const auto& [name, on] : by_cause) out += "  " + name + joints_text(on, arm_joints) + '\n';
   std::map<std::string, std::set<std::string>> by_reason;
   for (const auto& item : not_testable) by_reason[item.reason].insert(item.cause.name);
   if (!by_reason.empty()) out += "but not\n";

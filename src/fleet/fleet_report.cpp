@@ -21,6 +21,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kWeek_s = 7.0 * 24.0 * 3600.0;
 constexpr const char* kNotDiagnosed = "not diagnosed";
+constexpr double kMoved_deg = 0.3;  ///< an offset that moved by more is worth a word
 constexpr std::size_t kMostFileBytes = 64u << 20;
 
 std::string first_line_of(const fs::path& file) {
@@ -189,7 +190,10 @@ void add_robot(Report& report, const FleetRobot& robot) {
   for (const auto& trend : robot.causes) {
     if (trend.value.size() > 1) by_unit[trend.unit].push_back(&trend);
   }
-  for (const auto& [unit, trends] : by_unit) report.chart(chart_of(robot.name + ": causes over time", unit, trends));
+  for (const auto& [unit, trends] : by_unit) {
+    const std::string what = trends.size() == 1 ? trends.front()->name : "causes";
+    report.chart(chart_of(robot.name + ": " + what + " over time", unit, trends));
+  }
   std::vector<const FleetTrend*> offsets;
   for (const auto& trend : robot.offsets) {
     if (trend.value.size() > 1) offsets.push_back(&trend);
@@ -237,7 +241,7 @@ std::string FleetRobot::sentence() const {
   std::string out = fmt::format("{} of {} logs diagnosed", diagnosed, logs.size());
   std::vector<std::string> parts;
   for (const auto& trend : causes) {
-    std::string part = fmt::format("{} in {}", trend.name, trend.value.size());
+    std::string part = fmt::format("{} in {} log{}", trend.name, trend.value.size(), trend.value.size() == 1 ? "" : "s");
     if (trend.value.size() > 1 && trend.week.back() > trend.week.front()) {
       part += fmt::format(" ({:.3g} to {:.3g} {}, {:+.2g} a week)", trend.value.front(), trend.value.back(), trend.unit,
                           trend.per_week);
@@ -247,6 +251,13 @@ std::string FleetRobot::sentence() const {
     parts.push_back(part);
   }
   if (diagnosed > 0) out += parts.empty() ? "; nothing wrong beside the offsets" : "; " + fmt::format("{}", fmt::join(parts, ", "));
+  const auto moved = [](const FleetTrend& t) { return std::abs(t.value.back() - t.value.front()); };
+  const auto most = std::max_element(offsets.begin(), offsets.end(),
+                                     [&](const auto& a, const auto& b) { return moved(a) < moved(b); });
+  if (most != offsets.end() && moved(*most) > kMoved_deg) {
+    out += fmt::format("; the offset of {} moved most, {:.2f} to {:.2f} deg", most->name, most->value.front(),
+                       most->value.back());
+  }
   const bool unexplained = std::any_of(logs.begin(), logs.end(), [](const auto& log) { return log.verdict == "unexplained"; });
   if (unexplained) out += "; some logs hold structure that no known cause explains";
   return out;

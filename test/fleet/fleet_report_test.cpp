@@ -60,7 +60,8 @@ TEST_F(FleetReport, FollowsACauseOverWeeks) {
   EXPECT_THAT(robots[0].causes[0].week, testing::ElementsAre(0.0, 1.0, 3.0));
   EXPECT_NEAR(robots[0].causes[0].per_week, 0.2, 1e-9);
   EXPECT_NEAR(robots[0].offsets.at(0).per_week, 0.5, 1e-9);
-  EXPECT_EQ(robots[0].sentence(), "3 of 3 logs diagnosed; backlash of r_elbow in 3 (0.8 to 1.4 deg, +0.2 a week)");
+  EXPECT_EQ(robots[0].sentence(), "3 of 3 logs diagnosed; backlash of r_elbow in 3 logs (0.8 to 1.4 deg, +0.2 a week); "
+                                  "the offset of r_elbow moved most, 1.00 to 2.50 deg");
   EXPECT_EQ(robots[1].sentence(), "1 of 1 logs diagnosed; nothing wrong beside the offsets");
 }
 
