@@ -7,6 +7,8 @@
 #include <iterator>
 
 #include "bodyschema/bus/yarp_import.hpp"
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/core/nearest_name.hpp"
 
 namespace bodyschema {
 namespace {
@@ -37,6 +39,18 @@ std::string digest_of(const RobotSetup& setup, const RobotModel& robot) {
   return digest.text();
 }
 
+/// The robot, with every camera on one of its links.
+std::shared_ptr<const RobotModel> load(const RobotSetup& setup, const StereoRig& rig) {
+  auto robot = setup.load();
+  for (const auto& camera : rig.cameras) {
+    if (robot->has_link(camera.link)) continue;
+    throw ConfigurationError(fmt::format("cameras.{}.link: '{}' is not a link of robot '{}'; did you mean '{}'?",
+                                         camera.name, camera.link, robot->name(),
+                                         nearest_name(camera.link, robot->link_names())));
+  }
+  return robot;
+}
+
 }  // namespace
 
 Pipeline::Pipeline(const Configuration& configuration)
@@ -45,7 +59,7 @@ Pipeline::Pipeline(const Configuration& configuration)
       vision_(VisionSetup::from(configuration.section("vision"))),
       bus_(BusOptions::from(configuration.section("bus"))),
       options_(EstimatorOptions::from(configuration)),
-      robot_(setup_.load()),
+      robot_(load(setup_, rig_)),
       estimator_(robot_, setup_, rig_, options_),
       configuration_hash_(configuration.hash()),
       model_hash_(digest_of(setup_, *robot_)) {

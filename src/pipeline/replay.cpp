@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <set>
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
@@ -133,10 +134,12 @@ class Replay {
     ObservationStream stream = pipeline_.make_stream();
     ProgressBar bar(label, log.size());
     LogEvent event;
+    std::set<std::string> channels;
     const auto drain = [&] {
       while (auto arrived = stream.next()) action(arrived->observation);
     };
     while (log.next(event)) {
+      channels.insert(event.channel);
       if (stream.receive(event.channel, event.data, event.time_us)) drain();
       bar.set(log.position());
     }
@@ -145,6 +148,9 @@ class Replay {
     statistics_ = stream.statistics();
     complaint_ = fmt::format("{} messages on {} and {}", statistics_.messages,
                              stream.channels().joint_state, stream.channels().cameras);
+    if (statistics_.messages == 0) {
+      complaint_ += fmt::format("; it holds {} (bus.channel_prefix)", fmt::join(channels, ", "));
+    }
   }
 
   std::size_t count_frames() {

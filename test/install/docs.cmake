@@ -21,3 +21,11 @@ foreach(page IN LISTS pages ITEMS ${SOURCE_DIR}/README.md)
     endif()
   endforeach()
 endforeach()
+
+# The port that the page on the service names is the one that its unit opens.
+file(READ ${SOURCE_DIR}/docs/launch_at_boot.md page)
+file(READ ${SOURCE_DIR}/config/service/bodyschemad.service unit)
+string(REGEX MATCH "BODYSCHEMAD_OPTIONS=--page ([0-9]+)" named "${page}")
+if(NOT named OR NOT unit MATCHES "\nSocketBindAllow=ipv4:tcp:${CMAKE_MATCH_1}\n")
+  message(SEND_ERROR "docs/launch_at_boot.md and the unit do not agree on the live page's port")
+endif()

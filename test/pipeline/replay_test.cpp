@@ -133,6 +133,26 @@ TEST_F(ReplayTest, PicturesOfAnotherSizeThanConfiguredAreRefused) {
   }
 }
 
+TEST_F(ReplayTest, ACameraOnALinkThatIsNotThereIsRefusedByItsKey) {
+  try {
+    replay(configuration({"cameras.right.link=r_eye_optica"}), options("link"));
+    FAIL() << "no error";
+  } catch (const ConfigurationError& e) {
+    EXPECT_STREQ(e.what(), "cameras.right.link: 'r_eye_optica' is not a link of robot 'icub_right'; "
+                           "did you mean 'r_eye_optical'?");
+  }
+}
+
+TEST_F(ReplayTest, AWrongPrefixNamesTheChannelsThatAreThere) {
+  try {
+    replay(configuration({"bus.channel_prefix=LAB"}), options("prefix"));
+    FAIL() << "no error";
+  } catch (const DataError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("0 messages on LAB_JOINT_STATE and LAB_CAMERAS; it holds "
+                                    "ICUB_CAMERAS, ICUB_JOINT_STATE (bus.channel_prefix)"));
+  }
+}
+
 TEST_F(ReplayTest, AnUnknownKeyIsRefused) {
   try {
     replay(configuration({"filter.particels=3"}), options("unknown"));
