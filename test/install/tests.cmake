@@ -59,11 +59,18 @@ add_test(NAME docs.pages_agree_with_the_tree
 set_tests_properties(docs.pages_agree_with_the_tree PROPERTIES LABELS docs TIMEOUT 60)
 
 if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
-  # Every page with commands; a new page's name joins this list.
-  foreach(page IN ITEMS apply_the_result calibrate_my_robot first_run record_a_good_log)
+  # Every page with a block of commands.
+  file(GLOB pages CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/docs/*.md)
+  foreach(file IN LISTS pages)
+    file(STRINGS ${file} commands REGEX "^```sh$" LIMIT_COUNT 1)
+    if(NOT commands)
+      continue()
+    endif()
+    get_filename_component(page ${file} NAME_WE)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
     add_test(NAME docs.${page}
       COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/docs/run_page.py
-        ${PROJECT_SOURCE_DIR}/docs/${page}.md ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_SOURCE_DIR}
+        ${file} ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_SOURCE_DIR}
         ${PROJECT_BINARY_DIR}/test-docs/${page})
     set_tests_properties(docs.${page} PROPERTIES LABELS docs TIMEOUT 300)
   endforeach()
