@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
   bodyschema::apps::add_diagnose(app);
   bodyschema::apps::add_fleet(app);
   bodyschema::apps::add_log(app);
+  bodyschema::apps::add_new_robot(app);
   bodyschema::apps::add_selftest(app);
   try {
     app.parse(argc, argv);

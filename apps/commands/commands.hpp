@@ -14,5 +14,6 @@ void add_diagnose(CLI::App& app);
 void add_selftest(CLI::App& app);
 void add_log(CLI::App& app);
 void add_fleet(CLI::App& app);
+void add_new_robot(CLI::App& app);
 
 }  // namespace bodyschema::apps

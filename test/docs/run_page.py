@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
 """Runs the commands of one page of docs/ as its reader would: every block fenced as `sh`, in order, in
-one shell, in an empty folder. A command that fails fails the page. A block fenced as `yaml file=NAME`
-is a file that the page tells the reader to write. A `text` block that follows an `sh` block is what the
-page says is printed: every line of it must appear in the output, where `...` stands for anything.
+an empty folder. A command that fails fails the page. A `text` block that follows an `sh` block is what
+the page says is printed: every line of it must appear in the output, where `...` stands for anything.
 
 usage: run_page.py PAGE BIN_DIR SOURCE_DIR SCRATCH_DIR
 /usr/share/bodyschema (configurations, robots) and /usr/share/doc/bodyschema stand for the source tree.
@@ -14,7 +13,7 @@ import shutil
 import subprocess
 import sys
 
-BLOCK = re.compile(r"^```(sh|text|yaml file=(\S+))\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^```(sh|text)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def matches(expected, output):
@@ -31,13 +30,10 @@ def main():
                        LCM_DEFAULT_URL=f"udpm://239.255.76.67:{20000 + os.getpid() % 20000}?ttl=0")
     environment.pop("BODYSCHEMA_SHARE", None)
     output, runs = "", 0
-    for kind, name, content in BLOCK.findall(page.read_text(encoding="utf-8")):
+    for kind, content in BLOCK.findall(page.read_text(encoding="utf-8")):
         content = content.replace("/usr/share/doc/bodyschema", str(source / "docs"))
         content = content.replace("/usr/share/bodyschema", str(source))
-        if name:
-            (scratch / name).parent.mkdir(parents=True, exist_ok=True)
-            (scratch / name).write_text(content, encoding="utf-8")
-        elif kind == "sh":
+        if kind == "sh":
             runs += 1
             print(content, flush=True)
             done = subprocess.run(["bash", "-euo", "pipefail", "-c", content], cwd=scratch, text=True,

@@ -1,0 +1,106 @@
+#include "bodyschema/pipeline/starter_configuration.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/pipeline/pipeline.hpp"
+
+namespace bodyschema {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+const fs::path kSource = BODYSCHEMA_SOURCE_DIR;
+
+class StarterConfiguration : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("bodyschema_starter_" + std::to_string(getpid()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  StarterOptions options() const {
+    StarterOptions o;
+    o.urdf = kSource / "meshes/arm7/arm7.urdf";
+    o.hand_link = "hand";
+    o.camera_links = {"camera_left_optical", "camera_right_optical"};
+    o.out = folder_ / "mine";
+    return o;
+  }
+  fs::path folder_;
+};
+
+TEST_F(StarterConfiguration, FindsTheArmBetweenRootAndHand) {
+  auto o = options();
+  o.width = 320;
+  o.height = 240;
+  o.focal_px = 420.0;
+  const std::string told = write_starter_configuration(o);
+  EXPECT_THAT(told, HasSubstr("arm: joint1, joint2, joint3, joint4, joint5, joint6, joint7\n"));
+  EXPECT_THAT(told, HasSubstr("robot and meshes load"));
+  Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
+  EXPECT_THAT(pipeline.setup().estimated_joints,
+              ElementsAre("joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "joint7"));
+  EXPECT_THAT(pipeline.setup().model.rendered_links,
+              ElementsAre("link1", "link2", "link3", "link4", "link5", "link6", "link7", "hand", "left_finger",
+                          "right_finger"));
+  EXPECT_TRUE(pipeline.setup().head_joints.empty());
+  ASSERT_EQ(pipeline.rig().cameras.size(), 2u);
+  EXPECT_EQ(pipeline.rig().cameras[1].intrinsics, (PinholeIntrinsics{320, 240, 420.0, 420.0, 159.5, 119.5}));
+  EXPECT_EQ(pipeline.bus().channels().cameras, "ROBOT_CAMERAS");
+}
+
+TEST_F(StarterConfiguration, AHumanoidsTorsoIsSharedAndItsHeadIsNoArm) {
+  auto o = options();
+  o.urdf = kSource / "meshes/icub_right/icub_right.urdf";
+  o.hand_link = "r_hand";
+  o.camera_links = {"l_eye_optical", "r_eye_optical"};
+  const std::string told = write_starter_configuration(o);
+  EXPECT_THAT(told, HasSubstr("focal length: a guess, 55"));
+  Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
+  const Configuration ours = Configuration::load(kSource / "config/icub_right/robot.yaml");
+  EXPECT_EQ(pipeline.setup().estimated_joints, RobotSetup::from(ours.section("robot")).estimated_joints);
+  EXPECT_THAT(pipeline.setup().head_joints, testing::UnorderedElementsAre("neck_pitch", "neck_roll", "neck_yaw", "eyes_tilt",
+                                                                          "l_eye_pan", "r_eye_pan"));
+  EXPECT_TRUE(pipeline.setup().fixed_joints_rad.contains("torso_pitch"));
+  EXPECT_TRUE(pipeline.setup().fixed_joints_rad.contains("r_thumb_proximal"));
+}
+
+TEST_F(StarterConfiguration, ReplacesNothing) {
+  (void)write_starter_configuration(options());
+  EXPECT_THROW((void)write_starter_configuration(options()), FileError);
+}
+
+TEST_F(StarterConfiguration, WrongInputIsNamed) {
+  const auto error_of = [](const StarterOptions& o) {
+    try {
+      (void)write_starter_configuration(o);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  auto o = options();
+  o.hand_link = "hannd";
+  EXPECT_THAT(error_of(o), HasSubstr("--hand 'hannd': no such link in"));
+  EXPECT_THAT(error_of(o), HasSubstr("did you mean 'hand'?"));
+  o = options();
+  o.camera_links = {"left_fingertip"};
+  EXPECT_THAT(error_of(o), HasSubstr("no joint moves it against the cameras"));
+  o = options();
+  o.urdf = kSource / "README.md";
+  EXPECT_THAT(error_of(o), HasSubstr("README.md: not a URDF"));
+  o.urdf = "/nonexistent.urdf";
+  EXPECT_THAT(error_of(o), HasSubstr("/nonexistent.urdf: URDF not found"));
+  EXPECT_FALSE(fs::exists(o.out)) << "nothing is written for wrong input";
+}
+
+}  // namespace
+}  // namespace bodyschema
