@@ -32,14 +32,16 @@ std::vector<JointSample> JointStream::finish() {
   constexpr Microseconds kHalfWindow = 30'000;
   std::size_t a = 0, b = 0;
   for (std::size_t i = 0; i < stream_.size(); ++i) {
-    while (a < i && stream_[a].utime < stream_[i].utime - kHalfWindow) ++a;
+    while (a < i && stream_[a].utime < stream_[i].utime - kHalfWindow)
+      ++a;
     b = std::max(b, i);
-    while (b + 1 < stream_.size() && stream_[b + 1].utime <= stream_[i].utime + kHalfWindow) ++b;
+    while (b + 1 < stream_.size() && stream_[b + 1].utime <= stream_[i].utime + kHalfWindow)
+      ++b;
     const std::size_t low = a == i && i > 0 ? i - 1 : a;
     const std::size_t high = b == i && i + 1 < stream_.size() ? i + 1 : b;
     if (high > low) {
-      stream_[i].qdot = (stream_[high].q - stream_[low].q) /
-                        seconds(stream_[high].utime - stream_[low].utime);
+      stream_[i].qdot =
+          (stream_[high].q - stream_[low].q) / seconds(stream_[high].utime - stream_[low].utime);
     }
   }
   return std::move(stream_);

@@ -1,14 +1,14 @@
 #include "bodyschema/logs/log_summary.hpp"
 
-#include <spdlog/fmt/fmt.h>
-
 #include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <deque>
 #include <map>
-#include <nlohmann/json.hpp>
+#include <spdlog/fmt/fmt.h>
 #include <tuple>
+
+#include <nlohmann/json.hpp>
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/bus/messages.hpp"
@@ -41,7 +41,8 @@ class Stamps {
     }
     result.longest_gap_s = seconds(*std::max_element(steps.begin(), steps.end()));
     auto sorted = steps;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+    std::nth_element(sorted.begin(),
+                     sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
     const double usual = static_cast<double>(sorted[sorted.size() / 2]);
     for (const Microseconds step : steps) {
       result.gaps += usual > 0.0 && static_cast<double>(step) > kGapPeriods * usual ? 1 : 0;
@@ -66,10 +67,12 @@ class JointWatcher {
     motion.highest_rad = std::max(motion.highest_rad, q);
     if (!recent_.empty() && utime <= recent_.back().first) return;
     recent_.emplace_back(utime, q);
-    while (recent_.size() > 1 && recent_[1].first <= utime - kSpeedWindow) recent_.pop_front();
+    while (recent_.size() > 1 && recent_[1].first <= utime - kSpeedWindow)
+      recent_.pop_front();
     const double span_s = seconds(utime - recent_.front().first);
     if (span_s >= 0.5 * seconds(kSpeedWindow)) {
-      motion.fastest_rad_s = std::max(motion.fastest_rad_s, std::abs(q - recent_.front().second) / span_s);
+      motion.fastest_rad_s =
+          std::max(motion.fastest_rad_s, std::abs(q - recent_.front().second) / span_s);
     }
     // Turning points at least kTurn_rad apart, so that encoder noise is none.
     if (direction_ >= 0 && q < extreme_ - kTurn_rad) {
@@ -94,17 +97,24 @@ class JointWatcher {
 
 const char* encoding_name(std::int32_t format) {
   switch (format) {
-    case bot_core::image_t::PIXEL_FORMAT_GRAY: return "gray";
-    case bot_core::image_t::PIXEL_FORMAT_RGB: return "RGB";
-    case bot_core::image_t::PIXEL_FORMAT_BGR: return "BGR";
-    case bot_core::image_t::PIXEL_FORMAT_MJPEG: return "JPEG";
-    default: return "unknown";
+    case bot_core::image_t::PIXEL_FORMAT_GRAY:
+      return "gray";
+    case bot_core::image_t::PIXEL_FORMAT_RGB:
+      return "RGB";
+    case bot_core::image_t::PIXEL_FORMAT_BGR:
+      return "BGR";
+    case bot_core::image_t::PIXEL_FORMAT_MJPEG:
+      return "JPEG";
+    default:
+      return "unknown";
   }
 }
 
 class Summariser {
  public:
-  explicit Summariser(const std::filesystem::path& log) : reader_(log) { summary_.file = log.string(); }
+  explicit Summariser(const std::filesystem::path& log) : reader_(log) {
+    summary_.file = log.string();
+  }
 
   LogSummary run() {
     ProgressBar bar("reading", reader_.size());
@@ -140,12 +150,22 @@ class Summariser {
     }
     bool good = true;
     switch (kind) {
-      case MessageKind::kJointState: good = take_joints(event); break;
-      case MessageKind::kImages: good = take_images(event); break;
-      case MessageKind::kJointOffsets: good = decode(event.data, offsets_).ok(); break;
-      case MessageKind::kOffsetsStatus: good = decode(event.data, status_).ok(); break;
+      case MessageKind::kJointState:
+        good = take_joints(event);
+        break;
+      case MessageKind::kImages:
+        good = take_images(event);
+        break;
+      case MessageKind::kJointOffsets:
+        good = decode(event.data, offsets_).ok();
+        break;
+      case MessageKind::kOffsetsStatus:
+        good = decode(event.data, status_).ok();
+        break;
       // Noise on a channel of ours is unreadable; a channel of others is none of our business.
-      case MessageKind::kUnknown: good = channel.summary.type == name_of(MessageKind::kUnknown); break;
+      case MessageKind::kUnknown:
+        good = channel.summary.type == name_of(MessageKind::kUnknown);
+        break;
     }
     channel.summary.unreadable += good ? 0 : 1;
   }
@@ -154,14 +174,16 @@ class Summariser {
     if (!decode(event.data, joint_state_).ok()) return false;
     joint_stamps_.add(joint_state_.utime);
     auto& channels = summary_.joint_channels;
-    if (std::find(channels.begin(), channels.end(), event.channel) == channels.end()) channels.push_back(event.channel);
+    if (std::find(channels.begin(), channels.end(), event.channel) == channels.end())
+      channels.push_back(event.channel);
     for (std::size_t i = 0; i < joint_state_.names.size(); ++i) {
       const auto [at, is_new] = joint_index_.try_emplace(joint_state_.names[i], joints_.size());
       if (is_new) {
         joints_.emplace_back();
         joints_.back().motion.name = joint_state_.names[i];
       }
-      joints_[at->second].add(joint_state_.utime, static_cast<double>(joint_state_.position_rad[i]));
+      joints_[at->second].add(joint_state_.utime,
+                              static_cast<double>(joint_state_.position_rad[i]));
     }
     return true;
   }
@@ -169,7 +191,8 @@ class Summariser {
   bool take_images(const LogEvent& event) {
     if (!decode(event.data, images_).ok()) return false;
     for (const auto& image : images_.images) {
-      pictures_[{event.channel, image.type, image.width, image.height, image.pixelformat}].add(image.utime);
+      pictures_[{event.channel, image.type, image.width, image.height, image.pixelformat}].add(
+          image.utime);
     }
     return true;
   }
@@ -182,10 +205,12 @@ class Summariser {
     }
     for (const auto& [key, stamps] : pictures_) {
       const auto& [channel, type, width, height, format] = key;
-      summary_.pictures.push_back({channel, camera_name(type), encoding_name(format), width, height, stamps.regularity()});
+      summary_.pictures.push_back(
+          {channel, camera_name(type), encoding_name(format), width, height, stamps.regularity()});
     }
     summary_.joint_readings = joint_stamps_.regularity();
-    for (auto& joint : joints_) summary_.joints.push_back(std::move(joint.motion));
+    for (auto& joint : joints_)
+      summary_.joints.push_back(std::move(joint.motion));
   }
 
   LogReader reader_;
@@ -216,74 +241,102 @@ std::string plural(std::uint64_t n, const std::string& word) {
 
 std::string gaps_text(const Regularity& r) {
   std::string text;
-  if (r.gaps > 0) text += fmt::format("{}, the longest {:.0f} ms", plural(r.gaps, "gap"), 1e3 * r.longest_gap_s);
-  if (r.backwards > 0) text += fmt::format("{}{} out of order", text.empty() ? "" : "; ", r.backwards);
+  if (r.gaps > 0)
+    text += fmt::format("{}, the longest {:.0f} ms", plural(r.gaps, "gap"), 1e3 * r.longest_gap_s);
+  if (r.backwards > 0)
+    text += fmt::format("{}{} out of order", text.empty() ? "" : "; ", r.backwards);
   return text.empty() ? "no gaps" : text;
 }
 
 Json regularity_json(const Regularity& r) {
-  return {{"count", r.count}, {"rate_hz", r.rate_hz}, {"gaps", r.gaps}, {"longest_gap_s", r.longest_gap_s},
+  return {{"count", r.count},
+          {"rate_hz", r.rate_hz},
+          {"gaps", r.gaps},
+          {"longest_gap_s", r.longest_gap_s},
           {"out_of_order", r.backwards}};
 }
 
 }  // namespace
 
 std::string LogSummary::text() const {
-  std::string out = fmt::format("{}: {:.1f} MB, {}, {:.1f} s from {}\n", file, 1e-6 * static_cast<double>(bytes),
-                                plural(messages, "message"), duration_s, date_text(begin));
-  if (damaged_places > 0) out += fmt::format("damaged at {}; what could be read counts below\n", plural(damaged_places, "place"));
-  out += fmt::format("\n{:<28} {:<28} {:>9} {:>8} {:>9}\n", "channel", "type", "messages", "Hz", "MB");
+  std::string out =
+      fmt::format("{}: {:.1f} MB, {}, {:.1f} s from {}\n", file, 1e-6 * static_cast<double>(bytes),
+                  plural(messages, "message"), duration_s, date_text(begin));
+  if (damaged_places > 0)
+    out += fmt::format("damaged at {}; what could be read counts below\n",
+                       plural(damaged_places, "place"));
+  out +=
+      fmt::format("\n{:<28} {:<28} {:>9} {:>8} {:>9}\n", "channel", "type", "messages", "Hz", "MB");
   for (const auto& c : channels) {
-    out += fmt::format("{:<28} {:<28} {:>9} {:>8.1f} {:>9.1f}{}\n", c.channel, c.type, c.arrivals.count,
-                       c.arrivals.rate_hz, 1e-6 * static_cast<double>(c.bytes),
+    out += fmt::format("{:<28} {:<28} {:>9} {:>8.1f} {:>9.1f}{}\n", c.channel, c.type,
+                       c.arrivals.count, c.arrivals.rate_hz, 1e-6 * static_cast<double>(c.bytes),
                        c.unreadable > 0 ? fmt::format("  {} unreadable", c.unreadable) : "");
   }
-  if (!pictures.empty()) out += fmt::format("\n{:<28} {:<10} {:<18} {:>9} {:>8}  by their stamps\n", "pictures", "camera", "size", "pictures", "Hz");
+  if (!pictures.empty())
+    out += fmt::format("\n{:<28} {:<10} {:<18} {:>9} {:>8}  by their stamps\n", "pictures",
+                       "camera", "size", "pictures", "Hz");
   for (const auto& p : pictures) {
     out += fmt::format("{:<28} {:<10} {:<18} {:>9} {:>8.1f}  {}\n", p.channel, p.camera,
-                       fmt::format("{}x{} {}", p.width, p.height, p.encoding), p.stamps.count, p.stamps.rate_hz,
-                       gaps_text(p.stamps));
+                       fmt::format("{}x{} {}", p.width, p.height, p.encoding), p.stamps.count,
+                       p.stamps.rate_hz, gaps_text(p.stamps));
   }
   if (joints.empty()) return out;
-  out += fmt::format("\nencoders: {} joints at {:.1f} Hz, {}\n", joints.size(), joint_readings.rate_hz,
-                     gaps_text(joint_readings));
-  out += fmt::format("{:<28} {:>10} {:>10} {:>12} {:>6}\n", "joint that moved", "from deg", "to deg", "deg/s at most", "turns");
+  out += fmt::format("\nencoders: {} joints at {:.1f} Hz, {}\n", joints.size(),
+                     joint_readings.rate_hz, gaps_text(joint_readings));
+  out += fmt::format("{:<28} {:>10} {:>10} {:>12} {:>6}\n", "joint that moved", "from deg",
+                     "to deg", "deg/s at most", "turns");
   std::size_t still = 0;
   for (const auto& j : joints) {
     if (j.highest_rad - j.lowest_rad < kTurn_rad) {
       ++still;
       continue;
     }
-    out += fmt::format("{:<28} {:>10.1f} {:>10.1f} {:>12.0f} {:>6}\n", j.name, degrees(j.lowest_rad),
-                       degrees(j.highest_rad), degrees(j.fastest_rad_s), j.turns);
+    out +=
+        fmt::format("{:<28} {:>10.1f} {:>10.1f} {:>12.0f} {:>6}\n", j.name, degrees(j.lowest_rad),
+                    degrees(j.highest_rad), degrees(j.fastest_rad_s), j.turns);
   }
-  if (still > 0) out += fmt::format("{} moved by less than {:.1f} deg\n", plural(still, "joint"), degrees(kTurn_rad));
+  if (still > 0)
+    out += fmt::format("{} moved by less than {:.1f} deg\n", plural(still, "joint"),
+                       degrees(kTurn_rad));
   return out;
 }
 
 std::string LogSummary::json() const {
-  Json j = {{"file", file}, {"bytes", bytes}, {"messages", messages}, {"damaged_places", damaged_places},
+  Json j = {{"file", file},         {"bytes", bytes},
+            {"messages", messages}, {"damaged_places", damaged_places},
             {"begin_utime", begin}, {"duration_s", duration_s}};
   j["channels"] = Json::array();
   for (const auto& c : channels) {
-    j["channels"].push_back({{"channel", c.channel}, {"type", c.type}, {"arrivals", regularity_json(c.arrivals)},
-                             {"bytes", c.bytes}, {"unreadable", c.unreadable}});
+    j["channels"].push_back({{"channel", c.channel},
+                             {"type", c.type},
+                             {"arrivals", regularity_json(c.arrivals)},
+                             {"bytes", c.bytes},
+                             {"unreadable", c.unreadable}});
   }
   j["pictures"] = Json::array();
   for (const auto& p : pictures) {
-    j["pictures"].push_back({{"channel", p.channel}, {"camera", p.camera}, {"encoding", p.encoding},
-                             {"width", p.width}, {"height", p.height}, {"stamps", regularity_json(p.stamps)}});
+    j["pictures"].push_back({{"channel", p.channel},
+                             {"camera", p.camera},
+                             {"encoding", p.encoding},
+                             {"width", p.width},
+                             {"height", p.height},
+                             {"stamps", regularity_json(p.stamps)}});
   }
   j["joint_readings"] = regularity_json(joint_readings);
   j["joints"] = Json::array();
   for (const auto& m : joints) {
-    j["joints"].push_back({{"joint", m.name}, {"readings", m.readings}, {"lowest_deg", degrees(m.lowest_rad)},
-                           {"highest_deg", degrees(m.highest_rad)}, {"fastest_deg_s", degrees(m.fastest_rad_s)},
+    j["joints"].push_back({{"joint", m.name},
+                           {"readings", m.readings},
+                           {"lowest_deg", degrees(m.lowest_rad)},
+                           {"highest_deg", degrees(m.highest_rad)},
+                           {"fastest_deg_s", degrees(m.fastest_rad_s)},
                            {"turns", m.turns}});
   }
-  return j.dump(2) + "\n";
+  return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";  // names may be no UTF-8
 }
 
-LogSummary summarise_log(const std::filesystem::path& log) { return Summariser(log).run(); }
+LogSummary summarise_log(const std::filesystem::path& log) {
+  return Summariser(log).run();
+}
 
 }  // namespace bodyschema

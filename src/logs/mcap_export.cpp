@@ -1,6 +1,7 @@
 #include "bodyschema/logs/mcap_export.hpp"
 
 #include <cmath>
+
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/bus/log.hpp"
@@ -17,7 +18,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::uint64_t nanoseconds(Microseconds utime) { return utime > 0 ? 1000u * static_cast<std::uint64_t>(utime) : 0u; }
+std::uint64_t nanoseconds(Microseconds utime) {
+  return utime > 0 ? 1000u * static_cast<std::uint64_t>(utime) : 0u;
+}
 
 Json timestamp(Microseconds utime) {
   const auto us = static_cast<std::uint64_t>(std::max<Microseconds>(utime, 0));
@@ -25,32 +28,47 @@ Json timestamp(Microseconds utime) {
 }
 
 /// JSON has no infinities: what is not finite is null.
-Json number(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
+Json number(double x) {
+  return std::isfinite(x) ? Json(x) : Json(nullptr);
+}
+
+/// Text that is not UTF-8 is replaced, not refused: the numbers beside it are still good.
+std::string text_of(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
 
 /// A JSON schema that describes one message: viewers offer its fields for plotting by this.
 Json schema_of(const Json& value) {
   if (value.is_object()) {
     Json properties = Json::object();
-    for (const auto& [key, member] : value.items()) properties[key] = schema_of(member);
+    for (const auto& [key, member] : value.items())
+      properties[key] = schema_of(member);
     return {{"type", "object"}, {"properties", properties}};
   }
-  if (value.is_array()) return {{"type", "array"}, {"items", value.empty() ? Json::object() : schema_of(value[0])}};
+  if (value.is_array())
+    return {{"type", "array"}, {"items", value.empty() ? Json::object() : schema_of(value[0])}};
   if (value.is_string()) return {{"type", "string"}};
   if (value.is_number_integer()) return {{"type", "integer"}};
   return {{"type", {"number", "null"}}};
 }
 
 Json time_schema() {
-  return {{"type", "object"}, {"title", "time"},
-          {"properties", {{"sec", {{"type", "integer"}, {"minimum", 0}}},
-                          {"nsec", {{"type", "integer"}, {"minimum", 0}, {"maximum", 999'999'999}}}}}};
+  return {{"type", "object"},
+          {"title", "time"},
+          {"properties",
+           {{"sec", {{"type", "integer"}, {"minimum", 0}}},
+            {"nsec", {{"type", "integer"}, {"minimum", 0}, {"maximum", 999'999'999}}}}}};
 }
 
 Json picture_schema() {
-  return {{"title", "foxglove.CompressedImage"}, {"$comment", "A compressed image"}, {"type", "object"},
-          {"properties", {{"timestamp", time_schema()}, {"frame_id", {{"type", "string"}}},
-                          {"data", {{"type", "string"}, {"contentEncoding", "base64"}}},
-                          {"format", {{"type", "string"}}}}}};
+  return {{"title", "foxglove.CompressedImage"},
+          {"$comment", "A compressed image"},
+          {"type", "object"},
+          {"properties",
+           {{"timestamp", time_schema()},
+            {"frame_id", {{"type", "string"}}},
+            {"data", {{"type", "string"}, {"contentEncoding", "base64"}}},
+            {"format", {{"type", "string"}}}}}};
 }
 
 Json json_of(const JointStateMessage& m) {
@@ -59,7 +77,8 @@ Json json_of(const JointStateMessage& m) {
     position[m.names[i]] = degrees(static_cast<double>(m.position_rad[i]));
     velocity[m.names[i]] = degrees(static_cast<double>(m.velocity_rad_s[i]));
   }
-  return {{"timestamp", timestamp(m.utime)}, {"position_deg", position}, {"velocity_deg_s", velocity}};
+  return {
+      {"timestamp", timestamp(m.utime)}, {"position_deg", position}, {"velocity_deg_s", velocity}};
 }
 
 Json json_of(const joint_offsets_t& m) {
@@ -71,45 +90,73 @@ Json json_of(const joint_offsets_t& m) {
   for (std::size_t c = 0; c < m.camera_name.size(); ++c) {
     const auto& p = m.hand_pose_in_camera[c].position_m;
     const auto& q = m.hand_pose_in_camera[c].quaternion_wxyz;
-    hand[m.camera_name[c]] = {{"position_m", {{"x", number(p[0])}, {"y", number(p[1])}, {"z", number(p[2])}}},
-                              {"orientation", {{"x", number(q[1])}, {"y", number(q[2])}, {"z", number(q[3])},
-                                               {"w", number(q[0])}}}};
+    hand[m.camera_name[c]] = {
+        {"position_m", {{"x", number(p[0])}, {"y", number(p[1])}, {"z", number(p[2])}}},
+        {"orientation",
+         {{"x", number(q[1])}, {"y", number(q[2])}, {"z", number(q[3])}, {"w", number(q[0])}}}};
   }
   for (std::size_t i = 0; i < m.parameter_name.size(); ++i) {
-    others[m.parameter_name[i]] = {{"value", number(m.parameter_value[i])}, {"stddev", number(m.parameter_stddev[i])},
+    others[m.parameter_name[i]] = {{"value", number(m.parameter_value[i])},
+                                   {"stddev", number(m.parameter_stddev[i])},
                                    {"unit", m.parameter_unit[i]}};
   }
-  return {{"timestamp", timestamp(m.utime)}, {"sequence", m.sequence}, {"state", m.state},
-          {"offset_deg", mean}, {"stddev_deg", sd}, {"hand_in_camera", hand}, {"parameters", others},
-          {"effective_sample_size", number(m.effective_sample_size)}, {"best_likelihood", number(m.best_likelihood)},
-          {"latency_ms", number(m.latency_ms)}, {"model_hash", m.model_hash}, {"config_hash", m.config_hash}};
+  return {{"timestamp", timestamp(m.utime)},
+          {"sequence", m.sequence},
+          {"state", m.state},
+          {"offset_deg", mean},
+          {"stddev_deg", sd},
+          {"hand_in_camera", hand},
+          {"parameters", others},
+          {"effective_sample_size", number(m.effective_sample_size)},
+          {"best_likelihood", number(m.best_likelihood)},
+          {"latency_ms", number(m.latency_ms)},
+          {"model_hash", m.model_hash},
+          {"config_hash", m.config_hash}};
 }
 
 Json json_of(const offsets_status_t& m) {
   static constexpr const char* kLevels[] = {"OK", "WARN", "ERROR", "STALE"};
   Json counters = Json::object(), median = Json::object(), p99 = Json::object();
-  for (std::size_t i = 0; i < m.counter_name.size(); ++i) counters[m.counter_name[i]] = m.counter_value[i];
+  for (std::size_t i = 0; i < m.counter_name.size(); ++i)
+    counters[m.counter_name[i]] = m.counter_value[i];
   for (std::size_t i = 0; i < m.stage_name.size(); ++i) {
     median[m.stage_name[i]] = number(m.stage_median_ms[i]);
     p99[m.stage_name[i]] = number(m.stage_p99_ms[i]);
   }
-  return {{"timestamp", timestamp(m.utime)}, {"level", m.level},
-          {"level_name", m.level >= 0 && m.level < 4 ? kLevels[m.level] : "?"}, {"sentence", m.sentence},
-          {"state", m.state}, {"uptime_s", 1e-6 * static_cast<double>(m.uptime_us)}, {"frames_in", m.frames_in},
-          {"frames_estimated", m.frames_estimated}, {"frames_dropped", m.frames_dropped}, {"gaps", m.gaps},
-          {"frame_rate_hz", number(m.frame_rate_hz)}, {"image_age_ms", number(m.image_age_ms)},
-          {"encoder_lag_ms", number(m.encoder_lag_ms)}, {"latency_median_ms", number(m.latency_median_ms)},
-          {"latency_p99_ms", number(m.latency_p99_ms)}, {"stage_median_ms", median}, {"stage_p99_ms", p99},
-          {"counters", counters}, {"engine", m.engine}, {"renderer", m.renderer},
-          {"effective_sample_size", number(m.effective_sample_size)}, {"best_likelihood", number(m.best_likelihood)},
-          {"weakest_direction", m.weakest_direction}, {"weakest_stddev_deg", number(degrees(m.weakest_stddev_rad))},
-          {"resident_mb", 1e-6 * static_cast<double>(m.resident_bytes)}, {"version", m.version},
-          {"model_hash", m.model_hash}, {"config_hash", m.config_hash}};
+  return {{"timestamp", timestamp(m.utime)},
+          {"level", m.level},
+          {"level_name", m.level >= 0 && m.level < 4 ? kLevels[m.level] : "?"},
+          {"sentence", m.sentence},
+          {"state", m.state},
+          {"uptime_s", 1e-6 * static_cast<double>(m.uptime_us)},
+          {"frames_in", m.frames_in},
+          {"frames_estimated", m.frames_estimated},
+          {"frames_dropped", m.frames_dropped},
+          {"gaps", m.gaps},
+          {"frame_rate_hz", number(m.frame_rate_hz)},
+          {"image_age_ms", number(m.image_age_ms)},
+          {"encoder_lag_ms", number(m.encoder_lag_ms)},
+          {"latency_median_ms", number(m.latency_median_ms)},
+          {"latency_p99_ms", number(m.latency_p99_ms)},
+          {"stage_median_ms", median},
+          {"stage_p99_ms", p99},
+          {"counters", counters},
+          {"engine", m.engine},
+          {"renderer", m.renderer},
+          {"effective_sample_size", number(m.effective_sample_size)},
+          {"best_likelihood", number(m.best_likelihood)},
+          {"weakest_direction", m.weakest_direction},
+          {"weakest_stddev_deg", number(degrees(m.weakest_stddev_rad))},
+          {"resident_mb", 1e-6 * static_cast<double>(m.resident_bytes)},
+          {"version", m.version},
+          {"model_hash", m.model_hash},
+          {"config_hash", m.config_hash}};
 }
 
 class Exporter {
  public:
-  explicit Exporter(const McapExportOptions& options) : options_(options), reader_(options.log), writer_(options.out) {}
+  explicit Exporter(const McapExportOptions& options)
+      : options_(options), reader_(options.log), writer_(options.out) {}
 
   McapExportSummary run() {
     ProgressBar bar("to-mcap", reader_.size());
@@ -119,7 +166,9 @@ class Exporter {
       bar.set(reader_.position());
     }
     if (summary_.messages.empty()) {
-      throw DataError(options_.log.string() + ": no joint states, pictures, offsets or status in this log; nothing is written");
+      throw DataError(
+          options_.log.string() +
+          ": no joint states, pictures, offsets or status in this log; nothing is written");
     }
     writer_.close();
     summary_.bytes = writer_.bytes_written();
@@ -129,11 +178,21 @@ class Exporter {
  private:
   void take(const LogEvent& event) {
     switch (kind_of(event.data)) {
-      case MessageKind::kJointState: write_decoded(event, joint_state_, "bodyschema.JointState"); break;
-      case MessageKind::kJointOffsets: write_decoded(event, offsets_, "bodyschema.JointOffsets"); break;
-      case MessageKind::kOffsetsStatus: write_decoded(event, status_, "bodyschema.OffsetsStatus"); break;
-      case MessageKind::kImages: take_images(event); break;
-      case MessageKind::kUnknown: ++summary_.unknown; break;
+      case MessageKind::kJointState:
+        write_decoded(event, joint_state_, "bodyschema.JointState");
+        break;
+      case MessageKind::kJointOffsets:
+        write_decoded(event, offsets_, "bodyschema.JointOffsets");
+        break;
+      case MessageKind::kOffsetsStatus:
+        write_decoded(event, status_, "bodyschema.OffsetsStatus");
+        break;
+      case MessageKind::kImages:
+        take_images(event);
+        break;
+      case MessageKind::kUnknown:
+        ++summary_.unknown;
+        break;
     }
   }
 
@@ -144,7 +203,7 @@ class Exporter {
       return;
     }
     const Json json = json_of(message);
-    write("/" + event.channel, type, event.time_us, message.utime, json.dump(), [&] {
+    write("/" + event.channel, type, event.time_us, message.utime, text_of(json), [&] {
       Json schema = schema_of(json);
       schema["title"] = type;
       schema["properties"]["timestamp"] = time_schema();
@@ -164,12 +223,16 @@ class Exporter {
       }
       std::string name = camera_name(view.type);
       std::replace(name.begin(), name.end(), ' ', '_');
-      const std::string data = view.pixelformat == bot_core::image_t::PIXEL_FORMAT_MJPEG
-                                   ? base64(view.data)
-                                   : base64(to_jpeg_message(image_, view.utime, options_.jpeg_quality).data);
-      const Json json = {{"timestamp", timestamp(view.utime)}, {"frame_id", name}, {"format", "jpeg"}, {"data", data}};
-      write("/" + event.channel + "/" + name, "foxglove.CompressedImage", event.time_us, view.utime, json.dump(),
-            [] { return picture_schema(); });
+      const std::string data =
+          view.pixelformat == bot_core::image_t::PIXEL_FORMAT_MJPEG
+              ? base64(view.data)
+              : base64(to_jpeg_message(image_, view.utime, options_.jpeg_quality).data);
+      const Json json = {{"timestamp", timestamp(view.utime)},
+                         {"frame_id", name},
+                         {"format", "jpeg"},
+                         {"data", data}};
+      write("/" + event.channel + "/" + name, "foxglove.CompressedImage", event.time_us, view.utime,
+            text_of(json), [] { return picture_schema(); });
     }
   }
 
@@ -178,7 +241,7 @@ class Exporter {
              const std::string& json, MakeSchema make_schema) {
     auto at = channels_.find(topic);
     if (at == channels_.end()) {
-      const auto schema = writer_.add_schema(type, make_schema().dump());
+      const auto schema = writer_.add_schema(type, text_of(make_schema()));
       at = channels_.emplace(topic, writer_.add_channel(topic, schema)).first;
     }
     writer_.write(at->second, nanoseconds(arrival), nanoseconds(utime), json);
@@ -199,6 +262,8 @@ class Exporter {
 
 }  // namespace
 
-McapExportSummary export_mcap(const McapExportOptions& options) { return Exporter(options).run(); }
+McapExportSummary export_mcap(const McapExportOptions& options) {
+  return Exporter(options).run();
+}
 
 }  // namespace bodyschema

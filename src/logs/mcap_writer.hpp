@@ -28,7 +28,8 @@ class McapWriter {
   /// JSON messages on a topic.
   ChannelId add_channel(std::string_view topic, SchemaId schema);
   /// Times in ns since the Unix epoch.
-  void write(ChannelId channel, std::uint64_t log_time, std::uint64_t publish_time, std::string_view json);
+  void write(ChannelId channel, std::uint64_t log_time, std::uint64_t publish_time,
+             std::string_view json);
   /// Completes the file and gives it its name. Throws FileError when the disk is full.
   void close();
   [[nodiscard]] std::uint64_t bytes_written() const { return position_; }
@@ -37,8 +38,8 @@ class McapWriter {
   /// Little-endian fields of one record.
   class Fields;
   struct ChunkIndex {
-    std::uint64_t begin = 0, end = 0;          ///< message times
-    std::uint64_t start = 0, length = 0;       ///< of the chunk record in the file
+    std::uint64_t begin = 0, end = 0;     ///< message times
+    std::uint64_t start = 0, length = 0;  ///< of the chunk record in the file
     std::map<ChannelId, std::uint64_t> index_offsets;
     std::uint64_t index_length = 0;
     std::uint64_t size = 0;

@@ -1,13 +1,12 @@
 #include "bodyschema/pipeline/starter_configuration.hpp"
 
-#include <spdlog/fmt/fmt.h>
-#include <tinyxml2.h>
-
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <map>
 #include <set>
+#include <spdlog/fmt/fmt.h>
+#include <tinyxml2.h>
 
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/core/error.hpp"
@@ -39,18 +38,25 @@ class Tree {
   explicit Tree(const fs::path& urdf) : urdf_(urdf) {
     tinyxml2::XMLDocument document;
     const auto error = document.LoadFile(urdf.c_str());
-    if (error == tinyxml2::XML_ERROR_FILE_NOT_FOUND) throw FileError(urdf.string() + ": URDF not found");
+    if (error == tinyxml2::XML_ERROR_FILE_NOT_FOUND)
+      throw FileError(urdf.string() + ": URDF not found");
     const XMLElement* robot = document.FirstChildElement("robot");
     if (error != tinyxml2::XML_SUCCESS || robot == nullptr) {
-      throw FileError(urdf.string() + ": not a URDF (xacro files are converted first: xacro arm.urdf.xacro > arm.urdf)");
+      throw FileError(
+          urdf.string() +
+          ": not a URDF (xacro files are converted first: xacro arm.urdf.xacro > arm.urdf)");
     }
-    for (auto* link = robot->FirstChildElement("link"); link != nullptr; link = link->NextSiblingElement("link")) {
+    for (auto* link = robot->FirstChildElement("link"); link != nullptr;
+         link = link->NextSiblingElement("link")) {
       names_.push_back(attribute(link, "name"));
       if (link->FirstChildElement("visual") != nullptr) with_shape_.insert(names_.back());
     }
-    for (auto* element = robot->FirstChildElement("joint"); element != nullptr; element = element->NextSiblingElement("joint")) {
-      Joint joint{attribute(element, "name"), attribute(element->FirstChildElement("parent"), "link"),
-                  attribute(element->FirstChildElement("child"), "link"), false, attribute(element, "type") == "fixed"};
+    for (auto* element = robot->FirstChildElement("joint"); element != nullptr;
+         element = element->NextSiblingElement("joint")) {
+      Joint joint{attribute(element, "name"),
+                  attribute(element->FirstChildElement("parent"), "link"),
+                  attribute(element->FirstChildElement("child"), "link"), false,
+                  attribute(element, "type") == "fixed"};
       joint.movable = !joint.fixed && element->FirstChildElement("mimic") == nullptr;
       above_[joint.child] = joint;
       below_[joint.parent].push_back(joint);
@@ -59,14 +65,15 @@ class Tree {
 
   void require(const std::string& link, const std::string& option) const {
     if (std::find(names_.begin(), names_.end(), link) != names_.end()) return;
-    throw ConfigurationError(fmt::format("{} '{}': no such link in {}; did you mean '{}'?", option, link, urdf_.string(),
-                                         nearest_name(link, names_)));
+    throw ConfigurationError(fmt::format("{} '{}': no such link in {}; did you mean '{}'?", option,
+                                         link, urdf_.string(), nearest_name(link, names_)));
   }
   /// From the root down to a link.
   [[nodiscard]] std::vector<Joint> chain(std::string link) const {
     std::vector<Joint> joints;
     for (auto at = above_.find(link); at != above_.end(); at = above_.find(link)) {
-      if (joints.size() > above_.size()) throw FileError(urdf_.string() + ": link '" + link + "' hangs on itself");
+      if (joints.size() > above_.size())
+        throw FileError(urdf_.string() + ": link '" + link + "' hangs on itself");
       joints.insert(joints.begin(), at->second);
       link = at->second.parent;
     }
@@ -96,13 +103,17 @@ class Tree {
 };
 
 std::string yaml(const std::string& name) {
-  static constexpr const char* kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-";
-  return !name.empty() && name.find_first_not_of(kPlain) == std::string::npos && name[0] != '-' ? name : "'" + name + "'";
+  static constexpr const char* kPlain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-";
+  return !name.empty() && name.find_first_not_of(kPlain) == std::string::npos && name[0] != '-'
+             ? name
+             : "'" + name + "'";
 }
 
 std::string list(const std::vector<std::string>& names) {
   std::vector<std::string> quoted;
-  for (const auto& name : names) quoted.push_back(yaml(name));
+  for (const auto& name : names)
+    quoted.push_back(yaml(name));
   return fmt::format("[{}]", fmt::join(quoted, ", "));
 }
 
@@ -155,22 +166,28 @@ std::string robot_yaml(const StarterOptions& options, const Parts& parts, double
       "  rendered_links: {}\n  hand_link: {}\n"
       "  fingertip_links: []               # links at the fingertips, for errors there\n"
       "  estimated_joints: {}\n",
-      options.urdf.filename().string(), yaml(fs::proximate(fs::absolute(options.urdf), fs::absolute(options.out)).string()),
+      options.urdf.filename().string(),
+      yaml(fs::proximate(fs::absolute(options.urdf), fs::absolute(options.out)).string()),
       list(parts.rendered), yaml(options.hand_link), list(parts.arm));
   if (!parts.head.empty()) text += fmt::format("  head_joints: {}\n", list(parts.head));
   if (!parts.others.empty()) {
     text += "  # deg; take out the joints that the robot publishes.\n  fixed_joints_deg:\n";
-    for (const auto& joint : parts.others) text += fmt::format("    {}: 0\n", yaml(joint));
+    for (const auto& joint : parts.others)
+      text += fmt::format("    {}: 0\n", yaml(joint));
   }
-  text += "  gravity_m_s2: [0, 0, -9.81]       # root frame\n\n"
-          "# Focal lengths fx, fy and principal point cx, cy in px; distortion k1 k2 p1 p2 k3: OpenCV's calibration.\n"
-          "cameras:\n";
+  text +=
+      "  gravity_m_s2: [0, 0, -9.81]       # root frame\n\n"
+      "# Focal lengths fx, fy and principal point cx, cy in px; distortion k1 k2 p1 p2 k3: "
+      "OpenCV's calibration.\n"
+      "cameras:\n";
   static constexpr const char* kNames[] = {"left", "right"};
   for (std::size_t c = 0; c < options.camera_links.size(); ++c) {
-    text += fmt::format("  {}:\n    link: {}\n    width: {}\n    height: {}\n    fx: {:.6g}\n    fy: {:.6g}\n    cx: {}\n    cy: {}\n"
-                        "    distortion: [0, 0, 0, 0, 0]\n",
-                        kNames[c], yaml(options.camera_links[c]), options.width, options.height, focal_px, focal_px,
-                        0.5 * (options.width - 1), 0.5 * (options.height - 1));
+    text += fmt::format(
+        "  {}:\n    link: {}\n    width: {}\n    height: {}\n    fx: {:.6g}\n    fy: {:.6g}\n    "
+        "cx: {}\n    cy: {}\n"
+        "    distortion: [0, 0, 0, 0, 0]\n",
+        kNames[c], yaml(options.camera_links[c]), options.width, options.height, focal_px, focal_px,
+        0.5 * (options.width - 1), 0.5 * (options.height - 1));
   }
   return text;
 }
@@ -178,9 +195,11 @@ std::string robot_yaml(const StarterOptions& options, const Parts& parts, double
 std::string estimator_yaml(const StarterOptions& options) {
   return fmt::format(
       "# The included files of config/ are the installed ones and explain every key.\n"
-      "include: [config/estimator.yaml, config/bus.yaml, config/icub_right/vision.yaml, robot.yaml]\n"
+      "include: [config/estimator.yaml, config/bus.yaml, config/icub_right/vision.yaml, "
+      "robot.yaml]\n"
       "vision:\n"
-      "  method: statistics                # or single_colour, learned_background: docs/calibrate_my_robot.md\n"
+      "  method: statistics                # or single_colour, learned_background: "
+      "docs/calibrate_my_robot.md\n"
       "bus:\n"
       "  channel_prefix: {}\n",
       yaml(options.channel_prefix));
@@ -188,7 +207,8 @@ std::string estimator_yaml(const StarterOptions& options) {
 
 void write_new(const fs::path& file, const std::string& text) {
   std::error_code ignored;
-  if (fs::exists(file, ignored)) throw FileError(file.string() + ": is there already and is not replaced");
+  if (fs::exists(file, ignored))
+    throw FileError(file.string() + ": is there already and is not replaced");
   std::ofstream stream(file);
   stream << text;
   if (!stream.flush()) throw FileError(file.string() + ": cannot be written");
@@ -199,15 +219,19 @@ void write_new(const fs::path& file, const std::string& text) {
 std::string write_starter_configuration(const StarterOptions& options) {
   const Tree tree(options.urdf);
   tree.require(options.hand_link, "--hand");
-  for (const auto& camera : options.camera_links) tree.require(camera, "--camera");
+  for (const auto& camera : options.camera_links)
+    tree.require(camera, "--camera");
   const Parts parts = parts_of(tree, options);
   if (parts.arm.empty()) {
-    throw ConfigurationError(fmt::format("--hand '{}': no joint moves it against the cameras", options.hand_link));
+    throw ConfigurationError(
+        fmt::format("--hand '{}': no joint moves it against the cameras", options.hand_link));
   }
-  if (parts.rendered.empty()) throw FileError(options.urdf.string() + ": no link of the arm has a <visual> shape");
+  if (parts.rendered.empty())
+    throw FileError(options.urdf.string() + ": no link of the arm has a <visual> shape");
 
-  const double focal_px = options.focal_px > 0.0 ? options.focal_px
-                                                 : 0.5 * options.width / std::tan(0.5 * kGuessedFieldOfView_rad);
+  const double focal_px = options.focal_px > 0.0
+                              ? options.focal_px
+                              : 0.5 * options.width / std::tan(0.5 * kGuessedFieldOfView_rad);
   std::error_code error;
   fs::create_directories(options.out, error);
   write_new(options.out / "robot.yaml", robot_yaml(options, parts, focal_px));
@@ -215,12 +239,16 @@ std::string write_starter_configuration(const StarterOptions& options) {
 
   std::string told = fmt::format("arm: {}\n", fmt::join(parts.arm, ", "));
   if (!parts.head.empty()) told += fmt::format("head: {}\n", fmt::join(parts.head, ", "));
-  if (!parts.others.empty()) told += fmt::format("taken as fixed at 0 unless you take them out: {}\n", fmt::join(parts.others, ", "));
+  if (!parts.others.empty())
+    told += fmt::format("taken as fixed at 0 unless you take them out: {}\n",
+                        fmt::join(parts.others, ", "));
   told += fmt::format("seen: {}\n", fmt::join(parts.rendered, ", "));
   if (options.focal_px <= 0.0) {
-    told += fmt::format("focal length: a guess, {:.0f} px; fill in your cameras' in robot.yaml\n", focal_px);
+    told += fmt::format("focal length: a guess, {:.0f} px; fill in your cameras' in robot.yaml\n",
+                        focal_px);
   }
-  told += fmt::format("wrote {} and {}\n", (options.out / "robot.yaml").string(), (options.out / "estimator.yaml").string());
+  told += fmt::format("wrote {} and {}\n", (options.out / "robot.yaml").string(),
+                      (options.out / "estimator.yaml").string());
   try {
     const Pipeline pipeline(Configuration::load(options.out / "estimator.yaml"));
     told += "robot and meshes load\n";

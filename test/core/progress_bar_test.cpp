@@ -1,16 +1,15 @@
 #include "bodyschema/core/progress_bar.hpp"
 
+#include <array>
+#include <chrono>
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <array>
-#include <chrono>
 #include <string>
+#include <sys/wait.h>
 #include <thread>
+#include <unistd.h>
 
 namespace bodyschema {
 namespace {
@@ -35,7 +34,8 @@ std::string shown_on(int reader, int writer, std::chrono::milliseconds duration)
   close(writer);
   std::string text;
   std::array<char, 4096> buffer{};
-  for (ssize_t n; (n = read(reader, buffer.data(), buffer.size())) > 0;) text.append(buffer.data(), static_cast<std::size_t>(n));
+  for (ssize_t n; (n = read(reader, buffer.data(), buffer.size())) > 0;)
+    text.append(buffer.data(), static_cast<std::size_t>(n));
   waitpid(child, nullptr, 0);
   close(reader);
   return text;

@@ -1,11 +1,11 @@
 #include "bodyschema/fleet/fleet_report.hpp"
 
+#include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <sstream>
+
+#include <nlohmann/json.hpp>
 
 #include "bodyschema/core/error.hpp"
 
@@ -29,16 +29,25 @@ class FleetReport : public testing::Test {
     fs::create_directories(file.parent_path());
     std::ofstream(file) << content;
   }
-  void add_log(const std::string& log, Microseconds begin, const std::string& outcome, const std::string& report) const {
-    write(log + "/info.json", "{\"begin_utime\": " + std::to_string(begin) + ", \"duration_s\": 61.5}");
+  void add_log(const std::string& log, Microseconds begin, const std::string& outcome,
+               const std::string& report) const {
+    write(log + "/info.json",
+          "{\"begin_utime\": " + std::to_string(begin) + ", \"duration_s\": 61.5}");
     write(log + "/outcome.txt", outcome + "\n");
     if (!report.empty()) write(log + "/report.json", report);
   }
   static std::string backlash(double estimate, double elbow) {
-    nlohmann::json j = {{"verdict", "named"}, {"sentence", "backlash of r_elbow"},
-                        {"causes", {{{"name", "backlash"}, {"joint", "r_elbow"}, {"parameter", "backlash"},
-                                     {"unit", "deg"}, {"estimate", estimate}, {"ci95", {estimate - 0.1, estimate + 0.1}}}}},
-                        {"offsets_deg", {{"before", {{"r_elbow", 9.0}}}, {"after", {{"r_elbow", elbow}}}}}};
+    nlohmann::json j = {
+        {"verdict", "named"},
+        {"sentence", "backlash of r_elbow"},
+        {"causes",
+         {{{"name", "backlash"},
+           {"joint", "r_elbow"},
+           {"parameter", "backlash"},
+           {"unit", "deg"},
+           {"estimate", estimate},
+           {"ci95", {estimate - 0.1, estimate + 0.1}}}}},
+        {"offsets_deg", {{"before", {{"r_elbow", 9.0}}}, {"after", {{"r_elbow", elbow}}}}}};
     return j.dump();
   }
   const fs::path results_ = fs::path(testing::TempDir()) / "bodyschema-fleet";
@@ -49,7 +58,8 @@ TEST_F(FleetReport, FollowsACauseOverWeeks) {
   add_log("alpha/c", kBegin, "diagnosed", backlash(0.8, 1.0));
   add_log("alpha/b", kBegin + kWeek, "diagnosed", backlash(1.0, 1.5));
   add_log("alpha/a", kBegin + 3 * kWeek, "diagnosed", backlash(1.4, 2.5));
-  add_log("beta/only", kBegin, "diagnosed", R"({"verdict": "none", "sentence": "fine", "causes": []})");
+  add_log("beta/only", kBegin, "diagnosed",
+          R"({"verdict": "none", "sentence": "fine", "causes": []})");
   const auto robots = gather_fleet(results_);
   ASSERT_EQ(robots.size(), 2u);
   EXPECT_EQ(robots[0].name, "alpha");
@@ -60,8 +70,9 @@ TEST_F(FleetReport, FollowsACauseOverWeeks) {
   EXPECT_THAT(robots[0].causes[0].week, testing::ElementsAre(0.0, 1.0, 3.0));
   EXPECT_NEAR(robots[0].causes[0].per_week, 0.2, 1e-9);
   EXPECT_NEAR(robots[0].offsets.at(0).per_week, 0.5, 1e-9);
-  EXPECT_EQ(robots[0].sentence(), "3 of 3 logs diagnosed; backlash of r_elbow in 3 logs (0.8 to 1.4 deg, +0.2 a week); "
-                                  "the offset of r_elbow moved most, 1.00 to 2.50 deg");
+  EXPECT_EQ(robots[0].sentence(),
+            "3 of 3 logs diagnosed; backlash of r_elbow in 3 logs (0.8 to 1.4 deg, +0.2 a week); "
+            "the offset of r_elbow moved most, 1.00 to 2.50 deg");
   EXPECT_EQ(robots[1].sentence(), "1 of 1 logs diagnosed; nothing wrong beside the offsets");
 }
 
@@ -72,7 +83,8 @@ TEST_F(FleetReport, SaysWhyALogWasNotDiagnosed) {
   write("alpha/empty/info.json", "[]");
   const auto robots = gather_fleet(results_);
   ASSERT_EQ(robots.at(0).logs.size(), 4u);
-  for (const auto& log : robots[0].logs) EXPECT_EQ(log.verdict, "not diagnosed") << log.name;
+  for (const auto& log : robots[0].logs)
+    EXPECT_EQ(log.verdict, "not diagnosed") << log.name;
   EXPECT_THAT(robots[0].logs[1].sentence, HasSubstr("at least 10 s are needed"));
   EXPECT_THAT(robots[0].logs[2].sentence, HasSubstr("report.json: not valid JSON"));
   EXPECT_THAT(robots[0].logs[3].sentence, HasSubstr("no 'verdict'"));

@@ -1,9 +1,9 @@
 #include "bodyschema/logs/log_summary.hpp"
 
+#include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/core/error.hpp"

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/logs/log_summary.hpp"
 #include "recorded_log.hpp"
 
 /// What is in the file is checked with the official reader, test/install/mcap_reads_back.py.
@@ -15,9 +16,10 @@ namespace fs = std::filesystem;
 TEST(McapExport, CountsWhatItWrites) {
   const auto out = testing_logs::scratch_file("counts.mcap");
   const auto summary = export_mcap({testing_logs::swinging_log("counts.lcmlog"), out});
-  EXPECT_THAT(summary.messages, testing::UnorderedElementsAre(testing::Pair("/ICUB_JOINT_STATE", 400u),
-                                                              testing::Pair("/ICUB_CAMERAS/left", 30u),
-                                                              testing::Pair("/ICUB_CAMERAS/right", 30u)));
+  EXPECT_THAT(summary.messages,
+              testing::UnorderedElementsAre(testing::Pair("/ICUB_JOINT_STATE", 400u),
+                                            testing::Pair("/ICUB_CAMERAS/left", 30u),
+                                            testing::Pair("/ICUB_CAMERAS/right", 30u)));
   EXPECT_EQ(summary.unreadable, 0u);
   EXPECT_EQ(summary.bytes, fs::file_size(out));
   EXPECT_FALSE(fs::exists(out.string() + ".part"));
@@ -39,6 +41,16 @@ TEST(McapExport, LeavesOutWhatCannotBeRead) {
   EXPECT_EQ(summary.unknown, 1u);
 }
 
+TEST(McapExport, NamesThatAreNoUtf8AreReplacedNotRefused) {
+  const auto log = testing_logs::scratch_file("latin.lcmlog");
+  auto message = testing_logs::joints(testing_logs::kBegin, 0.1f, 0.2f);
+  message.joint_name[0] = "coud\xe9";
+  LogWriter(log).publish("JOINTS", 1, encode(message));
+  const auto summary = export_mcap({log, testing_logs::scratch_file("latin.mcap")});
+  EXPECT_EQ(summary.messages.at("/JOINTS"), 1u);
+  EXPECT_NO_THROW((void)summarise_log(log).json());
+}
+
 TEST(McapExport, FailsWithOneClearErrorAndLeavesNothing) {
   const auto log = testing_logs::scratch_file("nothing.lcmlog");
   LogWriter(log).publish("OTHERS", 2, std::vector<std::uint8_t>(9, 1));
@@ -47,7 +59,8 @@ TEST(McapExport, FailsWithOneClearErrorAndLeavesNothing) {
   EXPECT_FALSE(fs::exists(out));
   EXPECT_FALSE(fs::exists(out.string() + ".part"));
   EXPECT_THROW(export_mcap({"/nonexistent.lcmlog", out}), FileError);
-  EXPECT_THROW(export_mcap({testing_logs::swinging_log("unwritten.lcmlog"), "/nonexistent/a.mcap"}), FileError);
+  EXPECT_THROW(export_mcap({testing_logs::swinging_log("unwritten.lcmlog"), "/nonexistent/a.mcap"}),
+               FileError);
 }
 
 }  // namespace

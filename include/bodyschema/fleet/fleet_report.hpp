@@ -12,7 +12,7 @@ namespace bodyschema {
 
 /// A cause found in one log, as its diagnosis wrote it.
 struct FleetCause {
-  std::string name;       ///< "backlash of r_elbow"
+  std::string name;  ///< "backlash of r_elbow"
   std::string parameter;
   std::string unit;
   double estimate = 0.0;  ///< in `unit`; NaN where the diagnosis gives none
@@ -24,8 +24,8 @@ struct FleetLog {
   std::string name;
   Microseconds begin = 0;  ///< us since the Unix epoch
   double duration_s = 0.0;
-  std::string verdict;     ///< of the diagnosis; "not diagnosed" where there is none
-  std::string sentence;    ///< of the diagnosis, or why there is none
+  std::string verdict;   ///< of the diagnosis; "not diagnosed" where there is none
+  std::string sentence;  ///< of the diagnosis, or why there is none
   std::vector<FleetCause> causes;
   std::map<std::string, double> offsets_deg;
 };
@@ -34,27 +34,28 @@ struct FleetLog {
 struct FleetTrend {
   std::string name;
   std::string unit;
-  std::vector<double> week;    ///< since the robot's first log
+  std::vector<double> week;  ///< since the robot's first log
   std::vector<double> value;
-  double per_week = 0.0;       ///< slope of the straight line through them; 0 for fewer than two
+  double per_week = 0.0;  ///< slope of the straight line through them; 0 for fewer than two
 };
 
 struct FleetRobot {
   std::string name;
-  std::vector<FleetLog> logs;        ///< by date
-  std::vector<FleetTrend> causes;    ///< most frequent first
-  std::vector<FleetTrend> offsets;   ///< by joint
+  std::vector<FleetLog> logs;       ///< by date
+  std::vector<FleetTrend> causes;   ///< most frequent first
+  std::vector<FleetTrend> offsets;  ///< by joint
   [[nodiscard]] std::string sentence() const;
 };
 
-/// Gathers what the workflow left in `results`: a folder for each robot with a folder for each log, in
-/// which info.json (`bodyschema log info --json`), outcome.txt ("diagnosed", or why not) and
+/// Gathers what the workflow left in `results`: a folder for each robot with a folder for each log,
+/// in which info.json (`bodyschema log info --json`), outcome.txt ("diagnosed", or why not) and
 /// report.json lie. Robots by name. A report that cannot be read counts as not diagnosed. Throws
 /// FileError when there is no result at all.
 std::vector<FleetRobot> gather_fleet(const std::filesystem::path& results);
 
 /// Writes one page for people (report.html) and the same for programs (fleet.json) into `out`.
 /// Returns a line per robot. Throws FileError.
-std::string write_fleet_report(const std::vector<FleetRobot>& robots, const std::filesystem::path& out);
+std::string write_fleet_report(const std::vector<FleetRobot>& robots,
+                               const std::filesystem::path& out);
 
 }  // namespace bodyschema

@@ -14,15 +14,14 @@ struct StarterOptions {
   int height = 480;                       ///< px
   double focal_px = 0.0;                  ///< 0: not known yet, a guess is written and said
   std::string channel_prefix = "ROBOT";
-  std::filesystem::path out;              ///< folder, created
+  std::filesystem::path out;  ///< folder, created
 };
 
-/// Writes robot.yaml and estimator.yaml for a robot that has none, from its URDF: the joints between
-/// root and hand that do not move the cameras too are the arm, the links they carry are what the
-/// cameras see, joints between root and a camera are the head. Says what was found and what is left
-/// to fill in, for people. Replaces no file.
-/// Throws FileError naming the URDF and what is wrong, ConfigurationError naming a link that is not
-/// there and the nearest one.
+/// Writes robot.yaml and estimator.yaml for a robot that has none, from its URDF: the joints
+/// between root and hand that do not move the cameras too are the arm, the links they carry are
+/// what the cameras see, joints between root and a camera are the head. Says what was found and
+/// what is left to fill in, for people. Replaces no file. Throws FileError naming the URDF and what
+/// is wrong, ConfigurationError naming a link that is not there and the nearest one.
 std::string write_starter_configuration(const StarterOptions& options);
 
 }  // namespace bodyschema
