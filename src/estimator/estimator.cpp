@@ -166,15 +166,21 @@ struct Estimator::Impl {
     const bool in_view = prepare(observation);
     if (!in_view) {
       frame_state = fusion.frame_state();
-      if (options.mode == EstimatorMode::kPaper || fusion.frames() < 0.5) frame_state.x = state;
+      if (particles_only() || fusion.frames() < 0.5) frame_state.x = state;
       current = EstimatorState::kHandNotInView;
       best_likelihood = 0.0;
     } else {
       score_particles(observation);
       if (options.mode == EstimatorMode::kPaper) {
-        paper_step();
+        weights = 1.0 - distance.array();  // equation (4)
+        particle_step();
       } else {
-        best_step(observation);
+        weights = (-(distance.array() - distance.minCoeff()) / options.temperature).exp();
+        if (options.refine_outline) {
+          best_step(observation);
+        } else {
+          particle_step();
+        }
       }
     }
     report(observation, estimate);
@@ -244,13 +250,17 @@ struct Estimator::Impl {
     score_slots(options.filter.particles);
   }
 
-  void paper_step() {
+  /// The estimate is one of the particles, as in the paper.
+  [[nodiscard]] bool particles_only() const {
+    return options.mode == EstimatorMode::kPaper || !options.refine_outline;
+  }
+
+  void particle_step() {
     const auto start = Clock::now();
-    weights = 1.0 - distance.array();  // equation (4)
     if (weights.maxCoeff() <= 0.0) weights.setConstant(1.0);
     filter.update(weights);
     state.head(joints) = filter.estimate();
-    best_likelihood = weights(filter.estimate_index());
+    best_likelihood = 1.0 - distance(filter.estimate_index());
     effective_size = filter.effective_sample_size();
     cloud_covariance = filter.covariance();
     frame_state = {state, cloud_covariance};
@@ -258,6 +268,23 @@ struct Estimator::Impl {
     current = EstimatorState::kConverging;
     if (filter.spread_rad() <= options.filter.spread_min_rad) current = EstimatorState::kConverged;
     times.filter_ms += elapsed_ms(start);
+  }
+
+  Eigen::VectorXd likelihood(const Observation& observation, const Eigen::MatrixXd& offsets) {
+    Eigen::VectorXd result = Eigen::VectorXd::Zero(offsets.cols());
+    if (!prepare(observation)) return result;
+    const auto batch = static_cast<Eigen::Index>(options.filter.particles);
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(state.size());
+    for (Eigen::Index begin = 0; begin < offsets.cols(); begin += batch) {
+      const Eigen::Index n = std::min(batch, offsets.cols() - begin);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        x.head(joints) = offsets.col(begin + i);
+        place(observation, x, static_cast<std::size_t>(i));
+      }
+      score_slots(static_cast<std::size_t>(n));
+      result.segment(begin, n) = 1.0 - distance.head(n).array();
+    }
+    return result;
   }
 
   // --- mode best ------------------------------------------------------------------------------
@@ -286,8 +313,6 @@ struct Estimator::Impl {
 
   void best_step(const Observation& observation) {
     auto start = Clock::now();
-    const double least = distance.minCoeff();
-    weights = (-(distance.array() - least) / options.temperature).exp();
     filter.update(weights);
     effective_size = filter.effective_sample_size();
     times.filter_ms += elapsed_ms(start);
@@ -405,7 +430,7 @@ struct Estimator::Impl {
     estimate.effective_sample_size = effective_size;
     estimate.best_likelihood = best_likelihood;
     estimate.contour_rms_px = contour_rms_px;
-    if (options.mode == EstimatorMode::kPaper) {
+    if (particles_only()) {
       estimate.covariance_rad2 = cloud_covariance.size() > 0 ? cloud_covariance : filter.covariance();
     } else {
       const Eigen::MatrixXd covariance = fusion.covariance();
@@ -435,7 +460,7 @@ struct Estimator::Impl {
       }
     }
     estimate.weakest = weakest(estimate.covariance_rad2);
-    if (options.mode == EstimatorMode::kBest && current == EstimatorState::kConverging &&
+    if (!particles_only() && current == EstimatorState::kConverging &&
         fusion.frames() > 4.5 && estimate.hand_sd_m < options.converged_hand_sd_m) {
       current = EstimatorState::kConverged;
     }
@@ -538,6 +563,11 @@ Estimator::Estimator(std::shared_ptr<const RobotModel> robot, const RobotSetup& 
     : impl_(std::make_unique<Impl>(std::move(robot), setup, rig, options)) {}
 Estimator::~Estimator() = default;
 Estimator::Estimator(Estimator&&) noexcept = default;
+
+Eigen::VectorXd Estimator::likelihood(const Observation& observation,
+                                      const Eigen::MatrixXd& offsets_rad) {
+  return impl_->likelihood(observation, offsets_rad);
+}
 
 Estimate Estimator::step(const Observation& observation) { return impl_->step(observation); }
 void Estimator::reset() { impl_->reset(); }

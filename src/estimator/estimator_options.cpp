@@ -28,6 +28,7 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
   o.min_mask_px = static_cast<std::size_t>(estimator.integer_or("min_mask_px", 150, 1, 1000000000));
   const Configuration best = estimator.section("best");
   o.temperature = best.number_or("temperature", o.temperature, 1e-6, 10.0);
+  o.refine_outline = best.boolean_or("refine_outline", o.refine_outline);
   o.contour.spacing_px = static_cast<float>(best.number_or("contour_spacing_px", 3.0, 0.5, 100.0));
   o.contour.huber_px = best.number_or("huber_px", 1.0, 1e-3, 100.0);
   o.residual_sd_px = best.number_or("residual_sd_px", o.residual_sd_px, 1e-3, 100.0);

@@ -17,6 +17,10 @@ const std::vector<std::pair<std::string, std::string>>& experiment_names() {
       {"experiment2", "offsets in arm and head (Fig. 8)"},
       {"offsets", "the offsets themselves and their intervals after 60 s of babbling"},
       {"slip", "a joint slips by 5 degrees in mid-run"},
+      {"leave", "the hand leaves the view and comes back"},
+      {"camera", "one camera dies"},
+      {"likelihood", "likelihood over one offset, two arm postures (Fig. 2)"},
+      {"ablation", "best with one part taken away at a time"},
       {"reach", "hand to target with the nominal and with the corrected model"},
       {"recording", "the public recording, exact and nominal robot (needs BODYSCHEMA_DATA)"},
       {"all", "everything"}};
@@ -50,6 +54,10 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   if (wanted("experiment2")) run_experiment2(context);
   if (wanted("offsets")) run_offsets(context);
   if (wanted("slip")) run_slip(context);
+  if (wanted("leave")) run_hand_leaves(context);
+  if (wanted("camera")) run_camera_dies(context);
+  if (wanted("likelihood")) run_likelihood(context);
+  if (wanted("ablation")) run_ablations(context);
   if (wanted("reach")) run_reach(context);
   if (wanted("recording")) run_recording(context);
   summary["trials"] = options.trials;

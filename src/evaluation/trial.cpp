@@ -55,6 +55,7 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
 
   std::vector<JointSample> history;
   Eigen::VectorXd last_q;
+  int motion_frame = 0;
   while (auto frame = simulator.next()) {
     history.insert(history.end(), frame->encoders.begin(), frame->encoders.end());
     if (history.size() > 400) history.erase(history.begin(), history.end() - 200);
@@ -63,17 +64,18 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
     if (frame->phase != simulator::Phase::kMotion || !ready) continue;
     if (observation.cameras[0]) last_q = observation.cameras[0]->joints.q;
     for (std::size_t i = 0; i < contestants.size(); ++i) {
-      Estimate estimate;
+      Observation one_eye;
       if (contestants[i].mono) {
-        Observation left = observation;
-        left.cameras[1].reset();
-        estimate = estimators[i].step(left);
-      } else {
-        estimate = estimators[i].step(observation);
+        one_eye = observation;
+        one_eye.cameras[1].reset();
       }
+      const Observation& seen = contestants[i].mono ? one_eye : observation;
+      const Estimate estimate = estimators[i].step(seen);
       trial.contestants[i].frames.push_back(record_of(estimate, *frame));
       trial.contestants[i].weakest = estimate.weakest;
+      if (setting.on_frame) setting.on_frame(estimators[i], seen, trial, motion_frame);
     }
+    ++motion_frame;
   }
   if (setting.on_end && last_q.size() > 0) {
     for (std::size_t i = 0; i < contestants.size(); ++i) {

@@ -75,6 +75,35 @@ TEST_F(EstimatorOnOwnRobot, BestModeFindsTheHandWithinTenFrames) {
   EXPECT_FALSE(estimate.weakest.text.empty());
 }
 
+TEST_F(EstimatorOnOwnRobot, LikelihoodIsLargestAtTheTruthForAnyNumberOfHypotheses) {
+  options_.filter.particles = 8;  // fewer than hypotheses: several batches
+  Estimator estimator(robot_, setup_, rig_, options_);
+  const Observation seen = reach_->observe(pose(0.5), 0);
+  Eigen::MatrixXd offsets = offset_rad_.replicate(1, 21);
+  for (int i = 0; i < 21; ++i) offsets(6, i) += radians(i - 10.0);
+  const Eigen::VectorXd likelihood = estimator.likelihood(seen, offsets);
+  Eigen::Index best = -1;
+  EXPECT_GT(likelihood.maxCoeff(&best), 0.97);
+  EXPECT_EQ(best, 10);
+  EXPECT_LT(likelihood(0), likelihood(5));
+  // Asking changes nothing.
+  Estimator other(robot_, setup_, rig_, options_);
+  EXPECT_EQ(estimator.step(seen).offset_rad, other.step(seen).offset_rad);
+}
+
+TEST_F(EstimatorOnOwnRobot, WithoutRefinementTheSharperLikelihoodStillReducesTheError) {
+  options_.refine_outline = false;
+  Estimator estimator(robot_, setup_, rig_, options_);
+  Estimate estimate;
+  for (int frame = 0; frame < 25; ++frame) {
+    estimate = estimator.step(reach_->observe(pose(frame / 24.0), frame * 33'333));
+  }
+  const Pose truth = reach_->true_hand(pose(1.0), 0);
+  EXPECT_LT(position_error_m(estimate, truth),
+            0.5 * (estimate.X_CP_nominal[0].translation() - truth.translation()).norm());
+  EXPECT_GT(estimate.hand_sd_m, 0.0);
+}
+
 TEST_F(EstimatorOnOwnRobot, PaperModeReducesTheError) {
   options_.mode = EstimatorMode::kPaper;
   Estimator estimator(robot_, setup_, rig_, options_);

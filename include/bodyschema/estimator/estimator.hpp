@@ -34,6 +34,10 @@ class Estimator {
   /// Starts over, as if no picture had been seen.
   void reset();
 
+  /// Likelihood 1 - d (equation 4) of joint offsets, one hypothesis per column, all else nominal.
+  /// Zero where the hand is not in view. Leaves the estimate as it is.
+  [[nodiscard]] Eigen::VectorXd likelihood(const Observation& observation,
+                                           const Eigen::MatrixXd& offsets_rad);
   /// Outline of the robot predicted with a set of corrections, for overlays.
   /// @param corrected  with the current estimate, otherwise with the encoders as they are
   [[nodiscard]] BinaryMask predicted_silhouette(const Observation& observation,

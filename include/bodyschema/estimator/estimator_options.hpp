@@ -34,6 +34,7 @@ struct EstimatorOptions {
   ContourAlignmentOptions contour;
   NuisancePriors priors;
   double temperature = 0.02;         ///< best: weight = exp(-(d - d_min) / temperature)
+  bool refine_outline = true;        ///< best: without it the estimate is one of the particles
   double residual_sd_px = 0.5;       ///< best: sd of one outline residual, correlation included
   double encoder_sd_rad = 0.0006;    ///< best: one encoder reading's noise and rounding
   double correlated_frames = 6.0;    ///< best: neighbouring frames that err alike count as one

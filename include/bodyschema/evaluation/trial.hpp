@@ -51,11 +51,15 @@ struct TrialSetting {
   Configuration estimator;                ///< complete estimator configuration
   simulator::SimulatorSettings simulator;
   simulator::SimulationPlan plan;         ///< its seed is replaced by the trial's
+  /// Called with each contestant after each frame of the motion, counted from 0.
+  std::function<void(Estimator& estimator, const Observation& observation, const TrialRecord& trial,
+                     int frame)>
+      on_frame{};
   /// Called with each contestant when its last frame is done: what a robot would do with the result.
   /// @param q  encoder readings of the left camera's last picture
   std::function<void(Estimator& estimator, const RobotModel& robot, const Eigen::VectorXd& q,
                      TrialRecord& trial, std::size_t contestant)>
-      on_end;
+      on_end{};
 };
 
 /// Simulates one run in memory, segments its pictures once (background learned from the noisy

@@ -1,0 +1,127 @@
+#include "reach_figures.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+namespace bodyschema {
+namespace {
+
+constexpr std::size_t kLastFrames = 10;
+
+/// Frames until below 1 mm and 1 degree for good; all of them when that never happens.
+double frames_to_converge(const std::vector<FrameRecord>& frames, std::size_t camera) {
+  std::size_t last_bad = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].position_mm[camera] >= 1.0 || frames[i].rotation_deg[camera] >= 1.0) last_bad = i + 1;
+  }
+  return static_cast<double>(last_bad);
+}
+
+}  // namespace
+
+double mean_of_last(const std::vector<FrameRecord>& frames, std::size_t camera,
+                    const std::array<double, 2> FrameRecord::*figure) {
+  double sum = 0.0;
+  int n = 0;
+  for (std::size_t i = frames.size() - std::min(kLastFrames, frames.size());
+       i < frames.size(); ++i) {
+    const double value = (frames[i].*figure)[camera];
+    if (value < 0.0) continue;
+    sum += value;
+    ++n;
+  }
+  return n > 0 ? sum / n : 0.0;
+}
+
+ReachResult reach_result(const std::vector<TrialRecord>& trials, std::size_t contestant,
+                         std::size_t camera) {
+  std::vector<double> position, rotation, frames;
+  for (const auto& trial : trials) {
+    const auto& record = trial.contestants[contestant].frames;
+    if (record.empty()) continue;
+    position.push_back(mean_of_last(record, camera, &FrameRecord::position_mm));
+    rotation.push_back(mean_of_last(record, camera, &FrameRecord::rotation_deg));
+    frames.push_back(frames_to_converge(record, camera));
+  }
+  return {Statistics::of(position), Statistics::of(rotation), Statistics::of(frames)};
+}
+
+Json to_json(const ReachResult& r) {
+  const auto figures = [](const Statistics& s) {
+    return Json{{"mean", s.mean}, {"sd", s.sd}, {"worst", s.worst}};
+  };
+  return {{"position_mm", figures(r.position_mm)},
+          {"orientation_deg", figures(r.rotation_deg)},
+          {"frames_to_converge", {{"mean", r.frames_to_converge.mean}}}};
+}
+
+void add_row(ExperimentContext& context, const std::string& name, const ReachResult& r) {
+  context.table += fmt::format("{:<38} {:>5.2f} +- {:<5.2f} {:>5.2f} +- {:<5.2f} {:>6.2f} {:>6.2f} {:>7.1f}\n",
+                               name, r.position_mm.mean, r.position_mm.sd, r.rotation_deg.mean,
+                               r.rotation_deg.sd, r.position_mm.worst, r.rotation_deg.worst,
+                               r.frames_to_converge.mean);
+}
+
+void add_heading(ExperimentContext& context, const std::string& title) {
+  context.table += fmt::format("\n{:<38} {:>14} {:>14} {:>6} {:>6} {:>7}\n", title, "position mm",
+                               "rotation deg", "worst", "worst", "frames");
+}
+
+void chart_errors(ExperimentContext& context, const std::string& title,
+                  const std::vector<TrialRecord>& trials, const std::vector<Contestant>& contestants,
+                  std::size_t camera) {
+  context.report.heading(title);
+  struct Figure {
+    const char* what;
+    const char* unit;
+    std::array<double, 2> FrameRecord::*values;
+  };
+  for (const Figure& figure : {Figure{"position error", "mm", &FrameRecord::position_mm},
+                               Figure{"orientation error", "deg", &FrameRecord::rotation_deg}}) {
+    Chart chart;
+    chart.title = std::string(figure.what) + ", mean of " + std::to_string(trials.size()) + " trials";
+    chart.x_label = "frame";
+    chart.y_label = figure.unit;
+    chart.logarithmic_y = true;
+    for (std::size_t i = 0; i < contestants.size(); ++i) {
+      ChartSeries series{contestants[i].name, {}, {}};
+      for (std::size_t f = 0; f < trials.front().contestants[i].frames.size(); ++f) {
+        std::vector<double> values;
+        for (const auto& trial : trials) {
+          if (f >= trial.contestants[i].frames.size()) continue;
+          const double value = (trial.contestants[i].frames[f].*figure.values)[camera];
+          if (value >= 0.0) values.push_back(value);
+        }
+        if (values.empty()) continue;
+        series.x.push_back(static_cast<double>(f));
+        series.y.push_back(Statistics::of(values).mean);
+      }
+      chart.series.push_back(std::move(series));
+    }
+    context.report.chart(chart);
+  }
+}
+
+void judge_converged(ExperimentContext& context, const std::string& mode,
+                     const std::vector<TrialRecord>& trials, std::size_t contestant) {
+  int in_time = 0;
+  int converged_frames = 0;
+  int false_frames = 0;
+  for (const auto& trial : trials) {
+    bool found = false;
+    const auto& frames = trial.contestants[contestant].frames;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (frames[i].state != EstimatorState::kConverged) continue;
+      if (!found && i < 45) ++in_time;
+      found = true;
+      ++converged_frames;
+      if (frames[i].position_mm[kLeft] > 2.0) ++false_frames;
+    }
+  }
+  const double within = static_cast<double>(in_time) / static_cast<double>(trials.size());
+  const double wrong = converged_frames > 0 ? static_cast<double>(false_frames) / converged_frames : 0.0;
+  context.summary[mode]["converged"] = {{"within_45_rate", within}, {"false_rate", wrong}};
+  context.table += fmt::format("{}: state converged within 45 frames in {:.0f} %, wrong (over 2 mm) in {:.2f} % of its frames\n",
+                               mode, 100.0 * within, 100.0 * wrong);
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,113 @@
+#include "trial_runner.hpp"
+
+#include <atomic>
+#include <mutex>
+#include <random>
+#include <thread>
+
+#include "bodyschema/core/progress_bar.hpp"
+
+namespace bodyschema {
+namespace {
+
+using simulator::FaultSpec;
+
+constexpr int kBackgroundFrames = 30;
+
+}  // namespace
+
+const std::vector<std::string>& modes() {
+  static const std::vector<std::string> names = {"best", "paper"};
+  return names;
+}
+
+EstimatorOptions options_for(const ExperimentContext& context, const std::string& mode) {
+  EstimatorOptions options = EstimatorOptions::from(context.simulated);
+  options.mode = mode == "paper" ? EstimatorMode::kPaper : EstimatorMode::kBest;
+  return options;
+}
+
+std::vector<Contestant> stereo_contestants(const ExperimentContext& context) {
+  std::vector<Contestant> contestants;
+  for (const auto& mode : modes()) {
+    contestants.push_back({mode + ".stereo", options_for(context, mode), false});
+  }
+  return contestants;
+}
+
+TrialSetting standard_setting(const ExperimentContext& context) {
+  TrialSetting setting{context.simulated,
+                       simulator::SimulatorSettings::from(context.simulated.section("simulator")),
+                       {},
+                       {}};
+  setting.simulator.background_frames = kBackgroundFrames;
+  setting.simulator.entry_frames = 0;
+  setting.simulator.clutter = false;
+  setting.plan.frames = 100;
+  setting.plan.offsets_deg = {{"r_shoulder_pitch", 5}, {"r_shoulder_roll", 4},
+                              {"r_shoulder_yaw", 3},   {"r_elbow", -2},
+                              {"r_wrist_prosup", 3},   {"r_wrist_pitch", -7},
+                              {"r_wrist_yaw", 3}};
+  return setting;
+}
+
+TrialSetting mismatch_setting(const ExperimentContext& context, std::uint64_t seed) {
+  TrialSetting setting = standard_setting(context);
+  std::mt19937_64 random(seed * 7919u + 3u);
+  const auto sign = [&] { return (random() & 1u) != 0 ? 1.0 : -1.0; };
+  auto& faults = setting.plan.faults;
+  faults.push_back(FaultSpec::of("focal_length", "", 0.3 * sign()));
+  for (const char* source : {"left", "right"}) {
+    for (const char* axis : {"x", "y"}) {
+      FaultSpec shift{"principal_point", {{"source", source}, {"axis", axis}}};
+      shift.set("value", 0.5 * sign());
+      faults.push_back(shift);
+    }
+  }
+  faults.push_back(FaultSpec::of("mesh_scale", "", 0.5 * sign()));
+  faults.push_back(FaultSpec::of("finger_posture", "", 2.0 * sign()));
+  return setting;
+}
+
+std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std::string& label,
+                                    int trials,
+                                    const std::function<TrialSetting(std::uint64_t)>& setting_of,
+                                    const std::vector<Contestant>& contestants) {
+  std::vector<TrialRecord> records(static_cast<std::size_t>(trials));
+  // Configuration is read by one thread only: settings are made before the work is shared out.
+  std::vector<TrialSetting> settings;
+  for (int t = 0; t < trials; ++t) {
+    settings.push_back(setting_of(context.options.seed + static_cast<std::uint64_t>(t)));
+  }
+  ProgressBar bar(label, static_cast<std::uint64_t>(trials));
+  std::atomic<int> next{0};
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    for (int t = next++; t < trials; t = next++) {
+      try {
+        const auto index = static_cast<std::size_t>(t);
+        records[index] =
+            run_trial(settings[index], contestants, context.options.seed + static_cast<std::uint64_t>(t));
+        const std::lock_guard lock(mutex);
+        bar.advance();
+      } catch (...) {
+        const std::lock_guard lock(mutex);
+        if (!failure) failure = std::current_exception();
+        next = trials;
+      }
+    }
+  };
+  int count = context.options.threads > 0
+                  ? context.options.threads
+                  : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  count = std::min(count, trials);
+  std::vector<std::thread> threads;
+  for (int i = 1; i < count; ++i) threads.emplace_back(work);
+  work();
+  for (auto& thread : threads) thread.join();
+  if (failure) std::rethrow_exception(failure);
+  return records;
+}
+
+}  // namespace bodyschema
