@@ -27,6 +27,7 @@ void ParticleFilter::reset(const Eigen::VectorXd& mean_rad) {
   weights_.setConstant(1.0 / static_cast<double>(states_.cols()));
   spread_rad_ = options_.spread_rad;
   best_ = 0;
+  best_is_current_ = true;
 }
 
 void ParticleFilter::set_state(Eigen::Index particle, const Eigen::VectorXd& state_rad) {
@@ -35,8 +36,16 @@ void ParticleFilter::set_state(Eigen::Index particle, const Eigen::VectorXd& sta
 
 void ParticleFilter::update(const Eigen::VectorXd& likelihood) {
   weights_ = likelihood;
-  kernel_density(states_, likelihood, options_.kde_sd_deg, kde_);
-  best_ = densest_particle(likelihood, kde_, options_.kde_alpha);
+  best_is_current_ = false;
+}
+
+Eigen::Index ParticleFilter::estimate_index() {
+  if (!best_is_current_) {
+    kernel_density(states_, weights_, options_.kde_sd_deg, kde_);
+    best_ = densest_particle(weights_, kde_, options_.kde_alpha);
+    best_is_current_ = true;
+  }
+  return best_;
 }
 
 Eigen::VectorXd ParticleFilter::mean() const {

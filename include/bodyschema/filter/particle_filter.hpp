@@ -40,9 +40,10 @@ class ParticleFilter {
   /// Sets the weights; not negative, at least one positive.
   void update(const Eigen::VectorXd& likelihood);
 
-  /// Index of the particle with the largest W (equation 5).
-  [[nodiscard]] Eigen::Index estimate_index() const { return best_; }
-  [[nodiscard]] Eigen::VectorXd estimate() const { return states_.col(best_); }
+  /// Index of the particle with the largest W (equation 5). The density compares every pair of
+  /// particles, so it is worked out when first asked for after an update.
+  [[nodiscard]] Eigen::Index estimate_index();
+  [[nodiscard]] Eigen::VectorXd estimate() { return states_.col(estimate_index()); }
   /// Weighted mean and covariance of the cloud, radians and square radians.
   [[nodiscard]] Eigen::VectorXd mean() const;
   [[nodiscard]] Eigen::MatrixXd covariance() const;
@@ -66,6 +67,7 @@ class ParticleFilter {
   Eigen::VectorXd kde_;
   std::vector<std::size_t> ancestors_;
   Eigen::Index best_ = 0;
+  bool best_is_current_ = true;
   double spread_rad_ = 0.0;
 };
 

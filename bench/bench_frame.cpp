@@ -1,0 +1,124 @@
+// Cost of one whole frame: masks, particles, likelihoods, refinement. Our own robot (8k triangles)
+// in its simulated room. Names read `engine/mode/triangles/size/particles`. See README.md.
+
+#include <benchmark/benchmark.h>
+
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/simulator/simulator.hpp"
+
+namespace {
+
+using namespace bodyschema;
+
+Configuration configuration(const std::string& engine, const std::string& mode, int particles) {
+  const std::filesystem::path file =
+      std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml";
+  return Configuration::load(file, {"silhouette.engine=" + engine, "estimator.mode=" + mode,
+                                    "filter.particles=" + std::to_string(particles)});
+}
+
+/// A reach and the empty frames before it, drawn once. Masks are filled in by whoever uses it.
+struct Reach {
+  std::vector<Observation> background;
+  std::vector<Observation> motion;
+};
+
+const Reach& reach() {
+  static const Reach made = [] {
+    const Configuration c = configuration("contour", "best", 200);
+    const RobotSetup setup = RobotSetup::from(c.section("robot"));
+    auto settings = simulator::SimulatorSettings::from(c.section("simulator"));
+    settings.background_frames = 25;
+    settings.entry_frames = 0;
+    simulator::SimulationPlan plan;
+    plan.frames = 60;
+    plan.threads = 2;
+    plan.offsets_deg = {{"r_shoulder_pitch", 5}, {"r_elbow", -2}, {"r_wrist_pitch", -7}};
+    simulator::Simulator simulator(setup.load(), setup, StereoRig::from(c.section("cameras")), settings, plan);
+    Reach result;
+    std::vector<JointSample> history;
+    while (auto frame = simulator.next()) {
+      history.insert(history.end(), frame->encoders.begin(), frame->encoders.end());
+      auto& list = frame->phase == simulator::Phase::kMotion ? result.motion : result.background;
+      list.push_back(simulator::to_observation(*frame, history));
+    }
+    return result;
+  }();
+  return made;
+}
+
+/// Frames of the reach in turn, as the service gets them.
+void whole_frame(benchmark::State& state, const std::string& engine, const std::string& mode, int particles) {
+  Pipeline pipeline(configuration(engine, mode, particles));
+  for (Observation observation : reach().background) pipeline.process(observation);
+  // The first frames search; what counts is the frame of a running service.
+  constexpr std::size_t kWarmUp = 30;
+  const auto& motion = reach().motion;
+  for (std::size_t i = 0; i < kWarmUp; ++i) {
+    Observation observation = motion[i];
+    pipeline.process(observation);
+  }
+  std::size_t next = kWarmUp;
+  StageTimes sum;
+  double segmentation_ms = 0.0;
+  bool estimated = true;
+  for (auto _ : state) {
+    state.PauseTiming();
+    Observation observation = motion[next];
+    next = next + 1 < motion.size() ? next + 1 : kWarmUp;
+    state.ResumeTiming();
+    const Estimate estimate = pipeline.process(observation);
+    estimated = estimated && estimate.state != EstimatorState::kLearningBackground &&
+                estimate.state != EstimatorState::kHandNotInView;
+    segmentation_ms += pipeline.segmentation_ms();
+    sum.kinematics_ms += estimate.times.kinematics_ms;
+    sum.scoring_ms += estimate.times.scoring_ms;
+    sum.filter_ms += estimate.times.filter_ms;
+    sum.refinement_ms += estimate.times.refinement_ms;
+  }
+  if (!estimated) state.SkipWithError("a frame gave no estimate: nothing was measured");
+  const auto mean = benchmark::Counter::kAvgIterations;
+  state.counters["mask_ms"] = benchmark::Counter(segmentation_ms, mean);
+  state.counters["kinematics_ms"] = benchmark::Counter(sum.kinematics_ms, mean);
+  state.counters["scoring_ms"] = benchmark::Counter(sum.scoring_ms, mean);
+  state.counters["filter_ms"] = benchmark::Counter(sum.filter_ms, mean);
+  state.counters["refine_ms"] = benchmark::Counter(sum.refinement_ms, mean);
+  state.counters["particles_per_s"] =
+      benchmark::Counter(static_cast<double>(particles), benchmark::Counter::kIsIterationInvariantRate);
+}
+
+void register_all() {
+  for (const std::string engine : {"contour", "atlas"}) {
+    for (const std::string mode : {"best", "paper"}) {
+      for (const int particles : {50, 200, 1000, 10000}) {
+        if (engine == "atlas" && particles > 1000) continue;  // seconds a frame in software
+        benchmark::RegisterBenchmark(
+            (engine + "/" + mode + "/8k/320x240/" + std::to_string(particles)).c_str(),
+            [=](benchmark::State& state) { whole_frame(state, engine, mode, particles); })
+            ->MeasureProcessCPUTime()
+            ->UseRealTime()
+            ->Unit(benchmark::kMillisecond);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  try {
+    register_all();
+    benchmark::RunSpecifiedBenchmarks();
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bench_frame: %s\n", error.what());
+    return 1;
+  }
+  benchmark::Shutdown();
+}

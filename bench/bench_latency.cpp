@@ -1,0 +1,153 @@
+// From pictures published on LCM to offsets received, through the real daemon, fed from a recorded
+// log at 30 Hz. One iteration is one frame; its time is its latency. See README.md.
+
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "bodyschema/bus/bus_options.hpp"
+#include "integration/harness.hpp"
+
+namespace {
+
+using namespace bodyschema;
+using namespace bodyschema::integration;
+using Clock = std::chrono::steady_clock;
+
+/// Asks the daemon's status every second, and its offsets as they come; remembers when.
+class Arrivals {
+ public:
+  explicit Arrivals(const std::string& url) : link_(url) {
+    const Channels channels = Channels::with_prefix("ICUB");
+    link_.subscribe(channels.joint_offsets, 1000, [this](const std::string&, Bytes message, std::int64_t) {
+      const auto now = Clock::now();
+      joint_offsets_t offsets;
+      if (!decode(message, offsets).ok()) return;
+      const std::lock_guard lock(mutex_);
+      received_.emplace(offsets.utime, now);
+    });
+    link_.subscribe(channels.offsets_status, 100, [this](const std::string&, Bytes message, std::int64_t) {
+      offsets_status_t status;
+      if (!decode(message, status).ok()) return;
+      const std::lock_guard lock(mutex_);
+      status_ = std::move(status);
+    });
+    thread_ = std::jthread([this](const std::stop_token& stop) {
+      while (!stop.stop_requested()) link_.handle(20);
+    });
+  }
+  void published(Microseconds utime) {
+    const std::lock_guard lock(mutex_);
+    published_.emplace_back(utime, Clock::now());
+  }
+  /// Latencies in ms of the frames published so far; those without an answer are left out.
+  std::vector<double> latencies_ms() {
+    const std::lock_guard lock(mutex_);
+    std::vector<double> result;
+    for (const auto& [utime, sent] : published_) {
+      const auto found = received_.find(utime);
+      if (found == received_.end()) continue;
+      result.push_back(std::chrono::duration<double, std::milli>(found->second - sent).count());
+    }
+    return result;
+  }
+  std::size_t frames_published() {
+    const std::lock_guard lock(mutex_);
+    return published_.size();
+  }
+  offsets_status_t status() {
+    const std::lock_guard lock(mutex_);
+    return status_;
+  }
+  void forget() {
+    const std::lock_guard lock(mutex_);
+    published_.clear();
+    received_.clear();
+  }
+
+ private:
+  LcmLink link_;
+  std::mutex mutex_;
+  std::vector<std::pair<Microseconds, Clock::time_point>> published_;
+  std::map<Microseconds, Clock::time_point> received_;
+  offsets_status_t status_{};
+  std::jthread thread_;
+};
+
+double quantile(std::vector<double> sorted, double share) {
+  return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+}
+
+void latency(benchmark::State& state, int seconds) {
+  const Scratch scratch;
+  const std::string url = private_lcm_url();
+  Process daemon({"bodyschemad", "--config", reach_configuration(), "--lcm-url", url}, scratch.folder());
+  if (!daemon.said("waiting for", Seconds(60))) {
+    state.SkipWithError("bodyschemad did not start");
+    return;
+  }
+  Arrivals arrivals(url);
+  std::vector<double> all;
+  offsets_status_t status;
+  std::size_t published = 0;
+  {
+    Robot robot(url, reach_log());
+    Robot::Faults watch;
+    watch.pictures = [&](bot_core::images_t& pictures, LcmLink&) {
+      arrivals.published(pictures.images.front().utime);
+      return true;
+    };
+    std::this_thread::sleep_for(std::chrono::seconds(5));  // background learned, caches warm
+    robot.set_faults(watch);
+    std::this_thread::sleep_for(std::chrono::seconds(seconds));
+    robot.set_faults({});
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    all = arrivals.latencies_ms();
+    published = arrivals.frames_published();
+    status = arrivals.status();
+  }
+  if (all.empty()) {
+    state.SkipWithError("no offsets came back");
+    return;
+  }
+  std::size_t next = 0;
+  for (auto _ : state) state.SetIterationTime(1e-3 * all[next++ % all.size()]);
+  std::sort(all.begin(), all.end());
+  state.counters["frames"] = static_cast<double>(published);
+  state.counters["unanswered"] = static_cast<double>(published - all.size());
+  state.counters["shed"] = static_cast<double>(status.frames_dropped);
+  state.counters["median_ms"] = quantile(all, 0.5);
+  state.counters["p99_ms"] = quantile(all, 0.99);
+  state.counters["max_ms"] = all.back();
+  state.counters["memory_MiB"] = static_cast<double>(status.resident_bytes) / (1 << 20);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  try {
+    if (const std::string why = why_no_lcm(); !why.empty()) throw std::runtime_error(why);
+    const char* wish = std::getenv("BODYSCHEMA_BENCH_SECONDS");
+    const int seconds = wish != nullptr ? std::max(2, std::atoi(wish)) : 60;
+    benchmark::RegisterBenchmark("daemon/contour/8k/320x240/200",
+                                 [seconds](benchmark::State& state) { latency(state, seconds); })
+        ->UseManualTime()
+        ->Iterations(1000)
+        ->Unit(benchmark::kMillisecond);
+    benchmark::RunSpecifiedBenchmarks();
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bench_latency: %s\n", error.what());
+    return 1;
+  }
+  benchmark::Shutdown();
+}
