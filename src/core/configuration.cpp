@@ -226,7 +226,9 @@ class Reader {
       if (++entries_ > kMaxEntries || depth > kMaxDepth) {
         throw ConfigurationError(file.string() + ": too many or too deeply nested entries");
       }
-      if (item.IsSequence() || item.IsMap()) count_items(item, file, depth + 1);
+      // Of a mapping, an item is a pair and no node by itself.
+      const YAML::Node& value = node.IsMap() ? item.second : item;
+      if (value.IsSequence() || value.IsMap()) count_items(value, file, depth + 1);
     }
   }
 

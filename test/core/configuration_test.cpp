@@ -98,6 +98,14 @@ TEST(Configuration, DuplicateKeysAndBrokenYamlAreErrorsWithLines) {
   EXPECT_THAT(error_of([] { Configuration::parse("- a\n"); }), HasSubstr("expected a mapping"));
 }
 
+// Found by fuzz_yaml: yaml-cpp's own exception escaped.
+TEST(Configuration, AMappingWithinAListIsOneClearError) {
+  for (const char* text : {"a: [b, {c: d}]", "a: [b: c]", "a: [[{b: {c: [d]}}]]"}) {
+    const Configuration c = Configuration::parse(text);
+    EXPECT_NE(error_of([&] { (void)c.texts("a"); }).find("expected a list of texts"), std::string::npos) << text;
+  }
+}
+
 TEST(Configuration, AliasBombIsRefused) {
   std::string text = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
   for (int i = 1; i < 8; ++i) {
