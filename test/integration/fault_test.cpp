@@ -165,32 +165,6 @@ TEST_F(World, BothCamerasDie) {
           .words = "no pictures on ICUB_CAMERAS for", .level = HealthLevel::kStale});
 }
 
-TEST_F(World, CameraFreezes) {
-  std::vector<std::uint8_t> frozen;
-  suffer({.name = "left camera freezes",
-          .faults = {.pictures = [frozen](images_t& p, LcmLink&) mutable {
-                       if (frozen.empty()) frozen = p.images[0].data;
-                       p.images[0].data = frozen;
-                       return true;
-                     }, .joints = {}},
-          .words = "the left camera has shown the same picture for", .notice_s = 15.0});
-}
-
-TEST_F(World, PicturesLate) {
-  // Half a second late, as over a bad network: the encoders of that time are still remembered.
-  std::deque<images_t> waiting;
-  suffer({.name = "pictures 0.5 s late",
-          .faults = {.pictures = [waiting](images_t& p, LcmLink& link) mutable {
-                       waiting.push_back(p);
-                       while (p.utime - waiting.front().utime >= 500'000) {
-                         link.publish_message("ICUB_CAMERAS", 0, waiting.front());
-                         waiting.pop_front();
-                       }
-                       return false;
-                     }, .joints = {}},
-          .words = "", .level = HealthLevel::kOk});
-}
-
 TEST_F(World, CamerasSwapped) {
   suffer({.name = "left and right swapped",
           .faults = {.pictures = [](images_t& p, LcmLink&) {
@@ -345,17 +319,6 @@ TEST_F(World, EncoderJumpsToAndFro) {
 }
 
 // --- the rest --------------------------------------------------------------------------------------
-
-TEST_F(World, EncoderWraps) {
-  suffer({.name = "encoder wraps by 360 deg",
-          .faults = {.pictures = {}, .joints = [](joint_state_t& j, LcmLink&) {
-                       for (std::size_t k = 0; k < j.joint_name.size(); ++k) {
-                         if (j.joint_name[k] == "r_elbow") j.joint_position[k] -= 6.2831853f;
-                       }
-                       return true;
-                     }},
-          .words = "r_elbow", .level = HealthLevel::kError});
-}
 
 TEST_F(World, ClockStepsBack) {
   const auto back = [](auto& message) { message.utime -= 3'600'000'000; };
