@@ -107,8 +107,7 @@ CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at,
     set.offsets.push_back({static_cast<Eigen::Index>(set.columns.size()), 0});
     set.columns.push_back(joint_column(layout, joint, std::vector<double>(views, -kDeg)));
   }
-  const double begin = seconds(source.views().front().joints.utime);
-  const double end = seconds(source.views().back().joints.utime);
+  const auto [begin, end] = seen_span(source, at);
 
   std::vector<std::unique_ptr<Effect>> effects;
   for (const auto& name : effect_names()) {
@@ -140,17 +139,19 @@ CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at,
       set.columns.push_back(std::move(columns[next++]));
     }
   }
-  // A slip is a joint offset that begins with a block; its exact time is found in the refit.
+  // A slip is a joint offset that begins with a cell; its exact time is found in the refit.
   for (std::size_t j = 0; j < roles.arm.size(); ++j) {
     const auto& name = roles.names[static_cast<std::size_t>(roles.arm[j])];
     if (is_excluded(excluded, {"slip", name, ""})) continue;
-    for (std::size_t b = 1; b < plan.start_s.size(); ++b) {
-      Candidate candidate;
-      candidate.name = "slip";
-      candidate.target.joint = name;
-      candidate.slip = true;
-      candidate.columns.push_back({set.offsets[j].index, b});
-      set.candidates.push_back(std::move(candidate));
+    for (std::size_t b = 0; b < plan.block_count(); ++b) {
+      for (std::size_t cell = b == 0 ? 1 : 0; cell < plan.cell_start_s[b].size(); ++cell) {
+        Candidate candidate;
+        candidate.name = "slip";
+        candidate.target.joint = name;
+        candidate.slip = true;
+        candidate.columns.push_back({set.offsets[j].index, b, cell});
+        set.candidates.push_back(std::move(candidate));
+      }
     }
   }
 
@@ -203,6 +204,16 @@ CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at,
     if (has_torque) features.add_curve("torque", torque, 5);
   }
   return set;
+}
+
+std::pair<double, double> seen_span(const MeasurementSource& source, const Linearisation& at) {
+  const auto seen = [](const CompressedView& view) { return view.weight > 0.0; };
+  const auto first = std::find_if(at.views.begin(), at.views.end(), seen);
+  const auto last = std::find_if(at.views.rbegin(), at.views.rend(), seen);
+  const auto views = source.views();
+  if (first == at.views.end()) return {0.0, 1.0};
+  return {seconds(views[static_cast<std::size_t>(first - at.views.begin())].joints.utime),
+          seconds(views[static_cast<std::size_t>(at.views.rend() - last) - 1].joints.utime)};
 }
 
 void drop_aliased_columns(const BlockStatistics& statistics, CandidateSet& set) {
@@ -351,7 +362,7 @@ std::string splitting_motion(const std::vector<CauseName>& same) {
     say("Sweep " + joint + " through more than 90 deg.");
   }
   if (has("payload") && has("compliance")) say("Record one log with and one without the load.");
-  if (has("slip") && has("drift")) {
+  if ((has("slip") || has("drift")) && (has("slip") + has("drift") + has("unexplained") > 1)) {
     say("Revisit the first postures in the middle and at the end of the log.");
   }
   if (has("axis_tilt") || has("joint_coupling")) {

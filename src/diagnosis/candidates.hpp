@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "bodyschema/diagnosis/diagnoser.hpp"
@@ -23,6 +24,9 @@ CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at,
                              const BlockPlan& plan, const CoordinateLayout& layout,
                              const std::vector<CauseName>& nuisances,
                              const std::vector<NotTestable>& excluded);
+
+/// When the hand came into view and when it was last seen, s: a log may begin with an empty room.
+std::pair<double, double> seen_span(const MeasurementSource& source, const Linearisation& at);
 
 /// Takes columns out of candidates that the offsets make up for exactly (one direction of a tilted
 /// axis can be two offsets), so that the rest of the candidate can be tested.

@@ -67,15 +67,71 @@ class Diagnoser {
 
   DiagnosisReport run() {
     refuse_unusable();
+    const auto baseline = fit_baseline();
+    auto found = search(baseline);
+    // Blocks were as long as the noise in rests of the arm seemed to ask for. A slip or a drift that
+    // falls into a rest looks like slow noise until it is known; then shorter blocks show more.
+    const auto shorter = plan_blocks(source_, found.after.at.views, options_.block_s);
+    if (shorter.length_s < kWorthwhile * plan_->length_s) {
+      plan_ = shorter;
+      accumulate_on({}, before_);
+      found = search(baseline);
+    }
     DiagnosisReport report;
-    auto baseline = baseline_model();
-    ModelFit before = fit_nonlinear(baseline, {}, options_.baseline_iterations, 0.05, 0.5);
-    check_seen(before.at);
-    const auto& plan = *plan_;
+    fill_report(report, found.set, found.selection, before_, found.after, baseline, found.extended,
+                excluded_);
+    progress(1.0);
+    return report;
+  }
 
-    auto excluded = options_.excluded;
-    for (auto& item : untestable(source_, before.at)) excluded.push_back(std::move(item));
-    auto set = make_candidates(source_, before.at, plan, layout_, options_.nuisances, excluded);
+ private:
+  static constexpr double kWorthwhile = 0.8;
+
+  /// One pass over the catalogue and the model it leads to.
+  struct Search {
+    CandidateSet set;
+    Selection selection;
+    ErrorModel extended;
+    ModelFit after;
+  };
+
+  ErrorModel fit_baseline() {
+    auto baseline = baseline_model();
+    before_ = fit_nonlinear(baseline, {}, options_.baseline_iterations, 0.05, 0.5);
+    check_seen(before_.at);
+    excluded_ = options_.excluded;
+    for (auto& item : untestable(source_, before_.at)) excluded_.push_back(std::move(item));
+    // The candidates' own nuisances are counted from zero: move the linearisation there.
+    zero_views_ = without_nuisances(before_.at, baseline);
+    return baseline;
+  }
+
+  Search search(const ErrorModel& baseline) {
+    const auto& plan = *plan_;
+    Search found{make_candidates(source_, before_.at, plan, layout_, options_.nuisances, excluded_),
+                 {}, baseline, {}};
+    auto& set = found.set;
+    set_tolerances(set);
+    const auto statistics =
+        accumulate(zero_views_, plan, set.pointers(), set.offsets.size());
+    progress(0.6);
+    drop_aliased_columns(statistics, set);
+    auto rules = options_.selection;
+    if (options_.fixed_causes) rules = fix(set, *options_.fixed_causes, std::move(rules));
+    found.selection = select_causes(statistics, set.offsets, set.candidates, rules);
+    progress(0.65);
+
+    std::vector<const SparseColumn*> generic;
+    add_causes(found.selection, set, statistics, found.extended, generic);
+    found.after = fit_nonlinear(found.extended, generic, options_.refit_iterations, 0.65, 0.9);
+    // What looked like a cause only because others were taken for linear is none.
+    while (rules.search && drop_weakest(found.selection, set, found.after, found.extended)) {
+      found.after = fit_nonlinear(found.extended, generic, options_.refit_iterations, 0.9, 0.95);
+    }
+    return found;
+  }
+
+  void set_tolerances(CandidateSet& set) const {
     for (auto& candidate : set.candidates) {
       const auto at = options_.tolerances.find(candidate.name);
       if (!candidate.nuisance || at == options_.tolerances.end()) continue;
@@ -83,32 +139,8 @@ class Diagnoser {
       const auto& p = std::as_const(*effect).parameters()[0];
       candidate.tolerance = at->second * p.si_per_unit / p.typical;
     }
-    // The candidates' own nuisances are counted from zero: move the linearisation there.
-    zero_views_ = without_nuisances(before.at, baseline);
-    const auto statistics = accumulate(zero_views_, plan, set.pointers());
-    progress(0.6);
-    drop_aliased_columns(statistics, set);
-    auto rules = options_.selection;
-    if (options_.fixed_causes) rules = fix(set, *options_.fixed_causes, std::move(rules));
-    auto selection = select_causes(statistics, set.offsets, set.candidates, rules);
-    progress(0.65);
-
-    // Refit with the causes found.
-    auto extended = baseline;
-    std::vector<const SparseColumn*> generic;
-    add_causes(selection, set, statistics, extended, generic);
-    ModelFit after = fit_nonlinear(extended, generic, options_.refit_iterations, 0.65, 0.9);
-    // What looked like a cause only because others were taken for linear is none.
-    while (rules.search && drop_weakest(selection, set, after, extended)) {
-      after = fit_nonlinear(extended, generic, options_.refit_iterations, 0.9, 0.95);
-    }
-
-    fill_report(report, set, selection, before, after, baseline, extended, excluded);
-    progress(1.0);
-    return report;
   }
 
- private:
   void progress(double share) const {
     if (options_.progress) options_.progress(share);
   }
@@ -161,7 +193,7 @@ class Diagnoser {
                                  const std::vector<const SparseColumn*>& extra) {
     ModelFit result;
     result.at = linearise(source_, model);
-    if (!plan_) plan_ = plan_blocks(source_, result.at, options_.block_s);
+    if (!plan_) plan_ = plan_blocks(source_, result.at.views, options_.block_s);
     result.parameters = fitted_parameters(model);
     std::vector<std::unique_ptr<Effect>> effects;
     for (std::size_t e = 0; e < model.size(); ++e) effects.push_back(model[e].clone());
@@ -176,15 +208,27 @@ class Diagnoser {
                          int iterations, double progress_from, double progress_to) {
     const int least = options_.before_iteration && !planned_ ? 3 : 0;  // let the search narrow
     constexpr double kSmall = 2e-3;  // of the parameter's typical size
-    for (int i = 0;; ++i) {
+    constexpr double kLost = 0.7;    // of the outline seen so far
+    constexpr int kMostRetreats = 6;
+    auto accepted = model;
+    double most_seen = 0.0;
+    for (int i = 0, retreats = 0;; ++i) {
       if (options_.before_iteration) options_.before_iteration(planned_ ? 1000 : i);
       auto current = regress(model, extra);
+      // A step too far loses the outline: half of it.
+      if (seen_weight(current.at) < kLost * most_seen && retreats < kMostRetreats) {
+        ++retreats;
+        go_half_way(accepted, model);
+        continue;
+      }
+      most_seen = std::max(most_seen, seen_weight(current.at));
+      accepted = model;
       progress(progress_from + (progress_to - progress_from) * (i + 1) / (iterations + 1));
       const auto step = damped_step(current);
       if (i >= iterations || (i >= least && step.cwiseAbs().maxCoeff() < kSmall)) {
         if (!planned_) {
           // Once, on the residuals of the fitted baseline.
-          plan_ = plan_blocks(source_, current.at, options_.block_s);
+          plan_ = plan_blocks(source_, current.at.views, options_.block_s);
           planned_ = true;
           accumulate_on(extra, current);
         }
@@ -195,6 +239,22 @@ class Diagnoser {
         auto& parameter = model[ref.effect].parameters()[ref.parameter];
         parameter.value += step[static_cast<Eigen::Index>(c)] * parameter.typical;
         if (model[ref.effect].name() == "backlash") parameter.value = std::max(parameter.value, 1e-5);
+      }
+    }
+  }
+
+  static double seen_weight(const Linearisation& at) {
+    double weight = 0.0;
+    for (const auto& view : at.views) weight += view.weight;
+    return weight;
+  }
+
+  /// `model` back to the middle between itself and `accepted`.
+  static void go_half_way(const ErrorModel& accepted, ErrorModel& model) {
+    for (std::size_t e = 0; e < model.size(); ++e) {
+      for (std::size_t p = 0; p < model[e].parameters().size(); ++p) {
+        auto& value = model[e].parameters()[p].value;
+        value = 0.5 * (value + accepted[e].parameters()[p].value);
       }
     }
   }
@@ -323,56 +383,56 @@ class Diagnoser {
       if (candidate.slip) {
         // The column is an offset (true - encoder is its negative), in degrees.
         if (fit.usable) effect.parameters()[0].value = -fit.estimate[first] * kDeg;
-        effect.parameters()[1].value = find_slip_time(set, statistics, columns, first, candidate);
+        effect.parameters()[1].value = find_slip_time(set, fit, columns, first, candidate);
       }
       if (candidate.name == "drift") {
-        const double begin = seconds(source_.views().front().joints.utime);
+        const auto [begin, end] = seen_span(source_, before_.at);
         effect.parameters()[1].value = begin;
-        effect.parameters()[2].value = seconds(source_.views().back().joints.utime) - begin;
+        effect.parameters()[2].value = end - begin;
       }
     }
   }
 
-  /// The time within the blocks beside the winning boundary at which the step fits best; the other
-  /// columns keep their values.
-  double find_slip_time(const CandidateSet& set, const BlockStatistics& statistics,
-                        const Columns& columns, Eigen::Index slip, const Candidate& candidate) {
-    const auto fit = statistics.fit(columns);
-    const std::size_t boundary = candidate.columns.front().from_block;
+  /// The time beside the winning cell's beginning at which the step fits best; the other columns
+  /// keep their values.
+  double find_slip_time(const CandidateSet& set, const BlockFit& fit, const Columns& columns,
+                        Eigen::Index slip, const Candidate& candidate) {
+    constexpr double kBeside_s = 0.6;
     const auto& plan = *plan_;
     const auto views = source_.views();
-    double best_time = plan.start_s[boundary];
+    const auto& begin = candidate.columns.front();
+    const double cell_s = plan.cell_start_s[begin.from_block][begin.from_cell];
+    double best_time = cell_s - 1e-4;
     if (!fit.usable) return best_time;
-    // Gain of switching the step on at each view of the two blocks, from the view's own score.
-    const auto index = static_cast<std::size_t>(candidate.columns.front().index);
-    double running = 0.0, best = 0.0;
+    const auto add = [&](Eigen::Index c, std::size_t v, Eigen::VectorXd& x) {
+      const auto i = static_cast<std::size_t>(columns[static_cast<std::size_t>(c)].index);
+      for (const auto& e : set.columns[i].views[v]) {
+        x[static_cast<Eigen::Index>(e.coordinate)] += static_cast<double>(e.value) * fit.estimate[c];
+      }
+    };
+    // Loss that switching the step on at a view takes away there.
     const auto gain = [&](std::size_t v) {
       const auto& view = zero_views_[v];
       if (view.weight <= 0.0) return 0.0;
-      Eigen::VectorXd x = Eigen::VectorXd::Zero(layout_.size());
+      Eigen::VectorXd x = Eigen::VectorXd::Zero(layout_.size()), step = x;
       for (Eigen::Index c = 0; c < static_cast<Eigen::Index>(columns.size()); ++c) {
-        if (c == slip || plan.block_of_view[v] < columns[static_cast<std::size_t>(c)].from_block) continue;
-        const auto i = static_cast<std::size_t>(columns[static_cast<std::size_t>(c)].index);
-        for (const auto& e : set.columns[i].views[v]) {
-          x[static_cast<Eigen::Index>(e.coordinate)] += static_cast<double>(e.value) * fit.estimate[c];
-        }
+        const auto& column = columns[static_cast<std::size_t>(c)];
+        if (c != slip && plan.reached(v, column.from_block, column.from_cell)) add(c, v, x);
       }
-      Eigen::VectorXd s = Eigen::VectorXd::Zero(layout_.size());
-      for (const auto& e : set.columns[index].views[v]) {
-        s[static_cast<Eigen::Index>(e.coordinate)] += static_cast<double>(e.value) * fit.estimate[slip];
-      }
+      add(slip, v, step);
       const Eigen::VectorXd rest = view.vector - view.information * x;
-      return plan.weight_of_view[v] * (2.0 * s.dot(rest) - s.dot(view.information * s));
+      return plan.weight_of_view[v] * (2.0 * step.dot(rest) - step.dot(view.information * step));
     };
-    // From the end of the next block backwards: the sum of gains of all views after the switch.
+    // Backwards: the sum of gains of all views after the switch.
+    double running = 0.0, best = 0.0;
     for (std::size_t v = views.size(); v-- > 0;) {
-      const std::size_t b = plan.block_of_view[v];
-      if (b > boundary) continue;
-      if (b + 1 < boundary) break;
+      const double t = seconds(views[v].joints.utime);
+      if (t > cell_s + kBeside_s) continue;
+      if (t < cell_s - kBeside_s) break;
       running += gain(v);
       if (running > best) {
         best = running;
-        best_time = seconds(views[v].joints.utime) - 1e-4;
+        best_time = t - 1e-4;
       }
     }
     return best_time;
@@ -456,7 +516,7 @@ class Diagnoser {
     report.block_s = plan_->length_s;
     report.noise_correlation_s = plan_->correlation_s;
     report.views = source_.views().size();
-    report.blocks = plan_->start_s.size();
+    report.blocks = plan_->block_count();
     for (const auto joint : roles.arm) {
       report.arm_joints.push_back(roles.names[static_cast<std::size_t>(joint)]);
     }
@@ -472,6 +532,7 @@ class Diagnoser {
       cause.heldout_gain = selected.score.gain;
       cause.same.push_back(cause.cause);
       for (const auto c : selected.same) cause.same.push_back(name_of(set.candidates[c]));
+      if (selected.wanders) cause.same.push_back({"unexplained", cause.cause.joint, ""});
       if (cause.same.size() > 1) cause.advice = splitting_motion(cause.same);
       for (std::size_t c = 0; c < after.parameters.size(); ++c) {
         const auto& ref = after.parameters[c];
@@ -487,6 +548,8 @@ class Diagnoser {
       if (!listed) report.causes.push_back(std::move(cause));
     }
     add_limits(report, set, selection);
+    report.rest_gain = selection.rest_gain;
+    report.rest_t = selection.rest_t;
 
     for (std::size_t c = 0; c < set.candidates.size(); ++c) {
       const auto& first = selection.first_scores[c];
@@ -528,6 +591,14 @@ class Diagnoser {
     if (plan_->correlation_s <= 0.0) {
       report.warnings.push_back("no rest of 3 s or more in the log: the noise's correlation time is "
                                 "not measured, blocks are " + std::to_string(plan_->length_s) + " s");
+    }
+    if (selection.crowded) {
+      std::string list;
+      for (const auto& cause : selection.set_aside) {
+        list += (list.empty() ? "" : ", ") + set.candidates[cause.candidate].description();
+      }
+      report.warnings.push_back("several small errors share what is left" +
+                                (list.empty() ? "" : "; none stands out among " + list));
     }
     if (report.duration_s < 30.0) {
       report.warnings.push_back("the log is shorter than 30 s: small causes stay hidden");
@@ -703,6 +774,8 @@ class Diagnoser {
   CoordinateLayout layout_;
   std::optional<BlockPlan> plan_;
   bool planned_ = false;
+  ModelFit before_;                     ///< about the baseline
+  std::vector<NotTestable> excluded_;
   std::vector<CompressedView> zero_views_;
   std::vector<Eigen::MatrixXd> jacobians_;
 };

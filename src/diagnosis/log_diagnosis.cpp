@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
@@ -34,8 +35,11 @@ class LogDiagnosis {
     auto diagnosis = options_.diagnosis;
     if (diagnosis.nuisances.empty()) diagnosis.nuisances = usual_nuisances(measurement_.roles());
     if (diagnosis.start_offsets.empty()) diagnosis.start_offsets = start_offsets_;
-    ProgressBar bar("diagnosis", 100);
-    diagnosis.progress = [&](double share) { bar.set(static_cast<std::uint64_t>(100.0 * share)); };
+    std::optional<ProgressBar> bar;
+    if (!options_.quiet) bar.emplace("diagnosis", 100);
+    diagnosis.progress = [&](double share) {
+      if (bar) bar->set(static_cast<std::uint64_t>(100.0 * share));
+    };
     diagnosis.before_iteration = [this](int iteration) {
       constexpr double kSearch_px[] = {8.0, 6.0, 4.0};
       measurement_.set_search(kSearch_px[std::min(iteration, 2)]);
@@ -51,7 +55,8 @@ class LogDiagnosis {
     LogReader log(options_.log);
     auto stream = pipeline_.make_stream();
     const auto channels = stream.channels();
-    ProgressBar bar(label, log.size());
+    std::optional<ProgressBar> bar;
+    if (!options_.quiet) bar.emplace(label, log.size());
     LogEvent event;
     const auto drain = [&] {
       while (auto arrived = stream.next()) action(arrived->observation);
@@ -59,7 +64,7 @@ class LogDiagnosis {
     while (log.next(event)) {
       if (recorder != nullptr && event.channel == channels.joint_state) recorder->take(event.data);
       if (stream.receive(event.channel, event.data, event.time_us)) drain();
-      bar.set(log.position());
+      if (bar) bar->set(log.position());
     }
     stream.finish();
     drain();

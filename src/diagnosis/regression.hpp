@@ -10,6 +10,7 @@
 #include "bodyschema/diagnosis/measurement.hpp"
 #include "bodyschema/diagnosis/selection.hpp"
 #include "bodyschema/effects/error_model.hpp"
+#include "block_plan.hpp"
 
 namespace bodyschema::diagnosis {
 
@@ -33,21 +34,6 @@ struct SparseColumn {
   std::vector<std::vector<Entry>> views;
 };
 
-/// Which block each view belongs to.
-struct BlockPlan {
-  std::vector<std::size_t> block_of_view;
-  std::vector<double> weight_of_view;  ///< below one in a static hold, which repeats itself
-  std::vector<double> start_s;         ///< per block
-  double length_s = 0.0;
-  double correlation_s = 0.0;  ///< of the noise, measured in static holds; 0 when there is none
-  double still_share = 0.0;
-};
-
-/// Blocks of at least `shortest_s` and five noise correlation times, measured where the arm stands
-/// still. A static hold shows one posture again and again, so it counts as one block.
-BlockPlan plan_blocks(const MeasurementSource& source, const Linearisation& linearisation,
-                      double shortest_s);
-
 /// Columns for the fitted parameters of effects, taken one at a time: the change of the
 /// corrections per `typical` of the parameter. For an effect at zero this is the secant to its
 /// typical size, otherwise the derivative.
@@ -59,8 +45,10 @@ std::vector<SparseColumn> effect_columns(MeasurementSource& source, const Linear
 SparseColumn joint_column(const CoordinateLayout& layout, Eigen::Index joint,
                           const std::vector<double>& value);
 
+/// @param switchable  that many columns, the first ones, may begin within a block
 BlockStatistics accumulate(const std::vector<CompressedView>& views, const BlockPlan& plan,
-                           const std::vector<const SparseColumn*>& columns);
+                           const std::vector<const SparseColumn*>& columns,
+                           std::size_t switchable = 0);
 
 /// Acceleration of every joint at every view, rad/s^2, from the velocities of the log.
 std::vector<Eigen::VectorXd> accelerations(const MeasurementSource& source);

@@ -32,7 +32,8 @@ class Selector {
  public:
   Selector(const BlockStatistics& statistics, const Columns& always,
            const std::vector<Candidate>& candidates, const SelectionOptions& options)
-      : statistics_(statistics), always_(always), candidates_(candidates), options_(options) {
+      : statistics_(statistics), always_(always), candidates_(candidates), options_(options),
+        gain_floor_(options.gain_floor) {
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       if (candidates[c].nuisance) model_.push_back(c);
     }
@@ -41,10 +42,9 @@ class Selector {
   Selection run() {
     Selection result;
     drop_dependent_nuisances(result);
-    current_ = fit(model_);
+    refit();
     baseline_ = current_.heldout();
     result.baseline_heldout = baseline_;
-    find_floor();
     result.first_scores = score_all();
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       if (!result.first_scores[c].testable && !contains(result.not_testable, c)) {
@@ -55,6 +55,7 @@ class Selector {
       add_causes();
       simplify();
       drop_causes();
+      stand_out(result);
     } else {
       for (const auto c : options_.fixed) {
         if (!contains(model_, c) && fit(with(model_, c)).usable) {
@@ -62,7 +63,7 @@ class Selector {
           model_.push_back(c);
         }
       }
-      current_ = fit(model_);
+      refit();
     }
     for (const auto c : reported()) result.causes.push_back(describe(c));
     std::stable_sort(result.causes.begin(), result.causes.end(),
@@ -80,12 +81,28 @@ class Selector {
     Eigen::VectorXd loss;  ///< held out, with the candidate
   };
 
-  [[nodiscard]] BlockFit fit(const Ids& ids, std::size_t group = 1) const {
+  [[nodiscard]] Columns columns_of(const Ids& ids) const {
     Columns columns = always_;
     for (const auto c : ids) {
       columns.insert(columns.end(), candidates_[c].columns.begin(), candidates_[c].columns.end());
     }
-    return statistics_.fit(columns, group);
+    return columns;
+  }
+
+  [[nodiscard]] BlockFit fit(const Ids& ids, std::size_t group = 1) const {
+    return statistics_.fit(columns_of(ids), group);
+  }
+
+  /// After the model has changed.
+  void refit() {
+    nested_.emplace(statistics_, columns_of(model_));
+    current_ = nested_->base();
+    find_floor();
+  }
+
+  /// The model with one more candidate.
+  [[nodiscard]] BlockFit extended_by(std::size_t candidate) const {
+    return nested_->with(candidates_[candidate].columns);
   }
 
   /// Position of a candidate's first column in the fit of `ids`.
@@ -109,7 +126,10 @@ class Selector {
         (V.diagonal().array() / f.model_variance.segment(at, n).array()).mean();
     if (dispersion < floor_) V *= floor_ / dispersion;
     V += 1e-12 * V.trace() * Eigen::MatrixXd::Identity(n, n);
-    return equivalent_z(theta.dot(V.ldlt().solve(theta)), n);
+    // Few blocks know the covariance of many columns badly (Hotelling's correction; none for one).
+    const double blocks = static_cast<double>(statistics_.block_count());
+    const double known = std::max(0.0, (blocks - static_cast<double>(n)) / (blocks - 1.0));
+    return equivalent_z(known * theta.dot(V.ldlt().solve(theta)), n);
   }
 
   /// A candidate against the model so far; for one that is in the model, against the model without.
@@ -124,7 +144,7 @@ class Selector {
       return trial;
     }
     const auto extended_model = with(model_, candidate);
-    const auto extended = fit(extended_model);
+    const auto extended = extended_by(candidate);
     trial.score.testable = extended.usable;
     if (!extended.usable) return trial;
     trial.loss = extended.heldout_loss;
@@ -140,16 +160,21 @@ class Selector {
                                  const Eigen::VectorXd& with_it) const {
     double t = paired_t(without_it, with_it);
     if (!candidates_[candidate].slip) return t;
-    const auto from = static_cast<Eigen::Index>(candidates_[candidate].columns.front().from_block);
-    const Eigen::Index n = without_it.size();
-    if (from >= 2) t = std::max(t, paired_t(without_it.head(from), with_it.head(from)));
+    const auto& begin = candidates_[candidate].columns.front();
+    const auto from = static_cast<Eigen::Index>(begin.from_block);
+    const Eigen::Index until = from + (begin.from_cell > 0 ? 1 : 0), n = without_it.size();
+    if (until >= 2) t = std::max(t, paired_t(without_it.head(until), with_it.head(until)));
     if (n - from >= 2) t = std::max(t, paired_t(without_it.tail(n - from), with_it.tail(n - from)));
     return t;
   }
 
   [[nodiscard]] bool enters(std::size_t candidate, const CandidateScore& s) const {
-    return s.testable && s.z > options_.z_enter && s.gain > options_.gain_floor &&
-           s.t > options_.t_enter && (!candidates_[candidate].temporal() || lasts(candidate));
+    const auto& c = candidates_[candidate];
+    const double least = c.generic() ? std::max(gain_floor_, options_.generic_gain_floor) : gain_floor_;
+    const bool large = c.temporal() && s.gain > options_.gain_large;
+    const double z = large ? options_.z_large : options_.z_enter;
+    return s.testable && s.z > z && s.gain > least && s.t > options_.t_enter &&
+           (!c.temporal() || s.gain > options_.gain_far || lasts(candidate));
   }
 
   /// Whether a cause in time also predicts stretches that lie far from what its fit has seen. Slow
@@ -162,7 +187,7 @@ class Selector {
     if (!plain.usable) return false;
     if (!extended.usable) return candidates_[candidate].slip;  // near an end: one group holds it all
     const auto z = wald_z(extended, extended_model, candidate);
-    return z > options_.z_far && (plain.heldout() - extended.heldout()) / baseline_ > options_.gain_floor;
+    return z > options_.z_far && (plain.heldout() - extended.heldout()) / baseline_ > gain_floor_;
   }
 
   [[nodiscard]] std::vector<CandidateScore> score_all() const {
@@ -184,12 +209,15 @@ class Selector {
     model_ = kept;
   }
 
+  /// The catalogue's median dispersion against the present model: what the causes found so far left
+  /// unexplained before they were found must not blur those that come after.
   void find_floor() {
     std::vector<double> dispersions;
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       if (candidates_[c].generic() || candidates_[c].slip) continue;
-      const auto ids = contains(model_, c) ? model_ : with(model_, c);
-      const auto f = fit(ids);
+      const bool inside = contains(model_, c);
+      const auto ids = inside ? model_ : with(model_, c);
+      const auto f = inside ? current_ : extended_by(c);
       if (!f.usable) continue;
       const auto at = position(ids, c);
       dispersions.push_back(f.covariance(at, at) / f.model_variance[at]);
@@ -238,7 +266,7 @@ class Selector {
       if (!best) return;
       causes_.push_back(*best);
       model_.push_back(*best);
-      current_ = fit(model_);
+      refit();
       drop_causes();
     }
   }
@@ -260,7 +288,7 @@ class Selector {
   void remove(std::size_t c) {
     std::erase(causes_, c);
     std::erase(model_, c);
-    current_ = fit(model_);
+    refit();
   }
 
   /// Whether a nuisance is clearly larger than what one puts up with.
@@ -284,6 +312,23 @@ class Selector {
     return list;
   }
 
+  /// Where many small errors live together, the largest of them is a cause like any other on a clean
+  /// log, but not what is wrong with the robot. Sets aside what does not stand out.
+  void stand_out(Selection& result) {
+    find_rest(result);
+    const auto list = reported();
+    result.crowded = list.size() >= options_.crowd ||
+                     (result.rest_gain > options_.crowd_rest_gain &&
+                      result.rest_t > options_.crowd_rest_t);
+    if (!result.crowded) return;
+    gain_floor_ = options_.crowd_floor;
+    for (const auto c : list) {
+      const auto score = test(c).score;
+      if (score.gain <= gain_floor_) result.set_aside.push_back({c, score, {}, false});
+    }
+    drop_causes();
+  }
+
   /// One cause outside the baseline can look like several nuisances inside it. Where one candidate
   /// makes two or more reported causes superfluous and the fit stays as good, it replaces them.
   void simplify() {
@@ -296,7 +341,7 @@ class Selector {
       for (std::size_t a = 0; a < candidates_.size(); ++a) {
         if (contains(model_, a) || candidates_[a].generic() || blocked(a)) continue;
         const auto extended_model = with(model_, a);
-        const auto extended = fit(extended_model);
+        const auto extended = extended_by(a);
         if (!extended.usable) continue;
         Ids killed;
         for (const auto c : list) {
@@ -321,7 +366,7 @@ class Selector {
       for (const auto c : best_killed) remove(c);
       causes_.push_back(*best);
       model_.push_back(*best);
-      current_ = fit(model_);
+      refit();
     }
   }
 
@@ -330,7 +375,8 @@ class Selector {
   [[nodiscard]] SelectedCause describe(std::size_t cause) const {
     SelectedCause result{cause, test(cause).score, {}};
     if (candidates_[cause].generic()) return result;
-    const auto rest = without(model_, cause);
+    result.wanders = candidates_[cause].temporal() && wanders(candidates_[cause].target);
+    const NestedFits rest(statistics_, columns_of(without(model_, cause)));
     std::vector<std::pair<double, std::size_t>> same;
     for (std::size_t a = 0; a < candidates_.size(); ++a) {
       if (contains(model_, a) || candidates_[a].generic() ||
@@ -338,12 +384,15 @@ class Selector {
         continue;
       }
       const auto both_model = with(model_, a);
-      const auto both = fit(both_model);
-      const auto instead = fit(with(rest, a));
+      const auto both = extended_by(a);
+      const auto instead = rest.with(candidates_[a].columns);
       if (!instead.usable) continue;
-      // Exactly aliased: together they cannot be fitted at all.
-      if (both.usable && wald_z(both, both_model, cause) > options_.z_same) continue;
-      if (paired_t(instead.heldout_loss, current_.heldout_loss) > options_.t_same) continue;
+      // Exactly aliased ones cannot be fitted together at all.
+      if (both.usable && both.independent > options_.alike && wald_z(both, both_model, cause) > options_.z_same) continue;
+      if (instead.heldout() - current_.heldout() > options_.least_worse * baseline_ &&
+          paired_t(instead.heldout_loss, current_.heldout_loss) > options_.t_same) {
+        continue;
+      }
       same.emplace_back(instead.heldout(), a);
     }
     std::sort(same.begin(), same.end());
@@ -359,11 +408,23 @@ class Selector {
     return result;
   }
 
+  /// Whether a free curve in time of the joint takes something away that slip or drift leaves.
+  [[nodiscard]] bool wanders(const EffectTarget& joint) const {
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      const auto& candidate = candidates_[c];
+      if (!candidate.generic() || candidate.variable != "time" || !(candidate.target == joint)) continue;
+      const auto score = test(c).score;
+      if (score.testable && score.z > options_.z_wander && score.gain > options_.gain_floor) return true;
+    }
+    return false;
+  }
+
   void find_limits(Selection& result) const {
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       if (candidates_[c].generic() || candidates_[c].slip || contains(causes_, c)) continue;
-      const auto ids = contains(model_, c) ? model_ : with(model_, c);
-      const auto f = fit(ids);
+      const bool inside = contains(model_, c);
+      const auto ids = inside ? model_ : with(model_, c);
+      const auto f = inside ? current_ : extended_by(c);
       if (!f.usable) continue;
       const auto at = position(ids, c);
       Limit limit{c, {}};
@@ -376,16 +437,36 @@ class Selector {
     }
   }
 
+  /// What all other causes of the catalogue would explain together if each were small.
+  void find_rest(Selection& result) const {
+    constexpr double kSmall = 0.2;  // of a typical size
+    auto columns = columns_of(model_);
+    const auto own = columns.size();
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      const auto& candidate = candidates_[c];
+      if (candidate.generic() || candidate.slip || contains(model_, c)) continue;
+      columns.insert(columns.end(), candidate.columns.begin(), candidate.columns.end());
+    }
+    Eigen::VectorXd precision = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(columns.size()));
+    precision.tail(static_cast<Eigen::Index>(columns.size() - own))
+        .setConstant(floor_ / (kSmall * kSmall));
+    const auto loss = statistics_.heldout_with_prior(columns, precision);
+    result.rest_gain = (current_.heldout() - loss.sum()) / baseline_;
+    result.rest_t = paired_t(current_.heldout_loss, loss);
+  }
+
   const BlockStatistics& statistics_;
   const Columns& always_;
   const std::vector<Candidate>& candidates_;
   const SelectionOptions& options_;
+  double gain_floor_;  ///< least gain of a cause
   Ids model_;    ///< candidates in the fit: nuisances, then causes
   Ids causes_;   ///< those that were added
   Ids dropped_;  ///< and those that were dropped again: not tried twice
+  std::optional<NestedFits> nested_;  ///< about model_
   BlockFit current_;
   double baseline_ = 1.0;
-  double floor_ = 0.0;
+  double floor_ = 0.0;       ///< least dispersion of a candidate
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "bodyschema/effects/corrected_kinematics.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace bodyschema {
 namespace {
@@ -38,6 +39,14 @@ CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model
     const Eigen::Vector3d axis_P = X_W_[joints_[j].parent].linear().transpose() * axis.direction_W;
     joints_[j].tilt_P[0] = perpendicular(axis_P);
     joints_[j].tilt_P[1] = axis_P.cross(joints_[j].tilt_P[0]).normalized();
+    for (std::size_t k = 0; k < joints.size(); ++k) {
+      if (joints[k].parent_link != joints[j].child_link) continue;
+      const Eigen::Vector3d on = fk_->joint_axis(static_cast<Eigen::Index>(k)).point_W - axis.point_W;
+      const double along = axis.direction_W.dot(on);
+      if (std::abs(along) < 1e-6) continue;
+      joints_[j].outwards = along > 0.0 ? 1.0 : -1.0;
+      break;
+    }
     for (std::size_t l = 0; l < all.size(); ++l) {
       moves_[j * all.size() + l] = fk_->moves(static_cast<Eigen::Index>(j), l);
     }
@@ -68,7 +77,8 @@ void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q,
     }
     Pose C = Pose::Identity();
     C.linear() = R;
-    C.translation() = axis.point_W - R * axis.point_W + adjustment.along_m * axis.direction_W;
+    C.translation() = axis.point_W - R * axis.point_W +
+                      joints_[j].outwards * adjustment.along_m * axis.direction_W;
     for (std::size_t l = 0; l < link_count_; ++l) {
       if (moves(joint, l)) X_CB[l] = C * X_CB[l];
     }

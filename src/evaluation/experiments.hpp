@@ -34,5 +34,6 @@ void run_likelihood(ExperimentContext& context);
 void run_ablations(ExperimentContext& context);
 void run_reach(ExperimentContext& context);
 void run_recording(ExperimentContext& context);
+void run_diagnosis(ExperimentContext& context);
 
 }  // namespace bodyschema

@@ -40,14 +40,14 @@ const DiagnosedCause* find(const DiagnosisReport& report, const CauseName& cause
 TEST(LazyBreakers, NothingWrongIsNothing) {
   TrialOptions options;
   options.noise_burst = true;
-  const auto log = make_synthetic_log(robot(), options, test::seed());
+  const auto log = make_synthetic_log(robot(), options, test::log_seed());
   const auto report = diagnosis(*log);
   EXPECT_EQ(report.verdict, "none") << report.sentence;
   EXPECT_FALSE(report.exclusion_limits.empty());
 }
 
 TEST(LazyBreakers, DuplicatedFramesSharpenNothing) {
-  const auto log = make_synthetic_log(robot(), log_with({fault("backlash", "r_elbow", 0.8)}), test::seed());
+  const auto log = make_synthetic_log(robot(), log_with({fault("backlash", "r_elbow", 0.8)}), test::log_seed());
   std::vector<std::size_t> twice;
   for (std::size_t v = 0; v < log->views().size(); ++v) twice.insert(twice.end(), {v, v});
   EditedLog doubled(*log, twice);
@@ -61,10 +61,10 @@ TEST(LazyBreakers, DuplicatedFramesSharpenNothing) {
 }
 
 TEST(LazyBreakers, BacklashVanishesWhenDirectionsAreShuffled) {
-  const auto log = make_synthetic_log(robot(), log_with({fault("backlash", "r_elbow", 0.8)}), test::seed());
+  const auto log = make_synthetic_log(robot(), log_with({fault("backlash", "r_elbow", 0.8)}), test::log_seed());
   auto shuffled = EditedLog::whole(*log);
   // Before every picture the encoder log takes a random detour that sets the play to either side.
-  std::mt19937_64 random(test::seed());
+  std::mt19937_64 random(test::log_seed());
   std::vector<JointSample> stream;
   Microseconds last = 0;
   for (const auto& view : log->views()) {
@@ -91,7 +91,7 @@ TEST(LazyBreakers, BacklashVanishesWhenDirectionsAreShuffled) {
 TEST(LazyBreakers, AFrozenJointIsNotTestableAndTheRestIs) {
   auto options = log_with({fault("encoder_gain", "r_elbow", 4.0)});
   options.frozen_joints = {"r_wrist_pitch"};
-  const auto log = make_synthetic_log(robot(), options, test::seed());
+  const auto log = make_synthetic_log(robot(), options, test::log_seed());
   const auto report = diagnosis(*log);
   EXPECT_TRUE(in_class(report, options.faults[0])) << report.sentence;
   const auto frozen = std::find_if(report.not_testable.begin(), report.not_testable.end(), [](const auto& n) {
@@ -104,7 +104,7 @@ TEST(LazyBreakers, AFrozenJointIsNotTestableAndTheRestIs) {
 TEST(LazyBreakers, OneWayMotionCannotShowBacklash) {
   auto options = log_with({fault("backlash", "r_elbow", 1.0)});
   options.one_way = true;
-  const auto log = make_synthetic_log(robot(), options, test::seed());
+  const auto log = make_synthetic_log(robot(), options, test::log_seed());
   const auto report = diagnosis(*log);
   EXPECT_EQ(find(report, {"backlash", "r_elbow", ""}), nullptr) << report.sentence;
   EXPECT_TRUE(std::any_of(report.not_testable.begin(), report.not_testable.end(), [](const auto& n) {
@@ -116,7 +116,7 @@ TEST(LazyBreakers, AnExactlyAliasedPairIsAClass) {
   // The elbow moves only with shoulder yaw: its gain is a coupling to it, and the other way round.
   auto options = log_with({fault("encoder_gain", "r_elbow", 5.0)});
   options.locked = {"r_shoulder_yaw", "r_elbow"};
-  const auto log = make_synthetic_log(robot(), options, test::seed());
+  const auto log = make_synthetic_log(robot(), options, test::log_seed());
   const auto report = diagnosis(*log);
   ASSERT_FALSE(report.causes.empty());
   const auto& same = report.causes[0].same;
@@ -130,7 +130,7 @@ TEST(LazyBreakers, AnExactlyAliasedPairIsAClass) {
 TEST(LazyBreakers, TwoCausesOfOppositeSignOnOneJoint) {
   const auto options = log_with({fault("backlash", "r_elbow", 0.9),
                                  fault("joint_coupling", "r_elbow", -4.0, 0.0, "r_shoulder_yaw")});
-  const auto log = make_synthetic_log(robot(), options, test::seed());
+  const auto log = make_synthetic_log(robot(), options, test::log_seed());
   const auto report = diagnosis(*log);
   EXPECT_TRUE(in_class(report, options.faults[0])) << report.sentence;
   EXPECT_TRUE(in_class(report, options.faults[1])) << report.sentence;
@@ -140,7 +140,7 @@ TEST(LazyBreakers, TheSignIsTheTruths) {
   for (const double sign : {1.0, -1.0}) {
     for (const auto& truth : {fault("latency", "", sign * 30.0), fault("encoder_gain", "r_shoulder_roll", sign * 3.0),
                               fault("vergence", "", sign * 0.5), fault("link_length", "r_shoulder_yaw", sign * 4.0)}) {
-      const auto log = make_synthetic_log(robot(), log_with({truth}), test::seed());
+      const auto log = make_synthetic_log(robot(), log_with({truth}), test::log_seed());
       const auto report = diagnosis(*log);
       const auto* cause = find(report, truth.cause);
       ASSERT_NE(cause, nullptr) << truth.cause.text() << ": " << report.sentence;
@@ -152,14 +152,14 @@ TEST(LazyBreakers, TheSignIsTheTruths) {
 TEST(LazyBreakers, ASlipAtEitherEndIsFound) {
   for (const double at : {0.06, 0.93}) {
     const auto options = log_with({fault("slip", "r_shoulder_pitch", 2.5, at)});
-    const auto log = make_synthetic_log(robot(), options, test::seed());
+    const auto log = make_synthetic_log(robot(), options, test::log_seed());
     const auto report = diagnosis(*log);
     EXPECT_TRUE(in_class(report, options.faults[0])) << at << ": " << report.sentence;
   }
 }
 
 TEST(LazyBreakers, FingersCurledByFiveDegreesAreJustThat) {
-  const auto log = make_synthetic_log(robot(), log_with({fault("finger_posture", "", 5.0)}), test::seed());
+  const auto log = make_synthetic_log(robot(), log_with({fault("finger_posture", "", 5.0)}), test::log_seed());
   const auto report = diagnosis(*log);
   ASSERT_EQ(report.causes.size(), 1u) << report.sentence;
   EXPECT_EQ(report.causes[0].cause.name, "finger_posture");
@@ -169,7 +169,7 @@ TEST(LazyBreakers, FingersCurledByFiveDegreesAreJustThat) {
 TEST(LazyBreakers, AFixedPatternInTheMeshIsNoCause) {
   TrialOptions options;
   options.mesh_pattern_px = 0.5;
-  const auto log = make_synthetic_log(robot(), options, test::seed());
+  const auto log = make_synthetic_log(robot(), options, test::log_seed());
   const auto report = diagnosis(*log);
   // The parts' size and thickness may take up some of it; nothing that moves may.
   for (const auto& cause : report.causes) {
@@ -181,7 +181,7 @@ TEST(LazyBreakers, AFixedPatternInTheMeshIsNoCause) {
 TEST(LazyBreakers, SlowNoiseIsNoCause) {
   TrialOptions options;
   options.noise_correlation_s = 4.0;  // two blocks
-  const auto log = make_synthetic_log(robot(), options, test::seed());
+  const auto log = make_synthetic_log(robot(), options, test::log_seed());
   const auto report = diagnosis(*log);
   EXPECT_EQ(report.verdict, "none") << report.sentence;
 }
@@ -189,7 +189,7 @@ TEST(LazyBreakers, SlowNoiseIsNoCause) {
 TEST(LazyBreakers, TheTwoHalvesAgree) {
   auto options = log_with({fault("joint_coupling", "r_shoulder_roll", 3.0, 0.0, "r_shoulder_pitch")});
   options.duration_s = 100.0;
-  const auto log = make_synthetic_log(robot(), options, test::seed());
+  const auto log = make_synthetic_log(robot(), options, test::log_seed());
   std::vector<std::size_t> first, second;
   for (std::size_t v = 0; v < log->views().size(); ++v) {
     (2 * v < log->views().size() ? first : second).push_back(v);
@@ -221,7 +221,7 @@ TEST(Refusals, SayWhatToRecord) {
 }
 
 TEST(Report, HoldsTheKeysAndAModelThatLoadsAgain) {
-  const auto log = make_synthetic_log(robot(), log_with({fault("latency", "", 40.0)}), test::seed());
+  const auto log = make_synthetic_log(robot(), log_with({fault("latency", "", 40.0)}), test::log_seed());
   const auto report = diagnosis(*log);
   const auto json = report.to_json();
   for (const char* key : {"\"verdict\": \"named\"", "\"causes\"", "\"not_testable\"", "\"exclusion_limits\"",

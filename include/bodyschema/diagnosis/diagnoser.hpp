@@ -23,7 +23,7 @@ struct DiagnosisOptions {
   std::vector<CauseName> nuisances;
   /// Sizes of nuisances, by effect name in the unit of its parameter, that are put up with: a
   /// picture's blur and threshold alone make a mask a little fatter.
-  std::map<std::string, double> tolerances;
+  std::map<std::string, double> tolerances = {{"silhouette_bias", 0.1}};
   /// Causes that are not in this log whatever the data say, with the reason.
   std::vector<NotTestable> excluded;
   /// Instead of searching: exactly these causes are fitted (to measure what a known one is worth).

@@ -97,6 +97,7 @@ struct DiagnosisReport {
   std::vector<CandidateBar> bars;
   double z_threshold = 0.0, gain_threshold = 0.0;
   std::vector<ResidualSample> samples;
+  double rest_gain = 0.0, rest_t = 0.0;
   double duration_s = 0.0, block_s = 0.0, noise_correlation_s = 0.0;
   std::size_t views = 0, blocks = 0;
 

@@ -13,6 +13,7 @@ struct LogDiagnosisOptions {
   std::filesystem::path out;       ///< folder, created; empty: nothing is written
   double picture_rate_hz = 10.0;   ///< pictures used per second and camera
   int threads = 2;
+  bool quiet = false;              ///< no progress bars
   DiagnosisOptions diagnosis;      ///< `nuisances` empty: the usual ones
 };
 

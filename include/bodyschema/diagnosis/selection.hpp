@@ -30,13 +30,27 @@ struct Candidate {
 struct SelectionOptions {
   double z_enter = 4.5;
   double gain_floor = 0.006;   ///< of the baseline's held-out loss
+  double generic_gain_floor = 0.015;  ///< a free curve has more ways to follow noise
   double t_enter = 1.5;        ///< paired over blocks
   std::size_t far_group = 3;   ///< blocks held out together for causes in time: noise may be slow
   double z_far = 3.5;          ///< ... and the z they must keep then
+  double gain_large = 0.25;    ///< what takes away that much of the loss is there ...
+  double z_large = 3.0;        ///< ... even if its shape fits badly, as a walk's does
+  double gain_far = 0.15;      ///< slow noise never takes away that much: no need to last
+  double z_wander = 2.5;       ///< of a free curve in time beside a slip or drift of its joint
+  /// A cause that has less of its own than this beside another (square, of itself) differs from it
+  /// by no more than encoder noise: what tells them apart is not the cause.
+  double alike = 1e-4;
   double z_same = 2.8;         ///< below it a cause counts as explained away by another
   double t_same = 2.0;         ///< an alternative worse by more than this is not in the class
+  double least_worse = 1e-3;   ///< ... provided the loss grows by this share of the baseline's
   double t_generic = 2.0;      ///< a generic feature must beat named causes by this much
   int max_causes = 6;
+  /// Many small errors live together where so many causes were found, or where all others together
+  /// would still take away more than this; then a cause must stand out from them by its gain.
+  std::size_t crowd = 3;
+  double crowd_rest_gain = 0.004, crowd_rest_t = 1.0;
+  double crowd_floor = 0.4;
   bool search = true;  ///< false: `fixed` are the causes
   std::vector<std::size_t> fixed;
 };
@@ -53,6 +67,7 @@ struct SelectedCause {
   std::size_t candidate = 0;
   CandidateScore score;
   std::vector<std::size_t> same;  ///< other candidates that this log cannot tell apart from it
+  bool wanders = false;  ///< a slip or drift whose joint also moves otherwise over time
 };
 
 /// How large a cause could be without the data showing it.
@@ -69,6 +84,11 @@ struct Selection {
   std::vector<CandidateScore> last_scores;   ///< all candidates against the final model
   std::vector<std::size_t> not_testable;     ///< candidates without independent information
   double baseline_heldout = 0.0;
+  /// Held-out loss, as a share of the baseline's, that all other causes together would take away,
+  /// each a little: small errors that live together. With its paired t.
+  double rest_gain = 0.0, rest_t = 0.0;
+  bool crowded = false;            ///< many small errors live together
+  std::vector<SelectedCause> set_aside;  ///< causes that did not stand out from the crowd
   double final_heldout = 0.0;
 };
 

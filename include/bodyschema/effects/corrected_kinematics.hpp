@@ -42,6 +42,7 @@ class CorrectedKinematics {
   struct Frames {
     std::size_t parent = 0;  ///< position of the parent link in the FK's list
     std::array<Eigen::Vector3d, 2> tilt_P{};
+    double outwards = 1.0;  ///< sign of the axis that leads on to the next joint
   };
   std::shared_ptr<const RobotModel> model_;
   std::size_t link_count_;

@@ -16,7 +16,7 @@ struct CameraCorrection {
 
 /// A small constant transform at a joint, between its parent link and its rotation.
 struct JointAdjustment {
-  double along_m = 0.0;     ///< the joint (and all beyond) moved along its own axis, metres
+  double along_m = 0.0;     ///< the joint (and all beyond) moved along its own axis, away from the root, metres
   double tilt_1_rad = 0.0;  ///< tilt of the joint's axis in its parent link, about `tilt_axis(0)`
   double tilt_2_rad = 0.0;  ///< ... about `tilt_axis(1)` of CorrectedKinematics
   [[nodiscard]] bool is_zero() const { return along_m == 0 && tilt_1_rad == 0 && tilt_2_rad == 0; }

@@ -1,0 +1,257 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <thread>
+
+#include "integration/harness.hpp"
+
+/// The simulator hides an effect in a log; `bodyschema diagnose`, another process, gets log and
+/// configuration alone; only then is the truth opened. Fresh seeds each run.
+namespace bodyschema::integration {
+namespace {
+
+using Json = nlohmann::json;
+constexpr double kLog_s = 60.0;
+constexpr int kAtOnce = 2;
+
+std::uint64_t seed() {
+  static const std::uint64_t value = [] {
+    const char* given = std::getenv("BODYSCHEMA_SEED");
+    const std::uint64_t s = given != nullptr ? std::strtoull(given, nullptr, 10) : std::random_device{}();
+    std::cout << "BODYSCHEMA_SEED=" << s << std::endl;
+    return s;
+  }();
+  return value;
+}
+
+/// How many times the default number of logs; BODYSCHEMA_HIDDEN_LOGS=4 is thorough.
+int times() {
+  const char* given = std::getenv("BODYSCHEMA_HIDDEN_LOGS");
+  return given != nullptr ? std::max(1, std::atoi(given)) : 1;
+}
+
+Json read(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  return in ? Json::parse(in) : Json();
+}
+
+struct Answer {
+  Json truth, report;
+  std::string error;  ///< a program failed
+};
+
+std::string configuration(const char* name) {
+  return std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/" + name;
+}
+
+/// Simulates with these arguments, diagnoses, and reads the truth last.
+Answer ask(const Scratch& scratch, const std::string& name, std::vector<std::string> arguments) {
+  Answer answer;
+  const auto log = scratch / (name + ".log"), truth = scratch / (name + ".truth.json");
+  const auto out = scratch / (name + ".report");
+  std::vector<std::string> simulate = {"bodyschema-sim", "--config", configuration("simulator.yaml"),
+                                       "--set", "simulator.cameras.rate_hz=10", "--offsets", "random",
+                                       "--log", log.string(), "--truth", truth.string()};
+  simulate.insert(simulate.end(), arguments.begin(), arguments.end());
+  std::filesystem::create_directories(scratch / name);
+  {
+    Process simulator(simulate, scratch / name);
+    if (simulator.wait(Seconds(400)) != 0) {
+      answer.error = simulator.err();
+      return answer;
+    }
+  }
+  Process diagnose({"bodyschema", "diagnose", log.string(), "--config", configuration("estimator.yaml"),
+                    "--threads", "1", "--out", out.string()},
+                   scratch / name);
+  if (diagnose.wait(Seconds(400)) != 0) answer.error = diagnose.err();
+  std::filesystem::remove(log);
+  answer.report = read(out / "report.json");
+  answer.truth = read(truth);
+  return answer;
+}
+
+std::string text_of(const Json& j, const char* key) {
+  return j.contains(key) && j[key].is_string() ? j[key].get<std::string>() : "";
+}
+
+/// Gain and eccentricity of one joint count as one.
+bool same_cause(const Json& named, const Json& fault) {
+  const auto scale = [](const std::string& n) { return n == "encoder_gain" || n == "eccentricity"; };
+  const auto a = text_of(named, "name"), b = text_of(fault, "name");
+  if (text_of(named, "joint") != text_of(fault, "joint")) return false;
+  if (scale(a) && scale(b)) return true;
+  return a == b && text_of(named, "source") == text_of(fault, "source");
+}
+
+const Json* cause_of(const Json& report, const Json& fault) {
+  for (const auto& cause : report["causes"]) {
+    for (const auto& member : cause["class"]) {
+      if (same_cause(member, fault)) return &cause;
+    }
+  }
+  return nullptr;
+}
+
+/// The parameter of a report that the fault's value is.
+const Json* parameter_of(const Json& cause, const Json& fault) {
+  std::string wanted;
+  const auto name = text_of(fault, "name");
+  if (name == "axis_tilt") wanted = text_of(fault, "about") == "2" ? "tilt_2" : "tilt_1";
+  if (name == "principal_point") wanted = text_of(fault, "axis") == "y" ? "cy" : "cx";
+  if (name == "eccentricity") wanted = "sine";
+  for (const auto& p : cause["parameters"]) {
+    if (wanted.empty() || text_of(p, "parameter") == wanted) return &p;
+  }
+  return nullptr;
+}
+
+/// In the class; where it is named itself, with the right sign and within twice its 95 % interval
+/// or 15 % of its size; and better on blocks that the fit had not seen.
+bool found(const Json& report, const Json& fault) {
+  const Json* cause = cause_of(report, fault);
+  if (cause == nullptr || !((*cause)["heldout_gain"].get<double>() > 0.0)) return false;
+  if (text_of(*cause, "name") != text_of(fault, "name") || !same_cause(*cause, fault)) return true;
+  const Json* p = parameter_of(*cause, fault);
+  if (p == nullptr || !(*p)["estimate"].is_number()) return false;
+  const double value = fault["value"].get<double>(), estimate = (*p)["estimate"].get<double>();
+  const double half = (*p)["ci95"][1].get<double>() - estimate;
+  return value * estimate > 0.0 && std::abs(value - estimate) <= std::max(2.0 * half, 0.15 * std::abs(value));
+}
+
+std::string sentence_of(const Answer& answer) {
+  std::string faults;
+  if (answer.truth.contains("faults")) {
+    for (const auto& f : answer.truth["faults"]) {
+      if (text_of(f, "name") != "joint_offset") faults += f.dump() + " ";
+    }
+  }
+  return faults + "-> " + (answer.error.empty() ? text_of(answer.report, "sentence") : answer.error);
+}
+
+/// Fewest right answers that a tool which is right with these probabilities falls short of less than
+/// once in a thousand runs.
+int fewest_right(const std::vector<double>& rates) {
+  std::vector<double> chance = {1.0};  // of 0, 1, 2.. right answers
+  for (const double rate : rates) {
+    chance.push_back(0.0);
+    for (std::size_t k = chance.size() - 1; k > 0; --k) {
+      chance[k] = chance[k] * (1.0 - rate) + chance[k - 1] * rate;
+    }
+    chance[0] *= 1.0 - rate;
+  }
+  double at_most = 0.0;
+  int k = 0;
+  for (; k < static_cast<int>(rates.size()); ++k) {
+    at_most += chance[static_cast<std::size_t>(k)];
+    if (at_most > 1e-3) break;
+  }
+  return k;
+}
+
+struct Task {
+  std::string name;
+  std::vector<std::string> arguments;
+  double demanded_rate = 1.0;  ///< of right answers, through pictures
+  std::function<bool(const Answer&)> right{};
+};
+
+std::vector<Answer> ask_all(const Scratch& scratch, const std::vector<Task>& tasks) {
+  std::vector<Answer> answers(tasks.size());
+  std::atomic<std::size_t> next{0};
+  std::vector<std::jthread> threads;
+  for (int t = 0; t < kAtOnce; ++t) {
+    threads.emplace_back([&] {
+      for (std::size_t i; (i = next++) < tasks.size();) {
+        answers[i] = ask(scratch, tasks[i].name, tasks[i].arguments);
+      }
+    });
+  }
+  threads.clear();
+  return answers;
+}
+
+bool all_found(const Answer& answer) {
+  const auto& faults = answer.truth["faults"];
+  return std::all_of(faults.begin(), faults.end(), [&](const Json& f) { return found(answer.report, f); });
+}
+
+TEST(HiddenEffect, IsFoundBehindFreshSeeds) {
+  const Scratch scratch;
+  std::mt19937_64 random(seed());
+  const auto number = [&] { return std::to_string(random() % 1'000'000'000); };
+  const auto babble = [&](std::vector<std::string> more) {
+    std::vector<std::string> list = {"--babble", std::to_string(static_cast<int>(kLog_s)), "--seed", number()};
+    list.insert(list.end(), more.begin(), more.end());
+    return list;
+  };
+  std::vector<Task> tasks;
+  for (int i = 0; i < 5 * times(); ++i) {
+    tasks.push_back({"single" + std::to_string(i), babble({"--hidden-fault", number()}), 0.90,
+                     [](const Answer& a) { return all_found(a) && a.report["causes"].size() == 1; }});
+  }
+  for (int i = 0; i < times(); ++i) {
+    const auto n = std::to_string(i);
+    tasks.push_back({"nothing" + n, babble({}), 0.93,
+                     [](const Answer& a) { return text_of(a.report, "verdict") == "none"; }});
+    tasks.push_back({"two" + n, babble({"--hidden-fault", number(), "--hidden-fault", number()}), 0.80,
+                     all_found});
+    tasks.push_back({"outside" + n, babble({"--hidden-fault", number(), "--hidden-outside"}), 0.80,
+                     [](const Answer& a) {
+                       const auto verdict = text_of(a.report, "verdict");
+                       return verdict == "unexplained" || verdict == "class";
+                     }});
+  }
+  const auto answers = ask_all(scratch, tasks);
+  int right = 0;
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    const bool good = answers[i].error.empty() && tasks[i].right(answers[i]);
+    right += good;
+    std::cout << tasks[i].name << (good ? ": right: " : ": WRONG: ") << sentence_of(answers[i]) << std::endl;
+  }
+  std::vector<double> rates;
+  for (const auto& task : tasks) rates.push_back(task.demanded_rate);
+  EXPECT_GE(right, fewest_right(rates))
+      << "of " << tasks.size() << "; repeat with BODYSCHEMA_SEED=" << seed();
+}
+
+bool not_testable(const Json& report, const std::string& name, const std::string& joint) {
+  return std::any_of(report["not_testable"].begin(), report["not_testable"].end(), [&](const Json& n) {
+    return text_of(n, "name") == name && text_of(n, "joint") == joint;
+  });
+}
+
+TEST(HiddenEffect, AFrozenJointLeavesTheRestTestableAndOneWayMotionShowsNoBacklash) {
+  const Scratch scratch;
+  const std::string at = std::to_string(seed() % 1'000'000'000);
+  const auto answers = ask_all(
+      scratch,
+      {{"frozen", {"--babble", "60", "--seed", at, "--freeze", "r_wrist_pitch",
+                   "--fault", "encoder_gain:joint=r_elbow,value=4"}},
+       {"one_way", {"--one-way", "40", "--seed", at, "--fault", "backlash:joint=r_elbow,value=1"}}});
+  const auto& frozen = answers[0];
+  ASSERT_TRUE(frozen.error.empty()) << frozen.error;
+  EXPECT_TRUE(all_found(frozen)) << sentence_of(frozen);
+  EXPECT_TRUE(not_testable(frozen.report, "encoder_gain", "r_wrist_pitch"));
+  const auto& one_way = answers[1];
+  ASSERT_TRUE(one_way.error.empty()) << one_way.error;
+  EXPECT_EQ(cause_of(one_way.report, one_way.truth["faults"][0]), nullptr) << sentence_of(one_way);
+  EXPECT_TRUE(not_testable(one_way.report, "backlash", "r_elbow"));
+}
+
+TEST(BinomialBound, IsThatOfTables) {
+  EXPECT_EQ(fewest_right(std::vector<double>(8, 0.8)), 2);   // at most 1 of 8: 0.00008, 2: 0.0012
+  EXPECT_EQ(fewest_right(std::vector<double>(20, 0.9)), 13); // at most 12 of 20: 0.0004, 13: 0.0024
+}
+
+}  // namespace
+}  // namespace bodyschema::integration
