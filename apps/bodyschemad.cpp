@@ -3,6 +3,7 @@
 
 #include "bodyschema/bus/lcm_link.hpp"
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/effects/error_model.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/service/daemon.hpp"
 #include "bodyschema/service/start_up_checks.hpp"
@@ -28,6 +29,9 @@ void check_configuration(const apps::CommonOptions& common, const std::string& l
               pipeline.setup().estimated_joints.size(), pipeline.rig().cameras.size(),
               pipeline.estimator().engine_description().c_str(), channels.joint_state.c_str(),
               channels.cameras.c_str(), channels.joint_offsets.c_str(), channels.offsets_status.c_str());
+  if (const auto& model = pipeline.error_model()) {
+    std::printf("extended model: %s\n", describe(*model).c_str());
+  }
   for (const auto& complaint : check_network(lcm_url)) std::printf("network: %s\n", complaint.c_str());
 }
 
@@ -60,6 +64,7 @@ int main(int argc, char** argv) {
   int page = 0;
   bool check_config = false;
   common.add_to(app);
+  common.add_extended_model_to(app);
   app.add_option("-l,--lcm-url", lcm_url, "LCM network; default: $LCM_DEFAULT_URL, else this machine only");
   app.add_option("--record", record, "Record all messages in and out to this log");
   app.add_option("--estimates", estimates, "Write one JSON line per estimate, as bodyschema replay does");

@@ -21,11 +21,22 @@ void CommonOptions::add_to(CLI::App& app) {
   app.add_flag("--print-config", print_config, "Print the configuration in force and stop");
 }
 
+void CommonOptions::add_extended_model_to(CLI::App& app) {
+  app.add_option("--extended-model", extended_model,
+                 "extended_model.yaml of `bodyschema diagnose` (robot.extended_model)");
+}
+
 Configuration CommonOptions::load() const {
   set_up_logging(log_level);
   std::vector<std::string> all = overrides;
   if (!engine.empty()) all.push_back("silhouette.engine=" + engine);
   if (!mode.empty()) all.push_back("estimator.mode=" + mode);
+  if (!extended_model.empty()) {
+    // As quoted YAML, so that any file name stays one text.
+    std::string quoted;
+    for (const char c : extended_model) quoted += c == '\'' ? "''" : std::string(1, c);
+    all.push_back("robot.extended_model='" + quoted + "'");
+  }
   return Configuration::load(find_data_file(config), all);
 }
 

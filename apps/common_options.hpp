@@ -15,9 +15,12 @@ struct CommonOptions {
   std::string engine;
   std::string mode;
   std::string log_level = "info";
+  std::string extended_model;
   bool print_config = false;
 
   void add_to(CLI::App& app);
+  /// --extended-model, for the programs that can apply one.
+  void add_extended_model_to(CLI::App& app);
   /// The configuration with the command line's choices on top.
   [[nodiscard]] Configuration load() const;
 };

@@ -22,7 +22,7 @@ void add_diagnose(CLI::App& app) {
   command->footer(
       "Example:\n  bodyschema diagnose babble.log --config config/icub_right/estimator.yaml --out out/diagnosis");
   command->add_option("log", a->log, "LCM log")->required();
-  command->add_option("-o,--out", a->out, "Folder for report.json and extended_model.yaml")->required();
+  command->add_option("-o,--out", a->out, "Folder for report.html, report.json and extended_model.yaml")->required();
   command->add_option("--picture-rate", a->rate_hz, "Pictures used per second and camera")
       ->check(CLI::Range(0.5, 120.0));
   command->add_option("--threads", a->threads, "Worker threads")->check(CLI::Range(1, 256));
@@ -39,7 +39,7 @@ void add_diagnose(CLI::App& app) {
     std::printf("held out: %.3f -> %.3f px, hand %.2f -> %.2f mm, %.2f -> %.2f deg\n",
                 report.before.rms_px, report.after.rms_px, report.before.hand_mm,
                 report.after.hand_mm, report.before.hand_deg, report.after.hand_deg);
-    std::printf("not testable with this log: %zu causes; results in %s\n",
+    std::printf("not testable with this log: %zu causes; report.html, report.json and extended_model.yaml in %s\n",
                 report.not_testable.size(), a->out.c_str());
   });
 }

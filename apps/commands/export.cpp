@@ -22,10 +22,12 @@ void add_export(CLI::App& app) {
   command->add_option("summary", a->summary, "summary.json of a replay")->required();
   command->add_option("-o,--out", a->out, "Folder for the files")->required();
   a->common.add_to(*command);
+  a->common.add_extended_model_to(*command);
   command->callback([a] {
     const Configuration configuration = a->common.load();
     const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
-    std::fputs(export_correction(a->summary, setup.model.urdf, a->out).c_str(), stdout);
+    const StereoRig rig = StereoRig::from(configuration.section("cameras"));
+    std::fputs(export_correction(a->summary, setup, rig, a->out).c_str(), stdout);
   });
 }
 

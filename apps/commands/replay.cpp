@@ -33,6 +33,7 @@ void add_replay(CLI::App& app) {
   command->add_flag("--learn-background-first", a->learn_first,
                     "Learn the background from the whole log before the first estimate");
   a->common.add_to(*command);
+  a->common.add_extended_model_to(*command);
   command->callback([a] {
     const Configuration configuration = a->common.load();
     if (a->common.print_config) {

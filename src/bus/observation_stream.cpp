@@ -53,12 +53,13 @@ std::vector<std::pair<std::string, std::uint64_t>> BusStatistics::counters() con
   return list;
 }
 
-ObservationStream::ObservationStream(std::vector<std::string> joint_names,
+ObservationStream::ObservationStream(const std::vector<std::string>& joint_names,
                                      const std::map<std::string, double>& fixed_rad,
                                      const std::vector<CameraModel>& cameras, const BusOptions& options)
     : options_(options),
       channels_(options.channels()),
-      synchroniser_(std::move(joint_names), fixed_rad, static_cast<int>(cameras.size()), options.synchroniser) {
+      synchroniser_(joint_names, fixed_rad, static_cast<int>(cameras.size()), options.synchroniser),
+      assembler_(joint_names, fixed_rad) {
   for (const CameraModel& camera : cameras) {
     const bool left = camera.name == "left";
     if ((!left && camera.name != "right") || cameras.size() > 2 || (!cameras_.empty() && left)) {
@@ -94,6 +95,33 @@ void ObservationStream::receive_joints(Bytes message) {
     return refuse(channels_.joint_state, result);
   }
   synchroniser_.add(joint_state_);
+  if (follower_) show_follower();
+}
+
+/// The follower sees what the synchroniser saw, clock steps included.
+void ObservationStream::show_follower() {
+  if (const auto steps = synchroniser_.statistics().clock_steps; steps != clock_steps_) {
+    clock_steps_ = steps;
+    assembler_.forget();
+    follower_->forget();
+  }
+  if (const JointSample* sample = assembler_.take(joint_state_)) follower_->observe(*sample);
+}
+
+std::optional<ArrivedObservation> ObservationStream::next() {
+  auto arrived = synchroniser_.next();
+  if (arrived && follower_) annotate(arrived->observation);
+  return arrived;
+}
+
+void ObservationStream::annotate(Observation& observation) {
+  auto& cameras = observation.cameras;
+  // The earlier exposure first: what has a memory goes with time.
+  const bool right_first = cameras.size() > 1 && cameras[0] && cameras[1] && cameras[1]->utime < cameras[0]->utime;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const std::size_t c = right_first ? cameras.size() - 1 - i : i;
+    if (cameras[c]) follower_->annotate(*cameras[c], c);
+  }
 }
 
 void ObservationStream::receive_images(Bytes message, std::int64_t arrival_us) {

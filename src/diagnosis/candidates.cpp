@@ -276,6 +276,19 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
       list.push_back({{"principal_point", "", source_name}, "the log has one camera"});
     }
   }
+  double head_range = 0.0;
+  for (const auto joint : roles.head) {
+    double low = 1e9, high = -1e9;
+    for (const auto& view : views) {
+      low = std::min(low, view.joints.q[joint]);
+      high = std::max(high, view.joints.q[joint]);
+    }
+    head_range = std::max(head_range, high - low);
+  }
+  if (head_range < kLeastRange) {
+    exclude_all("base_shift", "the head moved " + number(head_range / kDeg, 1) +
+                                  " deg: a shifted base looks like errors of neck and eyes");
+  }
   const bool masses = !at.instants.empty() && at.instants.front().gravity_torque.size() > 0;
   if (!masses) {
     exclude_all("compliance", "the robot's URDF has no masses");
@@ -368,7 +381,7 @@ std::string splitting_motion(const std::vector<CauseName>& same) {
   if (has("axis_tilt") || has("joint_coupling")) {
     say("Move " + joint + " and its neighbours one at a time through their full ranges.");
   }
-  if (has("head_offset") || (has("principal_point") && !has("vergence"))) {
+  if (has("head_offset") || has("base_shift") || (has("principal_point") && !has("vergence"))) {
     say("Move the head by 20 to 30 deg with the arm still.");
   }
   if (has("vergence") || has("baseline") || has("focal_length") || has("distortion")) {

@@ -590,7 +590,7 @@ class Diagnoser {
     word_verdict(report);
     if (plan_->correlation_s <= 0.0) {
       report.warnings.push_back("no rest of 3 s or more in the log: the noise's correlation time is "
-                                "not measured, blocks are " + std::to_string(plan_->length_s) + " s");
+                                "not measured, blocks are " + std::to_string(std::lround(plan_->length_s)) + " s");
     }
     if (selection.crowded) {
       std::string list;

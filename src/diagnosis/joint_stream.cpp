@@ -4,28 +4,35 @@
 
 namespace bodyschema::diagnosis {
 
-JointStream::JointStream(const RobotModel& robot, const RobotSetup& setup, const BusOptions& bus)
-    : limits_(bus.limits) {
-  for (const auto& joint : robot.joints()) {
-    const auto i = static_cast<Eigen::Index>(index_.size());
-    index_[joint.name] = i;
-  }
-  now_.q = setup.default_joints(robot);
-  now_.qdot.setZero(robot.joint_count());
+namespace {
+
+std::vector<std::string> names_of(const RobotModel& robot) {
+  std::vector<std::string> names;
+  for (const auto& joint : robot.joints()) names.push_back(joint.name);
+  return names;
 }
+
+std::map<std::string, double> resting_joints(const RobotModel& robot, const RobotSetup& setup) {
+  std::map<std::string, double> values;
+  const Eigen::VectorXd q = setup.default_joints(robot);
+  for (Eigen::Index j = 0; j < q.size(); ++j) values[robot.joints()[static_cast<std::size_t>(j)].name] = q[j];
+  return values;
+}
+
+}  // namespace
+
+JointStream::JointStream(const RobotModel& robot, const RobotSetup& setup, const BusOptions& bus)
+    : limits_(bus.limits), assembler_(names_of(robot), resting_joints(robot, setup)) {}
 
 void JointStream::take(Bytes message) {
   if (!decode(message, joints_, limits_).ok()) return;
-  bool known = false;
-  for (std::size_t i = 0; i < joints_.names.size() && i < joints_.position_rad.size(); ++i) {
-    const auto at = index_.find(joints_.names[i]);
-    if (at == index_.end()) continue;
-    now_.q[at->second] = static_cast<double>(joints_.position_rad[i]);
-    known = true;
+  const JointSample* sample = assembler_.take(joints_);
+  if (sample == nullptr) return;
+  if (!stream_.empty() && stream_.back().utime == sample->utime) {
+    stream_.back() = *sample;  // head and arm apart, with one stamp
+  } else {
+    stream_.push_back(*sample);
   }
-  if (!known || (!stream_.empty() && joints_.utime <= stream_.back().utime)) return;
-  now_.utime = joints_.utime;
-  stream_.push_back(now_);
 }
 
 std::vector<JointSample> JointStream::finish() {

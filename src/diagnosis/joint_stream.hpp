@@ -1,10 +1,9 @@
 #pragma once
 
-#include <map>
-#include <string>
 #include <vector>
 
 #include "bodyschema/bus/bus_options.hpp"
+#include "bodyschema/bus/joint_assembler.hpp"
 #include "bodyschema/bus/messages.hpp"
 #include "bodyschema/observation/observation.hpp"
 #include "bodyschema/robot/robot_model.hpp"
@@ -24,9 +23,8 @@ class JointStream {
 
  private:
   DecodeLimits limits_;
-  std::map<std::string, Eigen::Index> index_;
   JointStateMessage joints_;
-  JointSample now_;
+  JointAssembler assembler_;
   std::vector<JointSample> stream_;
 };
 

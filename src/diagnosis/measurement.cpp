@@ -14,7 +14,8 @@ constexpr double kStep = 1e-5;
 
 bool moves_links(Kind kind) {
   return kind == Kind::kJoint || kind == Kind::kAlong || kind == Kind::kTilt1 ||
-         kind == Kind::kTilt2 || kind == Kind::kShiftX;
+         kind == Kind::kTilt2 || kind == Kind::kBaseX || kind == Kind::kBaseY ||
+         kind == Kind::kBaseZ || kind == Kind::kShiftX;
 }
 
 template <class C>
@@ -25,6 +26,9 @@ auto& slot_of(const CoordinateLayout::Entry& entry, C& c) {
     case Kind::kAlong: return c.adjustments[joint].along_m;
     case Kind::kTilt1: return c.adjustments[joint].tilt_1_rad;
     case Kind::kTilt2: return c.adjustments[joint].tilt_2_rad;
+    case Kind::kBaseX: return c.base_shift_m.x();
+    case Kind::kBaseY: return c.base_shift_m.y();
+    case Kind::kBaseZ: return c.base_shift_m.z();
     case Kind::kShiftX: return c.camera.shift_x_m;
     case Kind::kFocal: return c.camera.focal_scale;
     case Kind::kCx: return c.camera.cx_px;
@@ -49,7 +53,7 @@ CoordinateLayout::CoordinateLayout(const JointRoles& roles) {
     entries_.push_back({Kind::kTilt1, joint});
     entries_.push_back({Kind::kTilt2, joint});
   }
-  for (const auto kind : {Kind::kShiftX, Kind::kFocal, Kind::kCx, Kind::kCy, Kind::kK1,
+  for (const auto kind : {Kind::kBaseX, Kind::kBaseY, Kind::kBaseZ, Kind::kShiftX, Kind::kFocal, Kind::kCx, Kind::kCy, Kind::kK1,
                           Kind::kScale, Kind::kDilation}) {
     entries_.push_back({kind, -1});
   }

@@ -22,7 +22,14 @@ CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model
   all.insert(all.end(), camera_links.begin(), camera_links.end());
   const auto joints = model_->joints();
   joints_.resize(joints.size());
+  // Legs and the other arm cost nothing: only joints that matter get their parents evaluated.
+  const ForwardKinematics listed(model_, all);
+  const std::size_t listed_count = all.size();
   for (std::size_t j = 0; j < joints.size(); ++j) {
+    for (std::size_t l = 0; l < listed_count; ++l) {
+      joints_[j].moves_something |= listed.moves(static_cast<Eigen::Index>(j), l);
+    }
+    if (!joints_[j].moves_something) continue;
     const auto at =
         std::find(all.begin() + static_cast<std::ptrdiff_t>(link_count_ + camera_count_), all.end(),
                   joints[j].parent_link);
@@ -35,6 +42,7 @@ CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model
   fk_->compute(q_, X_W_);
   moves_.resize(joints.size() * all.size());
   for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (!joints_[j].moves_something) continue;
     const auto axis = fk_->joint_axis(static_cast<Eigen::Index>(j));
     const Eigen::Vector3d axis_P = X_W_[joints_[j].parent].linear().transpose() * axis.direction_W;
     joints_[j].tilt_P[0] = perpendicular(axis_P);
@@ -63,7 +71,7 @@ void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q,
   // Tip first: each C uses plain frames, so the product builds up from the right.
   for (auto j = joints_.size(); j-- > 0;) {
     const auto& adjustment = corrections.adjustments[j];
-    if (adjustment.is_zero()) continue;
+    if (adjustment.is_zero() || !joints_[j].moves_something) continue;
     const auto joint = static_cast<Eigen::Index>(j);
     const auto axis = fk_->joint_axis(joint);
     const Eigen::Vector3d tilt =
@@ -85,12 +93,14 @@ void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q,
     if (moves(joint, link_count_ + camera)) X_WC_ = C * X_WC_;
   }
   X_WC_.translate(Eigen::Vector3d(corrections.camera.shift_x_m, 0.0, 0.0));
+  X_WC_.pretranslate(-corrections.base_shift_m);
   const Pose X_CW = X_WC_.inverse(Eigen::Isometry);
   for (auto& X : X_CB.first(link_count_)) X = X_CW * X;
 }
 
 Eigen::Vector3d CorrectedKinematics::tilt_axis(Eigen::Index joint, int which) const {
   const auto& frames = joints_[static_cast<std::size_t>(joint)];
+  if (!frames.moves_something) return Eigen::Vector3d::Zero();
   return X_W_[frames.parent].linear() * frames.tilt_P[static_cast<std::size_t>(which)];
 }
 

@@ -239,4 +239,23 @@ StereoRig ErrorModel::corrected(const StereoRig& rig) const {
   return result;
 }
 
+std::string describe(const Effect& effect) {
+  std::ostringstream text;
+  text.precision(3);
+  text << effect.description();
+  for (const auto& p : effect.parameters()) {
+    if (p.fitted) text << ' ' << p.name << ' ' << p.in_unit() << (p.unit == "1" ? "" : " " + p.unit);
+  }
+  return text.str();
+}
+
+std::string describe(const ErrorModel& model) {
+  std::string text;
+  for (std::size_t e = 0; e < model.size(); ++e) {
+    if (model[e].name() == "joint_offset") continue;
+    text += (text.empty() ? "" : "; ") + describe(model[e]);
+  }
+  return text.empty() ? "joint offsets alone" : text;
+}
+
 }  // namespace bodyschema

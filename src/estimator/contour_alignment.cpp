@@ -115,23 +115,24 @@ void ContourAlignment::add_camera(const CameraObservation& seen, const Eigen::Ve
                                   ContourEvidence& evidence) {
   const auto parameters = body_.parameters();
   const std::size_t parts = body_.part_count();
-  body_.compute(seen.joints.q, x, camera, X_CB_);
+  body_.compute(seen, x, camera, X_CB_);
   const auto outline = extractor_.extract(X_CB_, camera, options_.spacing_px);
 
   // How each parameter moves each part: the derivative of X_CB acting on camera coordinates.
-  double dilation_px = 0.0;
+  const double known_px = seen.corrections ? seen.corrections->dilation_px : 0.0;
+  double dilation_px = known_px;
   x_work_ = x;
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     const auto index = static_cast<Eigen::Index>(k);
     if (parameters[k].kind == ParameterKind::kDilation) {
-      dilation_px = x(index);
+      dilation_px = known_px + x(index);
       continue;
     }
     const double step = step_for(parameters[k].kind);
     x_work_(index) = x(index) + step;
-    body_.compute(seen.joints.q, x_work_, camera, X_plus_);
+    body_.compute(seen, x_work_, camera, X_plus_);
     x_work_(index) = x(index) - step;
-    body_.compute(seen.joints.q, x_work_, camera, X_minus_);
+    body_.compute(seen, x_work_, camera, X_minus_);
     x_work_(index) = x(index);
     for (std::size_t part = 0; part < parts; ++part) {
       const Eigen::Matrix3d inverse = X_CB_[part].linear().cast<double>().inverse();

@@ -216,7 +216,7 @@ struct Estimator::Impl {
     const std::size_t parts = body.part_count();
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
       if ((camera_mask & (1u << c)) == 0) continue;
-      body.compute(observation.cameras[c]->joints.q, x, c,
+      body.compute(*observation.cameras[c], x, c,
                    {X_CB.data() + (slot * rig.cameras.size() + c) * parts, parts});
     }
   }
@@ -452,11 +452,10 @@ struct Estimator::Impl {
         }
       }
       if (seen == nullptr) continue;
-      estimate.X_CP.push_back(body.hand_pose(seen->joints.q, frame_state.x, c));
-      zero = Eigen::VectorXd::Zero(state.size());
-      estimate.X_CP_nominal.push_back(body.hand_pose(seen->joints.q, zero, c));
+      estimate.X_CP.push_back(body.hand_pose(*seen, frame_state.x, c));
+      estimate.X_CP_nominal.push_back(body.hand_pose(seen->joints.q, uncorrected(), c));
       if (c == 0 || estimate.hand_sd_m == 0.0) {
-        estimate.hand_sd_m = hand_sd(seen->joints.q, c);
+        estimate.hand_sd_m = hand_sd(*seen, c);
       }
     }
     estimate.weakest = weakest(estimate.covariance_rad2);
@@ -467,8 +466,11 @@ struct Estimator::Impl {
     estimate.state = current;
   }
 
+  /// The state of a robot that is as its encoders and model say.
+  [[nodiscard]] Eigen::VectorXd uncorrected() const { return Eigen::VectorXd::Zero(state.size()); }
+
   /// One sigma of the hand's position in a camera, from the covariance of this frame's state.
-  double hand_sd(const Eigen::VectorXd& q, std::size_t camera) {
+  double hand_sd(const Exposure& at, std::size_t camera) {
     constexpr double kStep = 1e-4;
     const Eigen::Index n = std::min<Eigen::Index>(state.size(), frame_state.covariance.rows());
     Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, n);
@@ -476,9 +478,9 @@ struct Estimator::Impl {
     for (Eigen::Index k = 0; k < n; ++k) {
       const double value = x(k);
       x(k) = value + kStep;
-      const Eigen::Vector3d plus = body.hand_pose(q, x, camera).translation();
+      const Eigen::Vector3d plus = body.hand_pose(at, x, camera).translation();
       x(k) = value - kStep;
-      J.col(k) = (plus - body.hand_pose(q, x, camera).translation()) / (2.0 * kStep);
+      J.col(k) = (plus - body.hand_pose(at, x, camera).translation()) / (2.0 * kStep);
       x(k) = value;
     }
     return std::sqrt(std::max(0.0, (J * frame_state.covariance * J.transpose()).trace()));
@@ -541,7 +543,6 @@ struct Estimator::Impl {
   Eigen::Index joints = 0;
   Eigen::VectorXd state;  ///< one value per parameter, fused over frames
   OffsetFusion::FrameState frame_state;  ///< the same with the last frame's own encoder error
-  Eigen::VectorXd zero;
   EstimatorState current = EstimatorState::kHandNotInView;
   double best_likelihood = 0.0;
   double effective_size = 0.0;
@@ -575,24 +576,28 @@ void Estimator::reset() { impl_->reset(); }
 BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::size_t camera,
                                            bool corrected) {
   std::vector<Eigen::Isometry3f> X_CB(impl_->body.part_count());
-  const Eigen::VectorXd x =
-      corrected ? impl_->state : Eigen::VectorXd(Eigen::VectorXd::Zero(impl_->state.size()));
-  impl_->body.compute(observation.cameras[camera]->joints.q, x, camera, X_CB);
+  const CameraObservation& seen = *observation.cameras[camera];
+  if (corrected) {
+    impl_->body.compute(seen, impl_->state, camera, X_CB);
+  } else {
+    impl_->body.compute(seen.joints.q, impl_->uncorrected(), camera, X_CB);
+  }
   return impl_->scorer->render(X_CB, camera);
 }
 
-Pose Estimator::hand_pose(const Eigen::VectorXd& q, std::size_t camera, bool corrected) {
-  return impl_->body.hand_pose(
-      q, corrected ? impl_->state : Eigen::VectorXd(Eigen::VectorXd::Zero(impl_->state.size())),
-      camera);
+Pose Estimator::hand_pose(const Exposure& at, std::size_t camera, bool corrected) {
+  return corrected ? impl_->body.hand_pose(at, impl_->state, camera)
+                   : impl_->body.hand_pose(at.q, impl_->uncorrected(), camera);
 }
 
-std::vector<Eigen::Vector3d> Estimator::fingertips(const Eigen::VectorXd& q, std::size_t camera,
+std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& at, std::size_t camera,
                                                    bool corrected) {
   std::vector<Eigen::Vector3d> tips;
-  impl_->body.fingertips(
-      q, corrected ? impl_->state : Eigen::VectorXd(Eigen::VectorXd::Zero(impl_->state.size())),
-      camera, tips);
+  if (corrected) {
+    impl_->body.fingertips(at, impl_->state, camera, tips);
+  } else {
+    impl_->body.fingertips(at.q, impl_->uncorrected(), camera, tips);
+  }
   return tips;
 }
 

@@ -95,6 +95,7 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
     std::size_t camera;
     Microseconds utime;
     Eigen::VectorXd q;
+    std::optional<Corrections> corrections;
   };
   std::vector<Seen> seen;
   std::vector<std::pair<Microseconds, double>> online;
@@ -107,7 +108,7 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
       if (!observation.cameras[c]) continue;
       const auto& picture = *observation.cameras[c];
-      seen.push_back({c, picture.utime, picture.joints.q});
+      seen.push_back({c, picture.utime, picture.joints.q, picture.corrections});
       if (const TruthInstant* instant = truth.at(picture.utime)) {
         online.emplace_back(instant->begin,
                             hand_error(last.X_CP[c], *instant, c, pipeline.rig().cameras[c].intrinsics)
@@ -138,9 +139,10 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
     const TruthInstant* instant = truth.at(frame.utime);
     if (instant == nullptr) continue;
     const auto& intrinsics = pipeline.rig().cameras[frame.camera].intrinsics;
-    const auto before = hand_error(pipeline.estimator().hand_pose(frame.q, frame.camera, false), *instant,
+    const Exposure at(frame.q, frame.corrections ? &*frame.corrections : nullptr);
+    const auto before = hand_error(pipeline.estimator().hand_pose(at, frame.camera, false), *instant,
                                    frame.camera, intrinsics);
-    const auto after = hand_error(pipeline.estimator().hand_pose(frame.q, frame.camera, true), *instant,
+    const auto after = hand_error(pipeline.estimator().hand_pose(at, frame.camera, true), *instant,
                                   frame.camera, intrinsics);
     before_px.push_back(before.fingertip_px);
     before_mm.push_back(1e3 * before.fingertip_m);

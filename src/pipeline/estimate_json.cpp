@@ -43,6 +43,21 @@ nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
   return json;
 }
 
+nlohmann::ordered_json error_model_json(const ErrorModel& model) {
+  Json effects = Json::array();
+  for (std::size_t e = 0; e < model.size(); ++e) {
+    const Effect& effect = model[e];
+    Json entry = {{"name", effect.name()}};
+    if (!effect.target().joint.empty()) entry["joint"] = effect.target().joint;
+    if (!effect.target().source.empty()) entry["source"] = effect.target().source;
+    for (const auto& p : effect.parameters()) {
+      entry["parameters"].push_back({{"name", p.name}, {"unit", p.unit}, {"value", p.in_unit()}});
+    }
+    effects.push_back(std::move(entry));
+  }
+  return effects;
+}
+
 std::string estimate_line(const Estimate& estimate, const StereoRig& rig) {
   return estimate_json(estimate, rig)
       .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);

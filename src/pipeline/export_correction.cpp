@@ -4,12 +4,15 @@
 #include <tinyxml2.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/geometry/pose.hpp"
+#include "estimate_json.hpp"
 
 namespace bodyschema {
 namespace {
@@ -47,12 +50,18 @@ Eigen::Vector3d rpy_of(const Eigen::Matrix3d& R) {
   return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
 }
 
-void correct_joint(tinyxml2::XMLDocument& document, XMLElement* joint, double offset) {
+/// The joint's origin, made where there is none.
+XMLElement* origin_of(tinyxml2::XMLDocument& document, XMLElement* joint) {
   XMLElement* origin = joint->FirstChildElement("origin");
   if (origin == nullptr) {
     origin = document.NewElement("origin");
     joint->InsertFirstChild(origin);
   }
+  return origin;
+}
+
+void correct_joint(tinyxml2::XMLDocument& document, XMLElement* joint, double offset) {
+  XMLElement* origin = origin_of(document, joint);
   const Eigen::Vector3d axis =
       triple(joint->FirstChildElement("axis"), "xyz", Eigen::Vector3d::UnitX()).normalized();
   const Eigen::Matrix3d R = rotation_of(triple(origin, "rpy", Eigen::Vector3d::Zero()));
@@ -73,6 +82,43 @@ void correct_joint(tinyxml2::XMLDocument& document, XMLElement* joint, double of
   }
 }
 
+/// Moves the joint by `step` of its own frame.
+void move_joint(tinyxml2::XMLDocument& document, XMLElement* joint, const Eigen::Vector3d& step) {
+  XMLElement* origin = origin_of(document, joint);
+  const Eigen::Matrix3d R = rotation_of(triple(origin, "rpy", Eigen::Vector3d::Zero()));
+  const Eigen::Vector3d p = triple(origin, "xyz", Eigen::Vector3d::Zero()) + R * step;
+  origin->SetAttribute("xyz", text_of(p).c_str());
+}
+
+void place_joint(tinyxml2::XMLDocument& document, XMLElement* joint, const JointPlacement& placement) {
+  XMLElement* axis_element = joint->FirstChildElement("axis");
+  Eigen::Vector3d axis = triple(axis_element, "xyz", Eigen::Vector3d::UnitX()).normalized();
+  move_joint(document, joint, placement.along_m * axis);
+  XMLElement* origin = origin_of(document, joint);
+  const Eigen::Vector3d p = triple(origin, "xyz", Eigen::Vector3d::Zero()) + placement.shift_m;
+  origin->SetAttribute("xyz", text_of(p).c_str());
+  const double angle = placement.tilt.norm();
+  if (angle == 0.0) return;
+  const Eigen::Matrix3d R =
+      rotation_of(triple(origin_of(document, joint), "rpy", Eigen::Vector3d::Zero()));
+  axis = R.transpose() * (Eigen::AngleAxisd(angle, placement.tilt / angle) * (R * axis));
+  if (axis_element == nullptr) {
+    axis_element = document.NewElement("axis");
+    joint->InsertEndChild(axis_element);
+  }
+  axis_element->SetAttribute("xyz", text_of(axis).c_str());
+}
+
+XMLElement* find_joint_of_child(XMLElement* robot, const std::string& link) {
+  for (XMLElement* joint = robot->FirstChildElement("joint"); joint != nullptr;
+       joint = joint->NextSiblingElement("joint")) {
+    const XMLElement* child = joint->FirstChildElement("child");
+    const char* name = child != nullptr ? child->Attribute("link") : nullptr;
+    if (name != nullptr && link == name) return joint;
+  }
+  return nullptr;
+}
+
 XMLElement* find_joint(XMLElement* robot, const std::string& name) {
   for (XMLElement* joint = robot->FirstChildElement("joint"); joint != nullptr;
        joint = joint->NextSiblingElement("joint")) {
@@ -80,6 +126,57 @@ XMLElement* find_joint(XMLElement* robot, const std::string& name) {
     if (own != nullptr && name == own && joint->Attribute("type") != nullptr) return joint;
   }
   return nullptr;
+}
+
+/// Offsets that were found with an extended model are wrong without it, and the other way round.
+void check_same_model(const std::filesystem::path& summary, const RobotSetup& setup,
+                      const std::optional<ErrorModel>& model) {
+  std::ifstream stream(summary);
+  const auto json = nlohmann::ordered_json::parse(stream, nullptr, false);
+  const bool made_with = json.is_object() && json.contains("extended_model");
+  if (made_with && !model) {
+    throw ConfigurationError(summary.string() +
+                             ": made with an extended model; expected the same one here (--extended-model)");
+  }
+  if (!made_with && model) {
+    throw ConfigurationError(summary.string() + ": made without an extended model, but robot.extended_model is '" +
+                             setup.extended_model.string() + "'; expected a replay made with it");
+  }
+  if (made_with && json["extended_model"] != error_model_json(*model)) {
+    throw ConfigurationError(summary.string() + ": made with another extended model than '" +
+                             setup.extended_model.string() + "'; expected the one of the replay");
+  }
+}
+
+std::string cameras_yaml(const StereoRig& rig) {
+  std::string text =
+      "# Intrinsics with the extended model applied: px; distortion k1 k2 p1 p2 k3 as OpenCV. Put in place\n"
+      "# of the section of the same name, and do not load the extended model as well.\ncameras:\n";
+  for (const auto& camera : rig.cameras) {
+    const auto& k = camera.intrinsics;
+    const auto& d = camera.distortion;
+    text += fmt::format("  {}:\n    link: {}\n    width: {}\n    height: {}\n    fx: {:.4f}\n    fy: {:.4f}\n"
+                        "    cx: {:.4f}\n    cy: {:.4f}\n    distortion: [{:.6g}, {:.6g}, {:.6g}, {:.6g}, {:.6g}]\n",
+                        camera.name, camera.link, k.width, k.height, k.fx, k.fy, k.cx, k.cy, d[0], d[1], d[2],
+                        d[3], d[4]);
+  }
+  return text;
+}
+
+std::string applied_text(const std::vector<AppliedEffect>& applied) {
+  std::string yes, no;
+  for (const auto& effect : applied) {
+    (effect.applied.empty() ? no : yes) += fmt::format(
+        "  {}: {}{}\n", effect.effect, effect.applied.empty() ? "" : "in " + effect.applied,
+        effect.remark.empty() ? "" : (effect.applied.empty() ? "" : "; ") + effect.remark);
+  }
+  std::string text;
+  if (!yes.empty()) text += "Of the extended model these files hold:\n" + yes;
+  if (!no.empty()) {
+    text += "They cannot hold the following; load extended_model.yaml in bodyschemad or bodyschema replay\n"
+            "(--extended-model), or do as said:\n" + no;
+  }
+  return text.empty() ? "The extended model holds joint offsets alone; those of the replay are used.\n" : text;
 }
 
 void write_text(const std::filesystem::path& file, const std::string& text) {
@@ -121,12 +218,24 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
   }
   XMLElement* robot = document.FirstChildElement("robot");
   if (robot == nullptr) throw FileError(urdf.string() + ": has no <robot>");
-  for (const auto& [name, offset] : correction.offsets_rad) {
+  const auto joint_named = [&](const std::string& name) {
     XMLElement* joint = find_joint(robot, name);
     if (joint == nullptr) {
       throw FileError(urdf.string() + ": has no joint '" + name + "', which the result corrects");
     }
-    correct_joint(document, joint, offset);
+    return joint;
+  };
+  // Axes first: offsets turn about the axes as they are.
+  for (const auto& placement : correction.placements) {
+    place_joint(document, joint_named(placement.joint), placement);
+  }
+  for (const auto& [link, shift] : correction.camera_shifts_m) {
+    XMLElement* joint = find_joint_of_child(robot, link);
+    if (joint == nullptr) throw FileError(urdf.string() + ": no joint carries camera link '" + link + "'");
+    move_joint(document, joint, {shift, 0.0, 0.0});
+  }
+  for (const auto* list : {&correction.offsets_rad, &correction.known_offsets_rad}) {
+    for (const auto& [name, offset] : *list) correct_joint(document, joint_named(name), offset);
   }
   // The arm's offsets hold together with the head's: one without the other would be wrong.
   for (const auto& [name, value] : correction.nuisances) {
@@ -137,16 +246,32 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
   }
 }
 
-std::string export_correction(const std::filesystem::path& summary, const std::filesystem::path& urdf,
-                              const std::filesystem::path& out) {
-  const Correction correction = read_correction(summary);
+std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup,
+                              const StereoRig& rig, const std::filesystem::path& out) {
+  Correction correction = read_correction(summary);
+  std::optional<ErrorModel> model;
+  std::vector<AppliedEffect> applied;
+  if (!setup.extended_model.empty()) {
+    const auto robot = setup.load();
+    model = ErrorModel::load(setup.extended_model, JointRoles::of(robot, setup));
+    applied = add_extended_model(*model, robot, setup, rig, correction);
+  }
+  check_same_model(summary, setup, model);
   std::error_code error;
   std::filesystem::create_directories(out, error);
-  write_corrected_urdf(urdf, correction, out / "corrected.urdf");
-  std::string yaml = "# encoder = true + offset: subtract from every encoder reading. Degrees.\nversion: 1\noffset_deg:\n";
+  write_corrected_urdf(setup.model.urdf, correction, out / "corrected.urdf");
+  std::string yaml = "# encoder = true + offset: subtract from every encoder reading. Degrees.\n";
   std::string delta =
       "# deg to add to each joint's calibrationDelta (the calibrator adds it to the zero, which lowers\n"
       "# the reading by as much)\n";
+  if (model) {
+    const std::string note =
+        "# Estimated with an extended model; they hold together with it. Of it this file has nothing:\n"
+        "# what_was_applied.txt says where each of its effects went.\n";
+    yaml += note;
+    delta += note;
+  }
+  yaml += "version: 1\noffset_deg:\n";
   for (const auto& [joint, offset] : correction.offsets_rad) {
     yaml += fmt::format("  {}: {:.4f}\n", joint, degrees(offset));
     delta += fmt::format("{:<24} {:+.4f}\n", joint, degrees(offset));
@@ -159,9 +284,21 @@ std::string export_correction(const std::filesystem::path& summary, const std::f
   for (const auto& [joint, sd] : correction.sd_rad) yaml += fmt::format("  {}: {:.4f}\n", joint, degrees(sd));
   write_text(out / "offsets.yaml", yaml);
   write_text(out / "calibration_delta.txt", delta);
-  return fmt::format("corrected URDF        {}\noffsets by joint      {}\niCub calibrationDelta {}\n",
-                     (out / "corrected.urdf").string(), (out / "offsets.yaml").string(),
-                     (out / "calibration_delta.txt").string());
+  std::string files =
+      fmt::format("corrected URDF        {}\noffsets by joint      {}\niCub calibrationDelta {}\n",
+                  (out / "corrected.urdf").string(), (out / "offsets.yaml").string(),
+                  (out / "calibration_delta.txt").string());
+  if (!model) return files;
+  const bool cameras = std::any_of(applied.begin(), applied.end(),
+                                   [](const auto& a) { return a.applied == "cameras.yaml"; });
+  if (cameras) {
+    write_text(out / "cameras.yaml", cameras_yaml(model->corrected(rig)));
+    files += fmt::format("camera intrinsics     {}\n", (out / "cameras.yaml").string());
+  }
+  const std::string report = applied_text(applied);
+  write_text(out / "what_was_applied.txt", report);
+  files += fmt::format("extended model        {}\n\n{}", (out / "what_was_applied.txt").string(), report);
+  return files;
 }
 
 }  // namespace bodyschema

@@ -41,13 +41,20 @@ void draw_outline(cv::Mat& picture, const BinaryMask& mask, int enlargement,
 }  // namespace
 
 Image draw_overlay(const std::vector<OverlayView>& views, const std::string& caption,
-                   int enlargement) {
+                   int enlargement, const OverlayNames& names) {
   std::vector<cv::Mat> pictures;
   for (const auto& view : views) {
     cv::Mat picture;
     cv::resize(to_matrix(*view.image), picture, {}, enlargement, enlargement, cv::INTER_LINEAR);
     draw_outline(picture, view.nominal, enlargement, kRed);
     draw_outline(picture, view.corrected, enlargement, kGreen);
+    if (view.part[2] > 0) {
+      const cv::Rect part(view.part[0], view.part[1], view.part[2], view.part[3]);
+      const cv::Rect whole(0, 0, view.image->width, view.image->height);
+      const cv::Rect shown = part & whole;
+      picture = picture(cv::Rect(shown.x * enlargement, shown.y * enlargement, shown.width * enlargement,
+                                 shown.height * enlargement)).clone();
+    }
     pictures.push_back(picture);
   }
   cv::Mat row;
@@ -59,8 +66,8 @@ Image draw_overlay(const std::vector<OverlayView>& views, const std::string& cap
     return x + cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, 0.45, 1, nullptr).width + 16;
   };
   int x = write(caption, 8, cv::Scalar(230, 230, 230));
-  x = write("encoders as they are", x, kRed);
-  write("corrected", x, kGreen);
+  x = write(names.nominal, x, kRed);
+  write(names.corrected, x, kGreen);
   Image result(page.cols, page.rows, 3);
   std::copy(page.datastart, page.dataend, result.data.begin());
   return result;

@@ -9,6 +9,7 @@
 #include "bodyschema/bus/yarp_import.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
+#include "bodyschema/effects/online_error_model.hpp"
 
 namespace bodyschema {
 namespace {
@@ -26,7 +27,18 @@ class Digest {
   std::uint64_t state_ = 0xcbf29ce484222325ull;
 };
 
-std::string digest_of(const RobotSetup& setup, const RobotModel& robot) {
+std::optional<ErrorModel> load_error_model(const RobotSetup& setup,
+                                           const std::shared_ptr<const RobotModel>& robot) {
+  if (setup.extended_model.empty()) return std::nullopt;
+  return ErrorModel::load(setup.extended_model, JointRoles::of(robot, setup));
+}
+
+StereoRig corrected(const StereoRig& rig, const std::optional<ErrorModel>& model) {
+  return model ? model->corrected(rig) : rig;
+}
+
+std::string digest_of(const RobotSetup& setup, const RobotModel& robot,
+                      const std::optional<ErrorModel>& error_model) {
   Digest digest;
   std::ifstream file(setup.model.urdf, std::ios::binary);
   const std::string urdf((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
@@ -35,6 +47,10 @@ std::string digest_of(const RobotSetup& setup, const RobotModel& robot) {
     digest.add(part.link.data(), part.link.size());
     digest.add(part.mesh.vertices.data(), part.mesh.vertices.size() * sizeof(part.mesh.vertices[0]));
     digest.add(part.mesh.triangles.data(), part.mesh.triangles.size() * sizeof(part.mesh.triangles[0]));
+  }
+  if (error_model) {
+    const std::string text = error_model->to_yaml();
+    digest.add(text.data(), text.size());
   }
   return digest.text();
 }
@@ -55,14 +71,15 @@ std::shared_ptr<const RobotModel> load(const RobotSetup& setup, const StereoRig&
 
 Pipeline::Pipeline(const Configuration& configuration)
     : setup_(RobotSetup::from(configuration.section("robot"))),
-      rig_(StereoRig::from(configuration.section("cameras"))),
       vision_(VisionSetup::from(configuration.section("vision"))),
       bus_(BusOptions::from(configuration.section("bus"))),
       options_(EstimatorOptions::from(configuration)),
-      robot_(load(setup_, rig_)),
+      robot_(load(setup_, StereoRig::from(configuration.section("cameras")))),
+      error_model_(load_error_model(setup_, robot_)),
+      rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
       estimator_(robot_, setup_, rig_, options_),
       configuration_hash_(configuration.hash()),
-      model_hash_(digest_of(setup_, *robot_)) {
+      model_hash_(digest_of(setup_, *robot_, error_model_)) {
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
   for (const auto& camera : rig_.cameras) {
@@ -73,7 +90,9 @@ Pipeline::Pipeline(const Configuration& configuration)
 }
 
 ObservationStream Pipeline::make_stream() const {
-  return {robot_, setup_, rig_, bus_};
+  ObservationStream stream(robot_, setup_, rig_, bus_);
+  if (error_model_) stream.set_follower(std::make_unique<OnlineErrorModel>(robot_, setup_, *error_model_));
+  return stream;
 }
 
 void Pipeline::straighten(CameraObservation& seen, std::size_t camera) {

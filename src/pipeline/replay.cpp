@@ -63,10 +63,14 @@ Json error_json(const HandError& error) {
           {"fingertip_px", error.fingertip_px}};
 }
 
-/// Encoder readings of every frame, to judge the final estimate over the whole log.
+/// What every frame was predicted from, to judge the final estimate over the whole log.
 struct SeenFrame {
   std::array<Microseconds, 2> utime{-1, -1};
   std::array<Eigen::VectorXd, 2> q;
+  std::array<std::optional<Corrections>, 2> corrections;
+  [[nodiscard]] Exposure exposure(std::size_t c) const {
+    return {q[c], corrections[c] ? &*corrections[c] : nullptr};
+  }
 };
 
 void write_overlay(Pipeline& pipeline, const Observation& observation,
@@ -99,6 +103,7 @@ class Replay {
       pipeline_.finish_learning();
     }
     spdlog::info("silhouettes: {}", pipeline_.estimator().engine_description());
+    if (pipeline_.error_model()) spdlog::info("extended model: {}", describe(*pipeline_.error_model()));
     std::size_t expected = count_frames();
     for_each("replay", [&](Observation& o) { take(o, expected); });
     if (frames_.empty()) {
@@ -171,6 +176,7 @@ class Replay {
       if (!observation.cameras[c]) continue;
       frame.utime[c] = observation.cameras[c]->utime;
       frame.q[c] = observation.cameras[c]->joints.q;
+      frame.corrections[c] = observation.cameras[c]->corrections;
       if (truth_ && c < estimate.X_CP.size()) {
         if (const TruthInstant* truth = truth_->at(frame.utime[c])) {
           json["error_" + pipeline_.rig().cameras[c].name] = error_json(hand_error(
@@ -229,6 +235,7 @@ class Replay {
     summary["engine"] = pipeline_.estimator().engine_description();
     summary["configuration_hash"] = pipeline_.configuration_hash();
     summary["model_hash"] = pipeline_.model_hash();
+    if (pipeline_.error_model()) summary["extended_model"] = error_model_json(*pipeline_.error_model());
     summary["estimate"] = estimate_json(last_, pipeline_.rig());
     summary["weakest_direction"] = last_.weakest.text;
 
@@ -284,8 +291,8 @@ class Replay {
         const TruthInstant* truth = truth_->at(frame.utime[c]);
         if (truth == nullptr) continue;
         const auto& intrinsics = pipeline_.rig().cameras[c].intrinsics;
-        all.add(hand_error(pipeline_.estimator().hand_pose(frame.q[c], c, false), *truth, c, intrinsics),
-                hand_error(pipeline_.estimator().hand_pose(frame.q[c], c, true), *truth, c, intrinsics));
+        all.add(hand_error(pipeline_.estimator().hand_pose(frame.exposure(c), c, false), *truth, c, intrinsics),
+                hand_error(pipeline_.estimator().hand_pose(frame.exposure(c), c, true), *truth, c, intrinsics));
       }
       row(fmt::format("{} eye, last {} frames", names[c], tail), last_frames);
       row(fmt::format("{} eye, final offsets, all frames", names[c]), all);

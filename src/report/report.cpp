@@ -30,7 +30,10 @@ th, td { padding: .3rem .7rem; border-bottom: 1px solid var(--line); text-align:
 td.number { text-align: right; font-variant-numeric: tabular-nums; }
 pre { overflow-x: auto; font-size: .85rem; } figure { margin: 1.2rem 0; }
 figure img { max-width: 100%; image-rendering: auto; } figcaption { color: var(--soft); font-size: .9rem; }
-.chart { position: relative; height: 22rem; margin: 1.2rem 0; }
+.chart { position: relative; height: 22rem; margin: 1.2rem 0; min-width: 0; }
+.grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(26rem, 100%), 1fr)); gap: 0 1.5rem; }
+.grid .chart { height: 18rem; } summary { cursor: pointer; color: #1f6fb4; margin: .8rem 0; }
+li { margin: .3rem 0; } @media (max-width: 40rem) { th, td { padding: .3rem .4rem; font-size: .9rem; } }
 )css";
 
 std::string escaped(const std::string& text) {
@@ -65,15 +68,34 @@ bool looks_like_a_number(const std::string& cell) {
          cell.find_first_of("0123456789") != std::string::npos;
 }
 
-Json dataset(const ChartSeries& series, Chart::Kind kind, std::size_t index) {
-  const char* colour = kColours[index % std::size(kColours)];
+Json points(const std::vector<double>& x, const std::vector<double>& y) {
   Json data = Json::array();
-  for (std::size_t i = 0; i < series.y.size(); ++i) {
-    if (kind == Chart::Kind::kBar) {
-      data.push_back(std::isfinite(series.y[i]) ? Json(series.y[i]) : Json(nullptr));
-    } else if (i < series.x.size() && std::isfinite(series.x[i]) && std::isfinite(series.y[i])) {
-      data.push_back({{"x", series.x[i]}, {"y", series.y[i]}});
-    }
+  for (std::size_t i = 0; i < y.size() && i < x.size(); ++i) {
+    if (std::isfinite(x[i]) && std::isfinite(y[i])) data.push_back({{"x", x[i]}, {"y", y[i]}});
+  }
+  return data;
+}
+
+/// Two nameless lines with the space between them filled; the legend leaves out what has no name.
+void add_band(Json& datasets, const ChartSeries& series, const char* colour) {
+  for (const bool upper : {false, true}) {
+    datasets.push_back({{"label", ""}, {"data", points(series.x, upper ? series.high : series.low)},
+                        {"borderWidth", 0}, {"pointRadius", 0},
+                        {"fill", upper ? Json("-1") : Json(false)},
+                        {"backgroundColor", std::string(colour) + "30"}});
+  }
+}
+
+const char* colour_of(const ChartSeries& series, std::size_t position) {
+  return kColours[(series.colour >= 0 ? static_cast<std::size_t>(series.colour) : position) % std::size(kColours)];
+}
+
+Json dataset(const ChartSeries& series, Chart::Kind kind, const char* colour) {
+  Json data = Json::array();
+  if (kind == Chart::Kind::kBar) {
+    for (const double y : series.y) data.push_back(std::isfinite(y) ? Json(y) : Json(nullptr));
+  } else {
+    data = points(series.x, series.y);
   }
   return {{"label", series.name},     {"data", data},
           {"borderColor", colour},    {"backgroundColor", kind == Chart::Kind::kLine ? "transparent" : colour},
@@ -92,6 +114,28 @@ void Report::verdict(const std::string& text) {
 }
 void Report::preformatted(const std::string& text) {
   body_ += "<pre>" + escaped(text) + "</pre>\n";
+}
+
+void Report::list(const std::vector<std::string>& items) {
+  body_ += "<ul>\n";
+  for (const auto& item : items) body_ += "<li>" + escaped(item) + "</li>\n";
+  body_ += "</ul>\n";
+}
+
+void Report::begin_grid() {
+  body_ += "<div class=\"grid\">\n";
+  open_.push_back("</div>\n");
+}
+
+void Report::begin_details(const std::string& summary) {
+  body_ += "<details><summary>" + escaped(summary) + "</summary>\n";
+  open_.push_back("</details>\n");
+}
+
+void Report::end() {
+  if (open_.empty()) return;
+  body_ += open_.back();
+  open_.pop_back();
 }
 
 void Report::table(const std::vector<std::string>& head,
@@ -125,10 +169,28 @@ void Report::chart(const Chart& chart) {
     return;
   }
   Json datasets = Json::array();
-  for (std::size_t i = 0; i < chart.series.size(); ++i) {
-    datasets.push_back(dataset(chart.series[i], chart.kind, i));
-  }
   const bool bars = chart.kind == Chart::Kind::kBar;
+  std::size_t names = 0;
+  for (std::size_t i = 0; i < chart.series.size(); ++i) {
+    const auto& series = chart.series[i];
+    names += !series.name.empty();
+    if (chart.kind == Chart::Kind::kLine && !series.low.empty()) {
+      add_band(datasets, series, colour_of(series, i));
+    }
+    datasets.push_back(dataset(series, chart.kind, colour_of(series, i)));
+  }
+  const bool lying = bars && chart.horizontal;
+  if (bars && chart.threshold && !chart.labels.empty()) {
+    Json line = Json::array();
+    for (const auto& label : chart.labels) {
+      line.push_back(lying ? Json{{"x", *chart.threshold}, {"y", label}}
+                           : Json{{"x", label}, {"y", *chart.threshold}});
+    }
+    names += 1;
+    datasets.push_back({{"type", "line"}, {"label", chart.threshold_name}, {"data", line},
+                        {"borderColor", "#8a8f98"}, {"borderDash", {6, 4}}, {"borderWidth", 2},
+                        {"pointRadius", 0}, {"backgroundColor", "transparent"}});
+  }
   Json data = {{"datasets", datasets}};
   if (bars) data["labels"] = chart.labels;
   const auto axis = [](const std::string& label, const char* type) {
@@ -136,6 +198,9 @@ void Report::chart(const Chart& chart) {
     if (type != nullptr) json["type"] = type;
     return json;
   };
+  Json names_axis = axis(chart.x_label, bars ? nullptr : "linear");
+  if (lying) names_axis["ticks"] = {{"autoSkip", false}};
+  const Json values_axis = axis(chart.y_label, chart.logarithmic_y ? "logarithmic" : nullptr);
   const Json config = {
       {"type", bars ? "bar" : chart.kind == Chart::Kind::kScatter ? "scatter" : "line"},
       {"data", data},
@@ -144,12 +209,16 @@ void Report::chart(const Chart& chart) {
         {"maintainAspectRatio", false},
         {"plugins",
          {{"title", {{"display", true}, {"text", chart.title}}},
-          {"legend", {{"display", chart.series.size() > 1}}}}},
-        {"scales",
-         {{"x", axis(chart.x_label, bars ? nullptr : "linear")},
-          {"y", axis(chart.y_label, chart.logarithmic_y ? "logarithmic" : nullptr)}}}}}};
+          {"legend", {{"display", names > 1}}}}},
+        {"indexAxis", lying ? "y" : "x"},
+        {"scales", {{lying ? "y" : "x", names_axis}, {lying ? "x" : "y", values_axis}}}}}};
   const std::string id = "chart" + std::to_string(charts_++);
-  body_ += "<div class=\"chart\"><canvas id=\"" + id + "\" role=\"img\" aria-label=\"" + escaped(chart.title) +
+  std::string height;
+  if (lying) {
+    const auto rows = chart.labels.size() * std::max<std::size_t>(1, chart.series.size());
+    height = " style=\"height:" + std::to_string(7 + rows * 9 / 10) + "rem\"";
+  }
+  body_ += "<div class=\"chart\"" + height + "><canvas id=\"" + id + "\" role=\"img\" aria-label=\"" + escaped(chart.title) +
            "\"></canvas></div>\n";
   script_ += "new Chart(document.getElementById('" + id + "')," + script_json(config) + ");\n";
 }
@@ -175,10 +244,15 @@ std::string Report::html() const {
                      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
                      escaped(title_) + "</title>\n<style>" + kStyle + "</style></head><body>\n<h1>" +
                      escaped(title_) + "</h1>\n" + body_;
+  for (auto tag = open_.rbegin(); tag != open_.rend(); ++tag) page += *tag;
   if (!script_.empty()) {
     page += "<script>";
     page += report_assets::kChartJs;
-    page += "</script>\n<script>\n" + script_ + "</script>\n";
+    page += "</script>\n<script>\n"
+            "Chart.defaults.plugins.legend.labels.filter = (item) => item.text !== '';\n"
+            "if (matchMedia('(prefers-color-scheme: dark)').matches) {\n"
+            "  Chart.defaults.color = '#b8c0c8'; Chart.defaults.borderColor = '#ffffff22';\n}\n" +
+            script_ + "</script>\n";
   }
   return page + "</body></html>\n";
 }

@@ -39,6 +39,7 @@ RobotSetup RobotSetup::from(const Configuration& robot) {
   const std::vector<double> gravity = robot.numbers_or("gravity_m_s2", {0.0, 0.0, -9.81});
   if (gravity.size() != 3) robot.fail("gravity_m_s2", "three numbers [x, y, z]");
   setup.gravity_W = {gravity[0], gravity[1], gravity[2]};
+  if (!robot.text_or("extended_model", "").empty()) setup.extended_model = robot.path("extended_model");
 
   if (setup.model.rendered_links.empty()) robot.fail("rendered_links", "at least one link");
   if (setup.estimated_joints.empty()) robot.fail("estimated_joints", "at least one joint");

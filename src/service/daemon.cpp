@@ -173,6 +173,7 @@ class Daemon {
     Pipeline& loaded = *session_->pipeline;
     const std::string engine = loaded.estimator().engine_description();
     spdlog::info("silhouettes: {}", engine);
+    if (loaded.error_model()) spdlog::info("extended model: {}", describe(*loaded.error_model()));
     reporter_.set_identity({options_.version, engine, loaded.model_hash(), loaded.configuration_hash(),
                             channels().cameras, channels().joint_state,
                             static_cast<int>(loaded.options().filter.particles),

@@ -8,6 +8,7 @@
 #include "bodyschema/bus/lcm_link.hpp"
 #include "bodyschema/bus/observation_queue.hpp"
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/effects/online_error_model.hpp"
 
 namespace bodyschema {
 namespace {
@@ -57,6 +58,51 @@ TEST(ObservationStream, TurnsMessagesIntoObservations) {
   EXPECT_EQ(arrived->observation.cameras[1]->image.channels, 1);
   EXPECT_EQ(stream.statistics().messages, 11u);
   for (const auto& [name, count] : stream.statistics().counters()) EXPECT_EQ(count, 0u) << name;
+}
+
+/// Arm and head published apart, as many robots do, with a backlash that is known.
+TEST(ObservationStream, CarriesWhatTheExtendedModelKnowsAtEachExposure) {
+  const Configuration configuration =
+      Configuration::load(std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/robot.yaml");
+  RobotSetup setup = RobotSetup::from(configuration.section("robot"));
+  setup.model.rendered_links.clear();
+  const auto robot = setup.load();
+  const JointRoles roles = JointRoles::of(robot, setup);
+  const auto elbow = roles.index("r_elbow");
+  ErrorModel model(roles);
+  model.add("backlash", {"r_elbow", ""}).parameters()[0].value = 0.02;
+  std::map<std::string, double> resting;
+  for (const auto& name : roles.names) resting[name] = 0.0;
+  ObservationStream stream(roles.names, resting, rig(), {});
+  stream.set_follower(std::make_unique<OnlineErrorModel>(robot, setup, model));
+
+  const auto joint = [](const char* name, Microseconds utime, float q) {
+    auto message = arm(utime, q);
+    message.joint_name = {name};
+    return encode(message);
+  };
+  // Up, then down again: the link first lags below the encoder, then above it. A picture that comes
+  // after its encoders have gone on must not see the later ones.
+  std::vector<double> dq;
+  for (int i = 0; i <= 40; ++i) {
+    const Microseconds now = 10 * i * kMs;
+    const float q = 0.01F * static_cast<float>(i <= 20 ? i : 40 - i);
+    stream.receive("ICUB_JOINT_STATE", joint("r_elbow", now, q));
+    stream.receive("ICUB_JOINT_STATE", joint("neck_pitch", now, 0.1F));
+    if (i == 20 || i == 40) stream.receive("ICUB_CAMERAS", encode(pictures(now - 45 * kMs)));
+    while (const auto arrived = stream.next()) {
+      for (const auto& camera : arrived->observation.cameras) {
+        ASSERT_TRUE(camera && camera->corrections);
+        dq.push_back(camera->corrections->dq[elbow]);
+        EXPECT_EQ(camera->corrections->dq.cwiseAbs().sum(), std::abs(dq.back())) << "the elbow alone";
+      }
+    }
+  }
+  ASSERT_EQ(dq.size(), 4u);
+  EXPECT_NEAR(dq[0], -0.01, 1e-6);
+  EXPECT_NEAR(dq[1], dq[0], 1e-12);
+  EXPECT_NEAR(dq[2], 0.01, 1e-6);
+  EXPECT_NEAR(dq[3], dq[2], 1e-12);
 }
 
 TEST(ObservationStream, CountsAndSkipsWhatIsMalformed) {

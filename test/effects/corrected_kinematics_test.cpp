@@ -102,5 +102,14 @@ TEST_F(CorrectedKinematicsTest, CameraShiftMovesTheWorldTheOtherWay) {
   EXPECT_LT((tip(corrections) - plain + Eigen::Vector3d(0.001, 0, 0)).norm(), 1e-12);
 }
 
+TEST_F(CorrectedKinematicsTest, BaseShiftMovesEveryLinkAlikeInTheRootFrame) {
+  // The camera's axes are the root's here.
+  const auto plain = tip(corrections);
+  const auto first = X[0];
+  corrections.base_shift_m = {0.001, -0.002, 0.003};
+  EXPECT_LT((tip(corrections) - plain - corrections.base_shift_m).norm(), 1e-12);
+  EXPECT_LT((X[0].translation() - first.translation() - corrections.base_shift_m).norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace bodyschema

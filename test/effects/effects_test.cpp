@@ -28,7 +28,7 @@ double dq_deg(const Corrections& c, Eigen::Index joint) { return degrees(c.dq[jo
 
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
-  EXPECT_EQ(effect_names().size(), 22u);
+  EXPECT_EQ(effect_names().size(), 23u);
   auto at = instant(r);
   at.q.setConstant(0.7);
   at.encoder.setConstant(0.8);
@@ -47,6 +47,7 @@ TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
       effect->apply(at, c);
       EXPECT_EQ(c.dq.norm(), 0.0) << effect->description();
       EXPECT_EQ(c.mesh_scale, 0.0);
+      EXPECT_EQ(c.base_shift_m.norm(), 0.0);
       EXPECT_EQ(c.dilation_px, 0.0);
       EXPECT_EQ(c.camera.focal_scale, 0.0);
       for (const auto& a : c.adjustments) EXPECT_TRUE(a.is_zero());
@@ -70,6 +71,14 @@ TEST(Catalogue, NamesTheNearestEffectAndJoint) {
   EXPECT_THROW(make_effect("latency", {"elbow", ""}, r), ConfigurationError);
   EXPECT_THROW(make_effect("slip", {"", ""}, r), ConfigurationError);
   EXPECT_THROW(make_effect("principal_point", {"", "middle"}, r), ConfigurationError);
+}
+
+TEST(BaseShift, MovesTheArmAlongTheRootsAxes) {
+  const auto r = roles();
+  auto effect = make_effect("base_shift", {}, r);
+  effect->parameters()[1].value = 2e-3;
+  const Corrections c = corrections(*effect, 5.0, instant(r));
+  EXPECT_LT((c.base_shift_m - Eigen::Vector3d(5e-3, 2e-3, 0.0)).norm(), 1e-15);
 }
 
 TEST(JointOffset, EncoderIsTruePlusOffset) {

@@ -79,6 +79,31 @@ TEST_F(Service, AgreesWithReplayBitForBit) {
   }
 }
 
+TEST_F(Service, AgreesWithReplayOnAnExtendedModelThatRemembers) {
+  const auto model = scratch_ / "extended_model.yaml";
+  std::ofstream(model) << R"(version: 1
+effects:
+  - {name: backlash, joint: r_elbow, parameters: {width_deg: 1.0}}
+  - {name: latency, parameters: {delay_ms: 25}}
+  - {name: compliance, joint: r_shoulder_pitch, parameters: {compliance_deg_per_Nm: 0.3}}
+)";
+  const auto log = reach_log();
+  Listener listener(url_);
+  const auto file = scratch_ / "estimates.jsonl";
+  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", "3", "--extended-model", model.string()}),
+                  scratch_.folder());
+  ASSERT_TRUE(service.said("extended model: backlash of r_elbow width 1 deg; latency delay 25 ms", kStart))
+      << service.err();
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  Player player(url_, log, 1000.0, in_step_with(listener));
+  player.wait();
+  ASSERT_EQ(service.wait(Seconds(60)), 0);
+  const auto live = estimates_by_utime(file);
+  EXPECT_GT(live.size(), 40u);
+  EXPECT_EQ(live, replay_estimates(log, scratch_ / "with", {"--extended-model", model.string()}));
+  EXPECT_NE(live, replay_estimates(log, scratch_ / "without"));
+}
+
 TEST_F(Service, AgreesWithReplayOverLcmLogplayer) {
   if (std::system("command -v lcm-logplayer >/dev/null") != 0) GTEST_SKIP() << "lcm-logplayer is not installed";
   const auto log = reach_log();

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/effects/corrected_kinematics.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
 
@@ -20,9 +21,24 @@ class ExportCorrection : public ::testing::Test {
  protected:
   ExportCorrection() : folder_(fs::temp_directory_path() / ("export_test_" + std::to_string(getpid()))) {
     fs::create_directories(folder_);
+    const Configuration configuration =
+        Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/robot.yaml");
+    setup_ = RobotSetup::from(configuration.section("robot"));
+    setup_.model.rendered_links.clear();
+    rig_ = StereoRig::from(configuration.section("cameras"));
+  }
+  [[nodiscard]] std::string content(const std::string& name) const {
+    std::ifstream stream(folder_ / name);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  void write_summary(const std::string& more = "") const {
+    std::ofstream(folder_ / "summary.json")
+        << R"({"estimate": {"offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1}})" << more << "}";
   }
   ~ExportCorrection() override { fs::remove_all(folder_); }
   fs::path folder_;
+  RobotSetup setup_;
+  StereoRig rig_;
 };
 
 TEST_F(ExportCorrection, TheCorrectedUrdfGivesTheCorrectedPose) {
@@ -30,10 +46,7 @@ TEST_F(ExportCorrection, TheCorrectedUrdfGivesTheCorrectedPose) {
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-  const Configuration configuration =
-      Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/robot.yaml");
-  RobotSetup setup = RobotSetup::from(configuration.section("robot"));
-  setup.model.rendered_links.clear();
+  const RobotSetup& setup = setup_;
   const auto nominal = setup.load();
   Correction correction;
   for (const auto& name : setup.estimated_joints) {
@@ -71,8 +84,7 @@ TEST_F(ExportCorrection, TheCorrectedUrdfGivesTheCorrectedPose) {
 TEST_F(ExportCorrection, WritesThreeFilesAndRefusesWhatDoesNotFit) {
   std::ofstream(folder_ / "summary.json")
       << R"({"estimate": {"offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1}}})";
-  const fs::path urdf = fs::path(BODYSCHEMA_SOURCE_DIR) / "meshes/icub_right/icub_right.urdf";
-  export_correction(folder_ / "summary.json", urdf, folder_ / "out");
+  export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
   std::ifstream yaml(folder_ / "out/offsets.yaml");
   const std::string text((std::istreambuf_iterator<char>(yaml)), {});
   EXPECT_THAT(text, ::testing::HasSubstr("r_elbow: -2.0000"));
@@ -80,9 +92,112 @@ TEST_F(ExportCorrection, WritesThreeFilesAndRefusesWhatDoesNotFit) {
 
   std::ofstream(folder_ / "summary.json")
       << R"({"estimate": {"offset_deg": {"no_joint": 1.0}, "stddev_deg": {}}})";
-  EXPECT_THROW(export_correction(folder_ / "summary.json", urdf, folder_ / "out"), FileError);
+  EXPECT_THROW(export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out"), FileError);
   std::ofstream(folder_ / "summary.json") << "{}";
-  EXPECT_THROW(export_correction(folder_ / "summary.json", urdf, folder_ / "out"), FileError);
+  EXPECT_THROW(export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out"), FileError);
+}
+
+TEST_F(ExportCorrection, TheUrdfHoldsWhatItCanOfAnExtendedModel) {
+  const auto seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  const auto robot = setup_.load();
+  ErrorModel model(JointRoles::of(robot, setup_));
+  const auto put = [&](const char* name, const EffectTarget& target) {
+    for (auto& p : model.add(name, target).parameters()) {
+      if (p.fitted) p.value = 3.0 * p.typical * uniform(random);
+    }
+  };
+  put("head_offset", {"neck_pitch", ""});
+  put("vergence", {});
+  put("link_length", {"r_shoulder_yaw", ""});
+  put("link_length", {"r_wrist_prosup", ""});
+  put("axis_tilt", {"r_shoulder_yaw", ""});
+  put("axis_tilt", {"r_elbow", ""});
+  put("baseline", {});
+  put("base_shift", {});
+  put("focal_length", {});
+  put("compliance", {"r_elbow", ""});
+  Correction correction;
+  correction.offsets_rad = {{"r_shoulder_yaw", 0.1}, {"r_elbow", -0.07}};
+  const auto applied = add_extended_model(model, robot, setup_, rig_, correction);
+  ASSERT_EQ(applied.size(), model.size());
+  EXPECT_EQ(applied.back().applied, "");
+  EXPECT_THAT(applied.back().effect, ::testing::HasSubstr("compliance of r_elbow"));
+  EXPECT_NE(applied.back().remark, "");
+  write_corrected_urdf(setup_.model.urdf, correction, folder_ / "corrected.urdf");
+  RobotModelOptions options = setup_.model;
+  options.urdf = folder_ / "corrected.urdf";
+  const auto corrected = RobotModel::load(options);
+
+  const std::vector<std::string> cameras = {"l_eye_optical", "r_eye_optical"};
+  CorrectedKinematics expected(robot, {setup_.hand_link, "r_forearm"}, cameras);
+  ForwardKinematics found(corrected, {setup_.hand_link, "r_forearm", cameras[0], cameras[1]});
+  model.remove("compliance", {"r_elbow", ""});  // which no URDF can hold
+  InstantBuilder instants(robot, setup_.hand_link, setup_.gravity_W);
+  for (int i = 0; i < 20; ++i) {
+    JointSample sample;
+    sample.q = setup_.default_joints(*robot);
+    for (const auto& group : {setup_.estimated_joints, setup_.head_joints}) {
+      for (const auto& name : group) sample.q(robot->joint_index(name)) += 0.5 * uniform(random);
+    }
+    sample.qdot.setZero(sample.q.size());
+    std::vector<Pose> X_W(4), X_C(2);
+    found.compute(sample.q, X_W);
+    for (const std::size_t c : {0u, 1u}) {
+      Instant at;
+      instants.build(sample, c, Eigen::VectorXd::Zero(sample.q.size()), at);
+      Corrections corrections(sample.q.size());
+      model.corrections(at, corrections);
+      Eigen::VectorXd q = sample.q;
+      for (const auto& [name, offset] : correction.offsets_rad) q(robot->joint_index(name)) -= offset;
+      expected.compute(q, corrections, c, X_C);
+      for (const std::size_t link : {0u, 1u}) {
+        const Pose X = X_W[2 + c].inverse() * X_W[link];
+        EXPECT_LT((X.translation() - X_C[link].translation()).norm(), 1e-8);
+        EXPECT_LT(rotation_distance(X.linear(), X_C[link].linear()), 1e-7);
+      }
+    }
+  }
+}
+
+TEST_F(ExportCorrection, SaysWhereEachEffectWentAndRefusesAnotherModelsOffsets) {
+  std::ofstream(folder_ / "model.yaml") << R"(version: 1
+effects:
+  - {name: latency, parameters: {delay_ms: 40}}
+  - {name: link_length, joint: r_shoulder_yaw, parameters: {change_mm: 2}}
+  - {name: focal_length, parameters: {scale_percent: 1}}
+)";
+  setup_.extended_model = folder_ / "model.yaml";
+  write_summary();
+  const auto refuse = [&](const char* words) {
+    try {
+      export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+      ADD_FAILURE() << "no error: " << words;
+    } catch (const ConfigurationError& e) {
+      EXPECT_THAT(e.what(), ::testing::HasSubstr(words));
+    }
+  };
+  refuse("made without an extended model");
+  const std::string made_with =
+      R"(, "extended_model": [{"name": "latency", "parameters": [{"name": "delay", "unit": "ms", "value": 40.0}]},
+      {"name": "link_length", "joint": "r_shoulder_yaw",
+       "parameters": [{"name": "change", "unit": "mm", "value": 2.0}]},
+      {"name": "focal_length", "parameters": [{"name": "scale", "unit": "%", "value": 1.0}]}])";
+  write_summary(made_with);
+  export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+  const std::string text = content("out/what_was_applied.txt");
+  EXPECT_THAT(text, ::testing::HasSubstr("link_length of r_shoulder_yaw change 2 mm: in corrected.urdf"));
+  EXPECT_THAT(text, ::testing::HasSubstr("focal_length scale 1 %: in cameras.yaml"));
+  EXPECT_LT(text.find("cannot hold"), text.find("latency delay 40 ms"));
+  EXPECT_THAT(content("out/cameras.yaml"), ::testing::HasSubstr("fx: 259.9134"));
+  EXPECT_THAT(content("out/offsets.yaml"), ::testing::HasSubstr("what_was_applied.txt"));
+
+  std::ofstream(folder_ / "model.yaml") << "version: 1\neffects: []\n";
+  refuse("another extended model");
+  setup_.extended_model.clear();
+  refuse("expected the same one here");
 }
 
 }  // namespace

@@ -29,11 +29,43 @@ TEST(Report, AChartHoldsItsNumbersAndNothingEndsItsScript) {
   Report report("charts");
   Chart chart;
   chart.title = "</script><script>alert(1)</script>";
-  chart.series = {{"error", {0, 1, 2}, {1.5, std::numeric_limits<double>::quiet_NaN(), 2.5}}};
+  chart.series = {{"error", {0, 1, 2}, {1.5, std::numeric_limits<double>::quiet_NaN(), 2.5}, {}, {}}};
   report.chart(chart);
   const std::string html = report.html();
   EXPECT_THAT(html, HasSubstr("2.5"));
   EXPECT_THAT(html, Not(HasSubstr("<script>alert(1)")));
+}
+
+TEST(Report, BarsLieWithTheirThresholdAndBandsHaveNoNameInTheLegend) {
+  Report report("bars");
+  Chart bars;
+  bars.kind = Chart::Kind::kBar;
+  bars.horizontal = true;
+  bars.labels = {"backlash", "latency"};
+  bars.series = {{"z", {}, {1.0, 9.0}, {}, {}}};
+  bars.threshold = 4.5;
+  bars.threshold_name = "threshold";
+  report.chart(bars);
+  Chart line;
+  line.series = {{"median", {0, 1}, {2, 3}, {1, 2}, {3, 4}}};
+  report.chart(line);
+  const std::string html = report.html();
+  EXPECT_THAT(html, HasSubstr(R"("indexAxis":"y")"));
+  EXPECT_THAT(html, HasSubstr(R"({"x":4.5,"y":"latency"})"));
+  EXPECT_THAT(html, HasSubstr(R"("fill":"-1")"));
+  EXPECT_THAT(html, HasSubstr(R"("data":[{"x":0.0,"y":3.0},{"x":1.0,"y":4.0}])"));
+}
+
+TEST(Report, OpenPartsAreClosed) {
+  Report report("parts");
+  report.begin_grid();
+  report.begin_details("<more>");
+  report.list({"a & b"});
+  report.end();
+  const std::string html = report.html();
+  EXPECT_THAT(html, HasSubstr("<summary>&lt;more&gt;</summary>"));
+  EXPECT_LT(html.find("a &amp; b"), html.find("</details>"));
+  EXPECT_LT(html.find("</details>"), html.rfind("</div>"));
 }
 
 TEST(Report, PicturesStandInsideThePage) {

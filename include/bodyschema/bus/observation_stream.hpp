@@ -4,12 +4,15 @@
 #include <chrono>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "bodyschema/bus/bus_options.hpp"
+#include "bodyschema/bus/joint_assembler.hpp"
 #include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/observation/encoder_follower.hpp"
 #include "bodyschema/robot/robot_model.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
 
@@ -40,18 +43,21 @@ class ObservationStream {
   /// @param fixed_rad  values of joints the robot does not publish
   /// @param cameras  the rig's: one named "left" or "right", or both, left first; pictures of
   ///        another size are refused. Throws ConfigurationError for other names.
-  ObservationStream(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad,
+  ObservationStream(const std::vector<std::string>& joint_names, const std::map<std::string, double>& fixed_rad,
                     const std::vector<CameraModel>& cameras, const BusOptions& options);
   /// For a configured robot. A joint that moves a rendered link, the hand, a fingertip or a camera
   /// must be published or fixed; all others (the other arm, legs) rest at their default.
   ObservationStream(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup, const StereoRig& rig,
                     const BusOptions& options);
 
+  /// From now on the follower sees all encoder samples and annotates every observation.
+  void set_follower(std::unique_ptr<EncoderFollower> follower) { follower_ = std::move(follower); }
+
   /// @param arrival_us  the caller's clock, handed through to ArrivedObservation
   /// @return whether the channel is one of our inputs
   bool receive(std::string_view channel, Bytes message, std::int64_t arrival_us = 0);
   /// The next observation, oldest first. Call until empty after each receive().
-  std::optional<ArrivedObservation> next() { return synchroniser_.next(); }
+  std::optional<ArrivedObservation> next();
   /// End of the recording: settles what waits; next() yields the rest.
   void finish();
 
@@ -72,6 +78,8 @@ class ObservationStream {
     std::uint64_t held_back = 0;
   };
   void receive_joints(Bytes message);
+  void show_follower();
+  void annotate(Observation& observation);
   void receive_images(Bytes message, std::int64_t arrival_us);
   void refuse(const std::string& source, const DecodeResult& result);
   void warn_of_missing_joints();
@@ -81,6 +89,9 @@ class ObservationStream {
   BusOptions options_;
   Channels channels_;
   Synchroniser synchroniser_;
+  JointAssembler assembler_;
+  std::unique_ptr<EncoderFollower> follower_;
+  std::uint64_t clock_steps_ = 0;  ///< when the follower saw its last sample
   BusStatistics statistics_;
   JointStateMessage joint_state_;
   ImagesView images_;

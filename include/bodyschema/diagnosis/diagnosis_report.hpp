@@ -70,6 +70,7 @@ struct CandidateBar {
 /// What is left at one exposure, for the charts of structure: the correction of each arm joint
 /// alone that the residuals ask for, before and after the extension.
 struct ResidualSample {
+  Microseconds utime = 0;
   double time_s = 0.0;
   std::size_t camera = 0;
   double rms_px_before = 0.0, rms_px_after = 0.0;
@@ -98,6 +99,7 @@ struct DiagnosisReport {
   double z_threshold = 0.0, gain_threshold = 0.0;
   std::vector<ResidualSample> samples;
   double rest_gain = 0.0, rest_t = 0.0;
+  Microseconds begin_utime = 0;
   double duration_s = 0.0, block_s = 0.0, noise_correlation_s = 0.0;
   std::size_t views = 0, blocks = 0;
 

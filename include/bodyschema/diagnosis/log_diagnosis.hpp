@@ -17,7 +17,8 @@ struct LogDiagnosisOptions {
   DiagnosisOptions diagnosis;      ///< `nuisances` empty: the usual ones
 };
 
-/// Diagnoses a recorded log: encoders and pictures in, report.json and extended_model.yaml out.
+/// Diagnoses a recorded log: encoders and pictures in, report.json, report.html and
+/// extended_model.yaml out.
 /// The background is learned from the whole log, the estimator gives the offsets to start from.
 /// Throws Error; DataError says what to record where the log cannot be used.
 DiagnosisReport diagnose_log(const Configuration& configuration, const LogDiagnosisOptions& options);

@@ -26,7 +26,10 @@ class CoordinateLayout {
   /// Position of a joint's angle; -1 when the joint has none.
   [[nodiscard]] Eigen::Index joint(Eigen::Index joint) const;
 
-  enum class Kind { kJoint, kAlong, kTilt1, kTilt2, kShiftX, kFocal, kCx, kCy, kK1, kScale, kDilation };
+  enum class Kind {
+    kJoint, kAlong, kTilt1, kTilt2, kBaseX, kBaseY, kBaseZ,
+    kShiftX, kFocal, kCx, kCy, kK1, kScale, kDilation
+  };
   struct Entry {
     Kind kind;
     Eigen::Index joint = -1;

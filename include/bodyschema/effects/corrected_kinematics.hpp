@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "bodyschema/effects/corrections.hpp"
+#include "bodyschema/observation/corrections.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
 
 namespace bodyschema {
@@ -29,10 +29,11 @@ class CorrectedKinematics {
   void compute(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
                std::size_t camera, std::span<Pose> X_CB);
 
-  /// Pose of the camera in the root frame at the last `compute`.
+  /// Pose of the camera in the root frame at the last `compute`, with its and the base's shift.
   [[nodiscard]] const Pose& X_WC() const { return X_WC_; }
   /// Directions about which JointAdjustment::tilt_1_rad and tilt_2_rad turn: unit, perpendicular to
-  /// the joint's axis, fixed in its parent link; root frame, at the last `compute`.
+  /// the joint's axis, fixed in its parent link; root frame, at the last `compute`. Zero for a joint
+  /// that moves none of the links and cameras.
   [[nodiscard]] Eigen::Vector3d tilt_axis(Eigen::Index joint, int which) const;
   [[nodiscard]] std::size_t link_count() const { return link_count_; }
 
@@ -40,7 +41,8 @@ class CorrectedKinematics {
   [[nodiscard]] bool moves(Eigen::Index joint, std::size_t link) const;
 
   struct Frames {
-    std::size_t parent = 0;  ///< position of the parent link in the FK's list
+    bool moves_something = false;  ///< a listed link or a camera
+    std::size_t parent = 0;        ///< position of the parent link in the FK's list
     std::array<Eigen::Vector3d, 2> tilt_P{};
     double outwards = 1.0;  ///< sign of the axis that leads on to the next joint
   };

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "bodyschema/effects/corrections.hpp"
+#include "bodyschema/observation/corrections.hpp"
 #include "bodyschema/effects/instant.hpp"
 #include "bodyschema/observation/observation.hpp"
 #include "bodyschema/robot/robot_setup.hpp"

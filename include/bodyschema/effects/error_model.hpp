@@ -62,4 +62,9 @@ class ErrorModel {
   std::vector<std::unique_ptr<Effect>> effects_;
 };
 
+/// "backlash of r_elbow width 0.8 deg": fitted parameters only.
+std::string describe(const Effect& effect);
+/// "latency delay 40 ms; backlash of r_elbow width 0.8 deg", joint offsets left out.
+std::string describe(const ErrorModel& model);
+
 }  // namespace bodyschema

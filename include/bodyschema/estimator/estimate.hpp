@@ -56,7 +56,7 @@ struct Estimate {
   WeakestDirection weakest;
   double hand_sd_m = 0.0;                   ///< one sigma of the hand base in the eye frame
   std::vector<Pose> X_CP;                   ///< hand base in each camera of the rig, corrected
-  std::vector<Pose> X_CP_nominal;           ///< the same with the encoders as they are
+  std::vector<Pose> X_CP_nominal;           ///< the same with encoders and model as they are
   StageTimes times;
 };
 

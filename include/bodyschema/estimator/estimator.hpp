@@ -39,13 +39,14 @@ class Estimator {
   [[nodiscard]] Eigen::VectorXd likelihood(const Observation& observation,
                                            const Eigen::MatrixXd& offsets_rad);
   /// Outline of the robot predicted with a set of corrections, for overlays.
-  /// @param corrected  with the current estimate, otherwise with the encoders as they are
+  /// @param corrected  with the current estimate and the observation's known corrections, otherwise
+  ///   with the encoders and the model as they are
   [[nodiscard]] BinaryMask predicted_silhouette(const Observation& observation,
                                                 std::size_t camera, bool corrected);
-  /// Where the corrected model puts hand and fingertips at encoder readings `q`.
-  [[nodiscard]] Pose hand_pose(const Eigen::VectorXd& q, std::size_t camera, bool corrected);
-  [[nodiscard]] std::vector<Eigen::Vector3d> fingertips(const Eigen::VectorXd& q,
-                                                        std::size_t camera, bool corrected);
+  /// Where the model puts hand and fingertips; `corrected` as above.
+  [[nodiscard]] Pose hand_pose(const Exposure& at, std::size_t camera, bool corrected);
+  [[nodiscard]] std::vector<Eigen::Vector3d> fingertips(const Exposure& at, std::size_t camera,
+                                                        bool corrected);
   [[nodiscard]] std::string engine_description() const;
 
  private:

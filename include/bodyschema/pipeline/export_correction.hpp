@@ -1,11 +1,24 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/effects/error_model.hpp"
+#include "bodyschema/robot/robot_setup.hpp"
+
 namespace bodyschema {
+
+/// A joint that sits elsewhere than the URDF has it.
+struct JointPlacement {
+  std::string joint;
+  double along_m = 0.0;                             ///< moved along its own axis
+  Eigen::Vector3d shift_m = Eigen::Vector3d::Zero(); ///< moved, parent frame
+  Eigen::Vector3d tilt = Eigen::Vector3d::Zero();   ///< its axis turned; rotation vector, parent frame
+};
 
 /// A result in the forms in which people apply it.
 struct Correction {
@@ -14,23 +27,46 @@ struct Correction {
   std::vector<std::pair<std::string, double>> sd_rad;
   /// What was estimated beside them; head joints among them are corrected in the URDF too.
   std::vector<std::pair<std::string, double>> nuisances;
+
+  // What an extended model adds that a URDF can hold.
+  std::vector<std::pair<std::string, double>> known_offsets_rad;  ///< encoder - true, by joint
+  std::vector<JointPlacement> placements;
+  std::vector<std::pair<std::string, double>> camera_shifts_m;    ///< along x of the camera, by link
+};
+
+/// One effect of an extended model and what the exported files make of it.
+struct AppliedEffect {
+  std::string effect;   ///< "link_length of r_shoulder_yaw change 2.1 mm"
+  std::string applied;  ///< file that holds it; empty: none
+  std::string remark;   ///< why not, or what else can be done
 };
 
 /// Reads the final offsets from a replay's `summary.json`. Throws FileError naming file and key.
 Correction read_correction(const std::filesystem::path& summary);
 
+/// Adds to `correction` what a URDF can hold of an extended model, and says of every effect where it
+/// went. Joint offsets are left out: those of the replay count.
+std::vector<AppliedEffect> add_extended_model(const ErrorModel& model,
+                                              const std::shared_ptr<const RobotModel>& robot,
+                                              const RobotSetup& setup, const StereoRig& rig,
+                                              Correction& correction);
+
 /// A copy of the URDF that is right when it is fed the encoders as they are: every corrected joint's
 /// origin is turned back by its offset about its axis (moved, for a sliding joint) and its limits
-/// grow by it, so that FK_corrected(encoder) = FK_nominal(encoder - offset). Everything else stays
-/// as it was. Relative mesh paths keep resolving only beside the original.
+/// grow by it, so that FK_corrected(encoder) = FK_nominal(encoder - offset). Placements and shifts
+/// of an extended model move origins and axes. Everything else stays as it was. Relative mesh paths
+/// keep resolving only beside the original.
 /// Throws FileError naming URDF and joint.
 void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& correction,
                           const std::filesystem::path& out);
 
 /// Writes `offsets.yaml` (by joint, deg), `corrected.urdf` and `calibration_delta.txt` (what to add
-/// to each joint's calibrationDelta in an iCub's calibrator file, deg) into `out`.
+/// to each joint's calibrationDelta in an iCub's calibrator file, deg) into `out`. With an extended
+/// model in `setup` also `cameras.yaml` (where it changes intrinsics) and `what_was_applied.txt`:
+/// which of its effects these files hold, and which only work where the model itself is loaded.
+/// Throws ConfigurationError when the summary was made with another extended model than `setup` has.
 /// Returns the files, for people.
-std::string export_correction(const std::filesystem::path& summary, const std::filesystem::path& urdf,
-                              const std::filesystem::path& out);
+std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup,
+                              const StereoRig& rig, const std::filesystem::path& out);
 
 }  // namespace bodyschema

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -15,11 +16,19 @@ struct OverlayView {
   const Image* image = nullptr;
   BinaryMask nominal;
   BinaryMask corrected;
+  /// Left edge, top edge, width and height in px of the part that is shown; zero width: all.
+  std::array<int, 4> part{};
+};
+
+/// What the outlines are, for the legend.
+struct OverlayNames {
+  std::string nominal = "encoders as they are";
+  std::string corrected = "corrected";
 };
 
 /// Left and right side by side, enlarged, with a legend. RGB.
 Image draw_overlay(const std::vector<OverlayView>& views, const std::string& caption,
-                   int enlargement = 2);
+                   int enlargement = 2, const OverlayNames& names = {});
 /// Throws FileError when the picture cannot be written.
 void write_png(const std::filesystem::path& file, const Image& image);
 

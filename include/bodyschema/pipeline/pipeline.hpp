@@ -9,6 +9,7 @@
 #include "bodyschema/bus/observation_stream.hpp"
 #include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/core/configuration.hpp"
+#include "bodyschema/effects/error_model.hpp"
 #include "bodyschema/estimator/estimator.hpp"
 #include "bodyschema/robot/robot_model.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
@@ -24,7 +25,8 @@ class Pipeline {
   /// Reads the whole configuration, robot and meshes, opens the silhouette engine. Throws Error.
   explicit Pipeline(const Configuration& configuration);
 
-  /// A fresh decoder and synchroniser for this robot and rig.
+  /// A fresh decoder and synchroniser for this robot and rig; its observations carry what the
+  /// extended model knows, where there is one.
   [[nodiscard]] ObservationStream make_stream() const;
 
   /// Fills in the observation's masks and takes one step of the estimator: segment(), estimate().
@@ -44,14 +46,17 @@ class Pipeline {
   [[nodiscard]] const RobotModel& robot() const { return *robot_; }
   [[nodiscard]] std::shared_ptr<const RobotModel> shared_robot() const { return robot_; }
   [[nodiscard]] const RobotSetup& setup() const { return setup_; }
+  /// With the extended model's intrinsics, where there is one.
   [[nodiscard]] const StereoRig& rig() const { return rig_; }
+  /// The extended model (robot.extended_model), if any.
+  [[nodiscard]] const std::optional<ErrorModel>& error_model() const { return error_model_; }
   [[nodiscard]] const BusOptions& bus() const { return bus_; }
   [[nodiscard]] const EstimatorOptions& options() const { return options_; }
   [[nodiscard]] Estimator& estimator() { return estimator_; }
   /// Time spent on masks in the last `process`, ms.
   [[nodiscard]] double segmentation_ms() const { return segmentation_ms_; }
   [[nodiscard]] const std::string& configuration_hash() const { return configuration_hash_; }
-  /// A short hexadecimal digest of the URDF file and of the meshes in use.
+  /// A short hexadecimal digest of the URDF file, of the meshes in use and of the extended model.
   [[nodiscard]] const std::string& model_hash() const { return model_hash_; }
 
  private:
@@ -62,11 +67,12 @@ class Pipeline {
   void straighten(CameraObservation& seen, std::size_t camera);
 
   RobotSetup setup_;
-  StereoRig rig_;
   VisionSetup vision_;
   BusOptions bus_;
   EstimatorOptions options_;
   std::shared_ptr<const RobotModel> robot_;
+  std::optional<ErrorModel> error_model_;
+  StereoRig rig_;
   std::vector<Eye> eyes_;
   Estimator estimator_;
   std::string configuration_hash_;

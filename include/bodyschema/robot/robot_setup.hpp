@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
@@ -22,6 +23,7 @@ struct RobotSetup {
   std::vector<std::string> head_joints;      ///< between root and cameras
   std::map<std::string, double> fixed_joints_rad;  ///< value of joints the robot does not publish
   Eigen::Vector3d gravity_W = {0, 0, -9.81};       ///< m/s^2 in the root frame
+  std::filesystem::path extended_model;  ///< of `bodyschema diagnose` (ErrorModel); empty: none
 
   /// Reads the `robot` section. Throws ConfigurationError.
   static RobotSetup from(const Configuration& robot);

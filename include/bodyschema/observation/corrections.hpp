@@ -22,14 +22,17 @@ struct JointAdjustment {
   [[nodiscard]] bool is_zero() const { return along_m == 0 && tilt_1_rad == 0 && tilt_2_rad == 0; }
 };
 
-/// Everything by which effects change the prediction of one camera's picture at one instant. All
-/// zero means: as the URDF and the configuration say. Effects add to it; the sum is applied.
+/// Everything in which the prediction of one camera's picture at one instant departs from what URDF
+/// and configuration say. All zero means: as they say. Effects (storey `effects`) add to it; the sum
+/// is applied.
 ///
 /// Sign everywhere: true minus assumed, so `q_true = q_encoder + dq` (a joint offset of +3 deg,
 /// encoder = true + offset, is dq = -3 deg).
 struct Corrections {
   Eigen::VectorXd dq;                        ///< radians, RobotModel order
   std::vector<JointAdjustment> adjustments;  ///< RobotModel order
+  /// The arm stands this much further along the root's axes, seen from the eyes, metres.
+  Eigen::Vector3d base_shift_m = Eigen::Vector3d::Zero();
   CameraCorrection camera;
   double mesh_scale = 0.0;   ///< rendered parts are scaled by 1 + this about their own frames
   double dilation_px = 0.0;  ///< the observed outline lies this far outside the predicted one
@@ -41,6 +44,7 @@ struct Corrections {
   void clear() {
     dq.setZero();
     for (auto& a : adjustments) a = {};
+    base_shift_m.setZero();
     camera = {};
     mesh_scale = dilation_px = 0.0;
   }

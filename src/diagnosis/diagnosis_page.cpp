@@ -1,0 +1,473 @@
+#include "bodyschema/diagnosis/diagnosis_page.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numeric>
+#include <spdlog/fmt/fmt.h>
+
+namespace bodyschema {
+namespace {
+
+constexpr std::size_t kBins = 14;
+constexpr std::size_t kFewestPerBin = 4;
+constexpr std::size_t kBarsShown = 16;
+
+// ---- what is left, in bins of what it may follow ----
+
+struct Point {
+  double x = 0.0, y = 0.0;
+};
+
+/// Medians of y over bins of x that hold equally many points, with their 95 % intervals.
+struct Curve {
+  std::vector<double> x, y, low, high;
+  /// Mean square of the medians over their standard errors: about one when y does not follow x.
+  [[nodiscard]] double structure() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      const double sd = std::max(1e-12, (high[i] - low[i]) / 3.92);
+      sum += y[i] * y[i] / (sd * sd);
+    }
+    return y.empty() ? 0.0 : sum / static_cast<double>(y.size());
+  }
+  /// Size of what follows x: the root mean square of the medians without their own noise.
+  [[nodiscard]] double size() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      const double sd = (high[i] - low[i]) / 3.92;
+      sum += y[i] * y[i] - sd * sd;
+    }
+    return y.empty() ? 0.0 : std::sqrt(std::max(0.0, sum / static_cast<double>(y.size())));
+  }
+};
+
+double quantile(const std::vector<double>& sorted, double share) {
+  const double at = share * static_cast<double>(sorted.size() - 1);
+  const auto low = static_cast<std::size_t>(at);
+  const double part = at - static_cast<double>(low);
+  return low + 1 < sorted.size() ? (1.0 - part) * sorted[low] + part * sorted[low + 1] : sorted[low];
+}
+
+Curve binned(std::vector<Point> points, bool centred = true) {
+  std::erase_if(points, [](const Point& p) { return !std::isfinite(p.x) || !std::isfinite(p.y); });
+  Curve curve;
+  if (points.size() < 2 * kFewestPerBin) return curve;
+  std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.x < b.x; });
+  double centre = 0.0;
+  if (centred) {  // a constant belongs to the offsets
+    std::vector<double> all;
+    for (const auto& p : points) all.push_back(p.y);
+    std::sort(all.begin(), all.end());
+    centre = quantile(all, 0.5);
+  }
+  const std::size_t bins = std::clamp<std::size_t>(points.size() / 12, 2, kBins);
+  for (std::size_t b = 0; b < bins; ++b) {
+    const std::size_t from = b * points.size() / bins, to = (b + 1) * points.size() / bins;
+    if (to - from < kFewestPerBin) continue;
+    std::vector<double> values;
+    double x = 0.0;
+    for (std::size_t i = from; i < to; ++i) {
+      values.push_back(points[i].y - centre);
+      x += points[i].x / static_cast<double>(to - from);
+    }
+    std::sort(values.begin(), values.end());
+    const double median = quantile(values, 0.5);
+    // Standard error of a median from the middle half of the values.
+    const double sd = 0.93 * (quantile(values, 0.75) - quantile(values, 0.25)) /
+                      std::sqrt(static_cast<double>(values.size()));
+    curve.x.push_back(x);
+    curve.y.push_back(median);
+    curve.low.push_back(median - 1.96 * sd);
+    curve.high.push_back(median + 1.96 * sd);
+  }
+  return curve;
+}
+
+using Value = std::function<double(const ResidualSample&)>;
+
+Curve curve_of(const DiagnosisReport& report, const Value& x, const Value& y, bool centred = true) {
+  std::vector<Point> points;
+  for (const auto& sample : report.samples) {
+    if (sample.rms_px_before > 0.0 && sample.rms_px_after > 0.0) points.push_back({x(sample), y(sample)});
+  }
+  return binned(std::move(points), centred);
+}
+
+/// The report's colours.
+enum Colour { kBlue = 0, kRed = 1, kGreen = 2, kOchre = 3 };
+
+ChartSeries series_of(const std::string& name, const Curve& curve, Colour colour) {
+  return {name, curve.x, curve.y, curve.low, curve.high, colour};
+}
+
+Chart curves(const std::string& title, const std::string& x, const std::string& y,
+             std::vector<ChartSeries> series) {
+  Chart chart;
+  chart.title = title;
+  chart.x_label = x;
+  chart.y_label = y;
+  chart.series = std::move(series);
+  return chart;
+}
+
+/// A variable that what is left of a joint may follow.
+struct Variable {
+  std::string name;
+  std::string axis;
+  std::function<double(const ResidualSample&, std::size_t joint)> of;
+};
+
+const std::vector<Variable>& variables() {
+  static const std::vector<Variable> list = {
+      {"gravity torque", "Nm", [](const auto& s, std::size_t j) { return s.torque_nm[j]; }},
+      {"angle", "deg", [](const auto& s, std::size_t j) { return s.angle_deg[j]; }},
+      {"velocity", "deg/s", [](const auto& s, std::size_t j) { return s.velocity_deg_s[j]; }},
+      {"speed", "deg/s", [](const auto& s, std::size_t j) { return std::abs(s.velocity_deg_s[j]); }},
+      {"time", "s", [](const auto& s, std::size_t) { return s.time_s; }}};
+  return list;
+}
+
+Value apparent(std::size_t joint, bool after) {
+  return [joint, after](const ResidualSample& s) {
+    return after ? s.apparent_deg_after[joint] : s.apparent_deg_before[joint];
+  };
+}
+
+class Page {
+ public:
+  Page(const DiagnosisReport& report, const std::string& title)
+      : d_(report), page_("Diagnosis: " + title) {}
+
+  Report write(const std::vector<std::pair<Image, std::string>>& pictures) {
+    page_.verdict(d_.sentence);
+    causes();
+    gain();
+    if (!pictures.empty()) {
+      page_.heading("Pictures");
+      for (const auto& [image, caption] : pictures) page_.picture(image, caption);
+    }
+    candidates();
+    if (!d_.samples.empty()) structure();
+    offsets();
+    limits();
+    log();
+    return std::move(page_);
+  }
+
+ private:
+  static std::string interval(const EstimatedParameter& p) {
+    if (!std::isfinite(p.ci95[0]) || !std::isfinite(p.ci95[1])) return "not known";
+    return fmt::format("{:.3g} to {:.3g}", p.ci95[0], p.ci95[1]);
+  }
+
+  void causes() {
+    if (d_.causes.empty()) return;
+    page_.heading("What was found");
+    std::vector<std::vector<std::string>> rows;
+    for (const auto& cause : d_.causes) {
+      const std::string name = cause.cause.name == "unexplained"
+                                   ? "unexplained: follows the " + cause.variable + " of " + cause.cause.joint
+                                   : cause.cause.text();
+      if (cause.parameters.empty()) {
+        rows.push_back({name, "", "", "", fmt::format("{:.1f}", cause.z), fmt::format("{:.1f} %", 100 * cause.heldout_gain)});
+      }
+      for (std::size_t i = 0; i < cause.parameters.size(); ++i) {
+        const auto& p = cause.parameters[i];
+        rows.push_back({i == 0 ? name : "", p.parameter,
+                        fmt::format("{:.3g}{}", p.estimate, p.unit == "1" ? "" : " " + p.unit), interval(p),
+                        i == 0 ? fmt::format("{:.1f}", cause.z) : "",
+                        i == 0 ? fmt::format("{:.1f} %", 100 * cause.heldout_gain) : ""});
+      }
+    }
+    page_.table({"cause", "parameter", "estimate", "95 % interval", "z", "held-out gain"}, rows);
+    for (const auto& cause : d_.causes) {
+      if (cause.same.size() < 2) continue;
+      std::string others;
+      for (std::size_t i = 1; i < cause.same.size(); ++i) {
+        others += (i == 1 ? "" : i + 1 == cause.same.size() ? " and " : ", ") + cause.same[i].text();
+      }
+      page_.paragraph("This log cannot tell " + cause.same.front().text() + " from " + others + ". " + cause.advice);
+    }
+  }
+
+  void gain() {
+    page_.heading(d_.causes.empty() ? "How well the model predicts" : "What the extension gains");
+    const auto row = [](const char* name, double before, double after, const char* unit) {
+      return std::vector<std::string>{name, fmt::format("{:.3f} {}", before, unit),
+                                      fmt::format("{:.3f} {}", after, unit)};
+    };
+    page_.table({"on parts of the log that the fit has not seen", "offsets and usual nuisances", "extended model"},
+                {row("outline residual, rms", d_.before.rms_px, d_.after.rms_px, "px"),
+                 row("motion of the hand it asks for", d_.before.hand_mm, d_.after.hand_mm, "mm"),
+                 row("turn of the hand it asks for", d_.before.hand_deg, d_.after.hand_deg, "deg")});
+  }
+
+  void offsets() {
+    page_.heading("Joint offsets");
+    std::vector<std::vector<std::string>> rows;
+    for (const auto& joint : d_.arm_joints) {
+      const auto before = d_.offsets_deg_before.find(joint);
+      const auto after = d_.offsets_deg_after.find(joint);
+      const auto ci = d_.offsets_ci95_deg.find(joint);
+      if (before == d_.offsets_deg_before.end() || after == d_.offsets_deg_after.end()) continue;
+      std::string width = "not known";
+      if (ci != d_.offsets_ci95_deg.end() && std::isfinite(ci->second[0])) {
+        width = fmt::format("{:.2f} to {:.2f}", ci->second[0], ci->second[1]);
+      }
+      rows.push_back({joint, fmt::format("{:.2f}", before->second), fmt::format("{:.2f}", after->second), width});
+    }
+    page_.table({"encoder - true, deg", "before", "after", "95 % interval"}, rows);
+    page_.paragraph(
+        "Compliance, gain, slip and drift trade a constant with the offset of their joint, so an offset "
+        "may move while the joint's whole correction stays.");
+  }
+
+  void candidates() {
+    std::vector<CandidateBar> bars;
+    for (const auto& bar : d_.bars) {
+      if (bar.testable) bars.push_back(bar);
+    }
+    if (bars.empty()) return;
+    page_.heading("All candidates");
+    page_.paragraph(
+        fmt::format("How much of the residual of held-out blocks each cause of the catalogue takes away when it alone is "
+                    "added to the model: before, to the model of offsets and usual nuisances; after, to the extended "
+                    "one. A cause must take away {:.1f} %, stand out of the noise by z = {:.1f} (given with its name), "
+                    "and beat the others. Generic features (unexplained) compete on equal terms.",
+                    100.0 * d_.gain_threshold, d_.z_threshold));
+    std::stable_sort(bars.begin(), bars.end(),
+                     [](const auto& a, const auto& b) { return a.gain_before > b.gain_before; });
+    const auto draw = [&](std::size_t from, std::size_t to, const std::string& title) {
+      Chart chart;
+      chart.kind = Chart::Kind::kBar;
+      chart.horizontal = true;
+      chart.title = title;
+      chart.y_label = "held-out gain, %";
+      chart.threshold = 100.0 * d_.gain_threshold;
+      chart.threshold_name = fmt::format("threshold {:.1f} %", 100.0 * d_.gain_threshold);
+      chart.series = {{.name = "before", .colour = kRed}, {.name = "after", .colour = kBlue}};
+      for (std::size_t i = from; i < to; ++i) {
+        chart.labels.push_back(fmt::format("{}, z {:.1f}", bars[i].label, bars[i].z_before));
+        chart.series[0].y.push_back(100.0 * std::max(0.0, bars[i].gain_before));
+        chart.series[1].y.push_back(100.0 * std::max(0.0, bars[i].gain_after));
+      }
+      page_.chart(chart);
+    };
+    const std::size_t first = std::min(kBarsShown, bars.size());
+    draw(0, first, fmt::format("the {} strongest of {} candidates", first, bars.size()));
+    if (bars.size() == first) return;
+    page_.begin_details(fmt::format("The other {} candidates", bars.size() - first));
+    draw(first, bars.size(), "all others");
+    page_.end();
+  }
+
+  // ---- structure of what is left ----
+
+  void structure() {
+    page_.heading("What is left, and what it follows");
+    page_.paragraph(
+        "Every picture asks for a small correction of each joint alone. Without an error in the model these are "
+        "noise about zero; a line that follows something names an error. Lines are medians over equally many "
+        "pictures, bands their 95 % intervals; red with offsets and usual nuisances, blue with the extended "
+        "model, both predicted for blocks that the fit had not seen. Each chart shows the joint that follows its "
+        "variable most clearly.");
+    page_.begin_grid();
+    for (const auto& variable : variables()) chart_of(variable);
+    direction_of_motion();
+    other_joints();
+    over_pictures();
+    page_.end();
+    all_structure();
+  }
+
+  [[nodiscard]] bool known(const Variable& variable) const {
+    if (variable.name != "gravity torque") return true;
+    return std::any_of(d_.samples.begin(), d_.samples.end(), [](const ResidualSample& s) {
+      return std::any_of(s.torque_nm.begin(), s.torque_nm.end(), [](double t) { return t != 0.0; });
+    });
+  }
+
+  void chart_of(const Variable& variable) {
+    if (!known(variable)) return;
+    std::size_t strongest = 0;
+    double most = -1.0;
+    for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
+      const double strength = curve(j, variable, false).structure();
+      if (strength > most) {
+        most = strength;
+        strongest = j;
+      }
+    }
+    page_.chart(curves(d_.arm_joints[strongest] + (variable.name == "time" ? " over " : " against its ") + variable.name,
+                       variable.name + ", " + variable.axis, "correction asked for, deg",
+                       before_and_after(curve(strongest, variable, false), curve(strongest, variable, true))));
+  }
+
+  [[nodiscard]] Curve curve(std::size_t joint, const Variable& variable, bool after) const {
+    return curve_of(d_, [&](const ResidualSample& s) { return variable.of(s, joint); }, apparent(joint, after));
+  }
+
+  static std::vector<ChartSeries> before_and_after(const Curve& before, const Curve& after) {
+    return {series_of("before", before, kRed), series_of("extended", after, kBlue)};
+  }
+
+  /// The same angles on the way up and on the way down: backlash opens a gap between them.
+  void direction_of_motion() {
+    constexpr double kMoving_deg_s = 2.0;
+    const auto one_way = [&](std::size_t j, double sign, bool after) {
+      return curve_of(
+          d_, [j](const ResidualSample& s) { return s.angle_deg[j]; },
+          [&, j](const ResidualSample& s) {
+            return sign * s.velocity_deg_s[j] > kMoving_deg_s ? apparent(j, after)(s) : std::nan("");
+          },
+          false);
+    };
+    std::size_t widest = 0;
+    double most = -1.0;
+    for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
+      const auto up = one_way(j, 1.0, false), down = one_way(j, -1.0, false);
+      if (up.y.empty() || down.y.empty()) continue;
+      const auto mean = [](const Curve& c) {
+        return std::accumulate(c.y.begin(), c.y.end(), 0.0) / static_cast<double>(c.y.size());
+      };
+      const auto noise = [](const Curve& c) {
+        double sum = 0.0;
+        for (std::size_t i = 0; i < c.y.size(); ++i) sum += std::pow((c.high[i] - c.low[i]) / 3.92, 2);
+        return sum / std::pow(static_cast<double>(c.y.size()), 2);
+      };
+      const double strength = std::abs(mean(up) - mean(down)) / std::sqrt(noise(up) + noise(down) + 1e-12);
+      if (strength > most) {
+        most = strength;
+        widest = j;
+      }
+    }
+    if (most < 0.0) return;
+    page_.chart(curves(d_.arm_joints[widest] + ", rising against falling", "angle, deg",
+                       "correction asked for, deg",
+                       {series_of("rising, before", one_way(widest, 1.0, false), kRed),
+                        series_of("falling, before", one_way(widest, -1.0, false), kOchre),
+                        series_of("rising, extended", one_way(widest, 1.0, true), kBlue),
+                        series_of("falling, extended", one_way(widest, -1.0, true), kGreen)}));
+  }
+
+  void other_joints() {
+    std::size_t follower = 0, leader = 0;
+    double most = -1.0;
+    const auto pair = [&](std::size_t i, std::size_t j, bool after) {
+      return curve_of(d_, [j](const ResidualSample& s) { return s.angle_deg[j]; }, apparent(i, after));
+    };
+    for (std::size_t i = 0; i < d_.arm_joints.size(); ++i) {
+      for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
+        if (i == j) continue;
+        const double strength = pair(i, j, false).structure();
+        if (strength > most) {
+          most = strength;
+          follower = i;
+          leader = j;
+        }
+      }
+    }
+    if (most < 0.0) return;
+    page_.chart(curves(d_.arm_joints[follower] + " against another joint: " + d_.arm_joints[leader],
+                       d_.arm_joints[leader] + ", deg", "correction asked for, deg",
+                       before_and_after(pair(follower, leader, false), pair(follower, leader, true))));
+  }
+
+  void over_pictures() {
+    const auto both = [&](const Value& x, const Value& before, const Value& after, bool centred = false) {
+      return before_and_after(curve_of(d_, x, before, centred), curve_of(d_, x, after, centred));
+    };
+    const Value rms_before = [](const ResidualSample& s) { return s.rms_px_before; };
+    const Value rms_after = [](const ResidualSample& s) { return s.rms_px_after; };
+    const Value mean_before = [](const ResidualSample& s) { return s.mean_px_before; };
+    const Value mean_after = [](const ResidualSample& s) { return s.mean_px_after; };
+    page_.chart(curves("outline residual over time", "time, s", "rms, px",
+                       both([](const ResidualSample& s) { return s.time_s; }, rms_before, rms_after)));
+    if (std::none_of(d_.samples.begin(), d_.samples.end(), [](const auto& s) { return s.depth_m > 0.0; })) return;
+    const Value radius = [](const ResidualSample& s) { return s.image_radius_px; };
+    const Value depth = [](const ResidualSample& s) { return s.depth_m; };
+    page_.chart(curves("outline against image radius", "hand from the picture's centre, px",
+                       "mean along the outward normal, px", both(radius, mean_before, mean_after)));
+    page_.chart(curves("outline against depth", "hand from the eye, m", "mean along the outward normal, px",
+                       both(depth, mean_before, mean_after)));
+    page_.chart(curves("residual against depth", "hand from the eye, m", "rms, px",
+                       both(depth, rms_before, rms_after)));
+  }
+
+  void all_structure() {
+    std::vector<std::string> head = {"deg, before > after"};
+    for (const auto& variable : variables()) {
+      if (known(variable)) head.push_back(variable.name);
+    }
+    std::vector<std::vector<std::string>> rows;
+    for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
+      std::vector<std::string> row = {d_.arm_joints[j]};
+      for (const auto& variable : variables()) {
+        if (!known(variable)) continue;
+        row.push_back(fmt::format("{:.2f} > {:.2f}", curve(j, variable, false).size(), curve(j, variable, true).size()));
+      }
+      rows.push_back(std::move(row));
+    }
+    page_.begin_details("Every joint against every variable, as numbers");
+    page_.paragraph("Root mean square of what follows the variable, its noise taken off.");
+    page_.table(head, rows);
+    page_.end();
+  }
+
+  // ---- what the log is good for ----
+
+  void limits() {
+    page_.heading("What this log cannot test");
+    if (d_.not_testable.empty()) page_.paragraph("Every cause of the catalogue can be tested with it.");
+    std::map<std::string, std::vector<std::string>> by_reason;
+    std::vector<std::string> reasons;
+    for (const auto& item : d_.not_testable) {
+      if (by_reason.find(item.reason) == by_reason.end()) reasons.push_back(item.reason);
+      by_reason[item.reason].push_back(item.cause.text());
+    }
+    std::vector<std::string> items;
+    for (const auto& reason : reasons) {
+      std::string list;
+      for (const auto& cause : by_reason[reason]) list += (list.empty() ? "" : ", ") + cause;
+      items.push_back(reason + ": " + list);
+    }
+    if (!items.empty()) page_.list(items);
+    if (d_.exclusion_limits.empty()) return;
+    std::vector<std::vector<std::string>> rows;
+    for (const auto& limit : d_.exclusion_limits) {
+      rows.push_back({limit.cause.text(), limit.parameter,
+                      fmt::format("{:.3g}{}", limit.limit, limit.unit == "1" ? "" : " " + limit.unit)});
+    }
+    page_.begin_details(fmt::format("What it excludes: {} limits", rows.size()));
+    page_.paragraph("With 95 % confidence these causes are smaller than:");
+    page_.table({"cause", "parameter", "at most"}, rows);
+    page_.end();
+  }
+
+  void log() {
+    page_.heading("The log");
+    std::vector<std::string> items = {fmt::format("{:.1f} s, {} pictures used, {} blocks of {:.1f} s", d_.duration_s,
+                                                  d_.views, d_.blocks, d_.block_s)};
+    if (d_.noise_correlation_s > 0.0) {
+      items.push_back(fmt::format("noise stays alike for {:.2f} s (measured while the arm rested)", d_.noise_correlation_s));
+    }
+    items.insert(items.end(), d_.warnings.begin(), d_.warnings.end());
+    page_.list(items);
+    page_.paragraph("extended_model.yaml beside this page holds the extended model. bodyschemad, bodyschema replay and "
+                    "bodyschema export take it with --extended-model.");
+  }
+
+  const DiagnosisReport& d_;
+  Report page_;
+};
+
+}  // namespace
+
+Report diagnosis_page(const DiagnosisReport& diagnosis, const std::string& title,
+                      const std::vector<std::pair<Image, std::string>>& pictures) {
+  return Page(diagnosis, title).write(pictures);
+}
+
+}  // namespace bodyschema

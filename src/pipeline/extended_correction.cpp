@@ -1,0 +1,113 @@
+#include <algorithm>
+#include <map>
+
+#include "bodyschema/effects/corrected_kinematics.hpp"
+#include "bodyschema/pipeline/export_correction.hpp"
+
+namespace bodyschema {
+namespace {
+
+/// What a URDF or a list of intrinsics cannot hold, and what can be done instead.
+const std::map<std::string, std::string> kRemarks = {
+    {"compliance", "the joint gives way with gravity's torque, which depends on the posture"},
+    {"payload", "the arm sags under the load; take the load off, or correct in the controller"},
+    {"backlash", "depends on the direction of motion; approach targets from one side"},
+    {"encoder_gain", "scale the reading, offset taken off, by 1 + gain where the encoder is read"},
+    {"eccentricity", "add sine * sin q + cosine * cos q where the encoder is read"},
+    {"joint_coupling", "correct the coupling matrix where encoders are read"},
+    {"latency", "stamp the pictures earlier by the delay"},
+    {"camera_skew", "stamp the right camera's pictures later by the skew"},
+    {"silhouette_bias", "belongs to the segmentation, not to the robot"},
+    {"mesh_scale", "scale the visual meshes; collision meshes may be right"},
+    {"finger_posture", "the finger encoders' zero; recalibrate the hand"},
+    {"drift", "changes with time: the replay's offsets are those at its end; calibrate again"},
+    {"slip", "happened once: the replay's offsets are those after it"}};
+
+bool in_cameras(const std::string& name) {
+  return name == "focal_length" || name == "principal_point" || name == "distortion";
+}
+
+bool in_urdf(const std::string& name) {
+  return name == "head_offset" || name == "vergence" || name == "link_length" ||
+         name == "axis_tilt" || name == "baseline" || name == "base_shift";
+}
+
+Instant at_rest(Eigen::Index joints, std::size_t camera) {
+  Instant at;
+  at.camera = camera;
+  at.encoder = at.q = at.qdot = Eigen::VectorXd::Zero(joints);
+  return at;
+}
+
+/// The rotation vector of a tilt in the joint's parent frame.
+Eigen::Vector3d tilt_in_parent(const std::shared_ptr<const RobotModel>& robot, const StereoRig& rig,
+                               Eigen::Index joint, const JointAdjustment& adjustment) {
+  const auto& info = robot->joints()[static_cast<std::size_t>(joint)];
+  CorrectedKinematics kinematics(robot, {info.parent_link, info.child_link}, {rig.cameras.front().link});
+  std::vector<Pose> X_CL(2);
+  kinematics.compute(Eigen::VectorXd::Zero(robot->joint_count()), Corrections(robot->joint_count()), 0, X_CL);
+  const Eigen::Vector3d tilt_W = adjustment.tilt_1_rad * kinematics.tilt_axis(joint, 0) +
+                                 adjustment.tilt_2_rad * kinematics.tilt_axis(joint, 1);
+  return (kinematics.X_WC() * X_CL.front()).linear().transpose() * tilt_W;
+}
+
+/// The whole arm moved along the root's axes: its first joint, in the frame of the link that carries it.
+JointPlacement shifted_base(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                            const Eigen::Vector3d& shift_W) {
+  // The estimated joint nearest to the root carries the others.
+  Eigen::Index first = robot->joint_index(setup.estimated_joints.front());
+  for (const auto& name : setup.estimated_joints) first = std::min(first, robot->joint_index(name));
+  const auto& joint = robot->joints()[static_cast<std::size_t>(first)];
+  ForwardKinematics kinematics(robot, {joint.parent_link});
+  std::vector<Pose> X_WL(1);
+  kinematics.compute(setup.default_joints(*robot), X_WL);
+  return {joint.name, 0.0, X_WL.front().linear().transpose() * shift_W, Eigen::Vector3d::Zero()};
+}
+
+}  // namespace
+
+std::vector<AppliedEffect> add_extended_model(const ErrorModel& model,
+                                              const std::shared_ptr<const RobotModel>& robot,
+                                              const RobotSetup& setup, const StereoRig& rig,
+                                              Correction& correction) {
+  const auto joints = robot->joint_count();
+  std::vector<AppliedEffect> list;
+  for (std::size_t e = 0; e < model.size(); ++e) {
+    const Effect& effect = model[e];
+    if (effect.name() == "joint_offset") continue;
+    AppliedEffect entry{describe(effect), "", ""};
+    if (in_cameras(effect.name())) {
+      entry.applied = "cameras.yaml";
+    } else if (in_urdf(effect.name())) {
+      entry.applied = "corrected.urdf";
+      for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+        Corrections change(joints);
+        effect.apply(at_rest(joints, c), change);
+        if (change.camera.shift_x_m != 0.0) {
+          correction.camera_shifts_m.emplace_back(rig.cameras[c].link, change.camera.shift_x_m);
+        }
+        if (c > 0) continue;  // the rest changes for all cameras alike
+        if (change.base_shift_m.norm() > 0.0) {
+          correction.placements.push_back(shifted_base(robot, setup, change.base_shift_m));
+          entry.remark = "at the first arm joint, for a torso that stands as configured";
+        }
+        for (Eigen::Index j = 0; j < joints; ++j) {
+          const auto& name = robot->joints()[static_cast<std::size_t>(j)].name;
+          if (change.dq[j] != 0.0) correction.known_offsets_rad.emplace_back(name, -change.dq[j]);
+          const auto& adjustment = change.adjustments[static_cast<std::size_t>(j)];
+          if (adjustment.is_zero()) continue;
+          const bool tilted = adjustment.tilt_1_rad != 0.0 || adjustment.tilt_2_rad != 0.0;
+          correction.placements.push_back(
+              {name, adjustment.along_m, Eigen::Vector3d::Zero(),
+               tilted ? tilt_in_parent(robot, rig, j, adjustment) : Eigen::Vector3d::Zero().eval()});
+        }
+      }
+    } else if (const auto remark = kRemarks.find(effect.name()); remark != kRemarks.end()) {
+      entry.remark = remark->second;
+    }
+    list.push_back(std::move(entry));
+  }
+  return list;
+}
+
+}  // namespace bodyschema
