@@ -168,6 +168,7 @@ struct Estimator::Impl {
       frame_state = fusion.frame_state();
       if (particles_only() || fusion.frames() < 0.5) frame_state.x = state;
       current = EstimatorState::kHandNotInView;
+      contradicted = false;
       best_likelihood = 0.0;
     } else {
       score_particles(observation);
@@ -329,10 +330,16 @@ struct Estimator::Impl {
       const Eigen::VectorXd alone =
           first_look.solve_with(best.evidence, best.x, variance) - best.x;
       gain = (best.evidence.cost - predicted_cost(best.evidence, alone)) / variance;
-      accepted = fits(best.evidence) && gain < kSurprise;
+      // A slip shows as frames that pull far more than frames did until now. One may be a stray.
+      const bool doubtful = gain > kDoubt && gain > kDoubtRatio * usual_pull;
+      doubtful_frames = doubtful ? doubtful_frames + 1 : 0;
+      accepted = fits(best.evidence) && gain < kSurprise && doubtful_frames < 2;
     }
-    if (accepted) {
+    if (accepted && doubtful_frames > 0) {
+      // Not believed yet: the memory stays as it is.
+    } else if (accepted) {
       surprised_frames = 0;
+      usual_pull += (gain - usual_pull) / kUsualFrames;
       // What no constant offset explains (an error that is not in the model) shows as frames that
       // keep pulling away; then only recent ones are worth remembering.
       const double pull = std::max(1.0, gain / kUsualPull);
@@ -340,12 +347,15 @@ struct Estimator::Impl {
       fusion.add(best.evidence, best.x, variance, 1.0 / options.correlated_frames);
     } else {
       // Nothing known yet, or what is known no longer fits: look again from the best particles.
+      doubtful_frames = 0;
+      usual_pull = 0.0;
       Candidate found = search(observation);
       const bool good = fits(found.evidence) && found.distance < options.lock_distance;
       if (fusion.frames() > 0.5) {
         ++surprised_frames;
         if (good || surprised_frames > 5) {
           fusion.forget_all();
+          surprised_frames = good ? 0 : surprised_frames;
           if (!good) filter.reset(state.head(joints));
         }
       }
@@ -356,7 +366,9 @@ struct Estimator::Impl {
       }
     }
     state = fusion.frames() > 0.5 ? fusion.mean() : best.x;
-    frame_state = fusion.frame_state(best.evidence, best.x, variance);
+    // A frame that the memory contradicts speaks for itself alone, with the uncertainty that has.
+    contradicted = fusion.frames() > 0.5 && (doubtful_frames > 0 || surprised_frames > 0);
+    frame_state = (contradicted ? first_look : fusion).frame_state(best.evidence, best.x, variance);
     contour_rms_px = best.evidence.rms_px();
     place(observation, frame_state.x, 0);
     const Eigen::Index first = 0;
@@ -433,7 +445,7 @@ struct Estimator::Impl {
     if (particles_only()) {
       estimate.covariance_rad2 = cloud_covariance.size() > 0 ? cloud_covariance : filter.covariance();
     } else {
-      const Eigen::MatrixXd covariance = fusion.covariance();
+      const Eigen::MatrixXd covariance = contradicted ? frame_state.covariance : fusion.covariance();
       estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
       for (std::size_t k = static_cast<std::size_t>(joints); k < parameters.size(); ++k) {
         estimate.nuisance_names.push_back(parameters[k].name);
@@ -459,7 +471,7 @@ struct Estimator::Impl {
       }
     }
     estimate.weakest = weakest(estimate.covariance_rad2);
-    if (!particles_only() && current == EstimatorState::kConverging &&
+    if (!particles_only() && !contradicted && current == EstimatorState::kConverging &&
         fusion.frames() > 4.5 && estimate.hand_sd_m < options.converged_hand_sd_m) {
       current = EstimatorState::kConverged;
     }
@@ -518,13 +530,19 @@ struct Estimator::Impl {
     current = EstimatorState::kHandNotInView;
     cloud_covariance.resize(0, 0);
     best_likelihood = effective_size = contour_rms_px = 0.0;
-    surprised_frames = 0;
+    surprised_frames = doubtful_frames = 0;
+    usual_pull = 0.0;
+    contradicted = false;
   }
 
   static constexpr double kMaxStep_rad = 0.2;
   static constexpr double kSearchSpread_rad = 0.0349066;  ///< 2 deg
   static constexpr double kUsualPull = 20.0;  ///< chi-square of a frame that agrees with the memory
   static constexpr double kSurprise = 400.0;  ///< chi-square of a frame that contradicts the memory
+  /// Two frames in a row above this, and above so many times what was usual, contradict it too.
+  static constexpr double kDoubt = 80.0;
+  static constexpr double kDoubtRatio = 8.0;
+  static constexpr double kUsualFrames = 30.0;  ///< over which "usual" is averaged
 
   EstimatorOptions options;
   RobotSetup setup;
@@ -548,6 +566,9 @@ struct Estimator::Impl {
   double effective_size = 0.0;
   double contour_rms_px = 0.0;
   int surprised_frames = 0;
+  int doubtful_frames = 0;
+  bool contradicted = false;
+  double usual_pull = 0.0;  ///< recent mean of what frames pulled, chi-square
   Eigen::MatrixXd cloud_covariance;
   StageTimes times;
 
