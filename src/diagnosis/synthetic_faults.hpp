@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bodyschema/diagnosis/synthetic_log.hpp"
-#include "bodyschema/effects/corrections.hpp"
+#include "bodyschema/observation/corrections.hpp"
 #include "synthetic_path.hpp"
 
 namespace bodyschema::diagnosis {

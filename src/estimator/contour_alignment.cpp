@@ -103,7 +103,8 @@ void ContourAlignment::linearise(const Observation& observation, const Eigen::Ve
   evidence.cost = 0.0;
   evidence.matched = evidence.sampled = 0;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (c < observation.cameras.size() && observation.cameras[c]) {
+    if (c < observation.cameras.size() && observation.cameras[c] &&
+        !observation.cameras[c]->mask.empty()) {
       add_camera(*observation.cameras[c], x, c, search_px, evidence);
     }
   }

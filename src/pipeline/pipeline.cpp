@@ -14,6 +14,10 @@
 namespace bodyschema {
 namespace {
 
+/// A picture that does not change while a joint moves this far was not taken anew; beyond the noise
+/// and rounding of encoders.
+constexpr double kFrozenMotion_rad = 0.005;
+
 /// FNV-1a, 64 bit: names a model, protects nothing.
 class Digest {
  public:
@@ -123,6 +127,12 @@ bool Pipeline::segment(Observation& observation) {
   for (std::size_t c = 0; c < eyes_.size(); ++c) {
     if (!observation.cameras[c]) continue;
     CameraObservation& seen = *observation.cameras[c];
+    if (eyes_[c].frozen.look(seen.image, seen.joints.q) &&
+        eyes_[c].frozen.moved_rad() > kFrozenMotion_rad) {
+      seen.mask = seen.valid = BinaryMask();
+      seen.coverage.clear();
+      continue;
+    }
     straighten(seen, c);
     BinaryMask predicted;
     if (predict) predicted = estimator_.predicted_silhouette(observation, c, true);

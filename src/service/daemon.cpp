@@ -14,6 +14,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/pipeline/estimate_line.hpp"
+#include "bodyschema/pipeline/frozen_picture.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/service/live_page.hpp"
 #include "bodyschema/service/notifier.hpp"
@@ -42,39 +43,18 @@ double ms_between(std::int64_t from_us, std::int64_t to_us) {
   return 1e-3 * static_cast<double>(to_us - from_us);
 }
 
-/// Notices a camera that goes on sending one and the same picture.
-class FrozenPictureDetector {
+/// For how long a camera has sent one and the same picture.
+class FrozenPictureClock {
  public:
   void look(const CameraObservation& seen, std::int64_t now_us, CameraFacts& facts) {
-    const std::uint64_t digest = digest_of(seen.image);
-    if (digest != digest_ || since_us_ < 0) {
-      digest_ = digest;
-      since_us_ = now_us;
-      q_ = seen.joints.q;
-      moved_rad_ = 0.0;
-    }
-    moved_rad_ = std::max(moved_rad_, (seen.joints.q - q_).cwiseAbs().maxCoeff());
+    if (!picture_.look(seen.image, seen.joints.q)) since_us_ = now_us;
     facts.unchanged_ms = ms_between(since_us_, now_us);
-    facts.moved_meanwhile_rad = moved_rad_;
+    facts.moved_meanwhile_rad = picture_.moved_rad();
   }
 
  private:
-  static std::uint64_t digest_of(const Image& image) {
-    std::uint64_t state = 0xcbf29ce484222325ull;
-    std::size_t i = 0;
-    for (; i + sizeof(std::uint64_t) <= image.data.size(); i += sizeof(std::uint64_t)) {
-      std::uint64_t word = 0;
-      std::memcpy(&word, image.data.data() + i, sizeof word);
-      state = (state ^ word) * 0x100000001b3ull;
-    }
-    for (; i < image.data.size(); ++i) state = (state ^ image.data[i]) * 0x100000001b3ull;
-    return state;
-  }
-
-  std::uint64_t digest_ = 0;
+  FrozenPicture picture_;
   std::int64_t since_us_ = -1;
-  Eigen::VectorXd q_;
-  double moved_rad_ = 0.0;
 };
 
 double brightness_of(const Image& image) {
@@ -98,7 +78,7 @@ struct Session {
   ObservationQueue queue;
   LcmLink link;
   Receiver receiver;
-  std::vector<FrozenPictureDetector> frozen;
+  std::vector<FrozenPictureClock> frozen;
 };
 
 class Daemon {

@@ -104,6 +104,42 @@ TEST_F(EstimatorOnOwnRobot, WithoutRefinementTheSharperLikelihoodStillReducesThe
   EXPECT_GT(estimate.hand_sd_m, 0.0);
 }
 
+TEST_F(EstimatorOnOwnRobot, ACameraWithoutAMaskIsAsGoodAsAbsent) {
+  Estimator without(robot_, setup_, rig_, options_);
+  Estimator absent(robot_, setup_, rig_, options_);
+  for (int frame = 0; frame < 4; ++frame) {
+    Observation seen = reach_->observe(pose(frame / 4.0), frame * 33'333);
+    seen.cameras[0]->mask = BinaryMask();
+    seen.cameras[0]->coverage.clear();
+    Observation one_eye = seen;
+    one_eye.cameras[0].reset();
+    one_eye.utime = seen.utime;
+    EXPECT_EQ(without.step(seen).offset_rad, absent.step(one_eye).offset_rad) << frame;
+  }
+}
+
+// The offset of one joint changes in mid-run: within two frames the old memory is gone, and the
+// estimates in between do not call themselves converged.
+TEST_F(EstimatorOnOwnRobot, AnotherOffsetIsNoticedAtOnce) {
+  Estimator estimator(robot_, setup_, rig_, options_);
+  for (int frame = 0; frame < 30; ++frame) {
+    estimator.step(reach_->observe(pose(frame / 60.0), frame * 33'333));
+  }
+  Eigen::VectorXd slipped = offset_rad_;
+  slipped(6) += radians(5.0);
+  SyntheticReach after(robot_, setup_, rig_, slipped);
+  for (int frame = 30; frame < 45; ++frame) {
+    const Estimate estimate = estimator.step(after.observe(pose(frame / 60.0), frame * 33'333));
+    const double error_m = position_error_m(estimate, after.true_hand(pose(frame / 60.0), 0));
+    if (estimate.state == EstimatorState::kConverged) {
+      EXPECT_LT(error_m, 2e-3) << frame;
+    }
+    if (frame > 33) {
+      EXPECT_LT(error_m, 1e-3) << frame;
+    }
+  }
+}
+
 TEST_F(EstimatorOnOwnRobot, PaperModeReducesTheError) {
   options_.mode = EstimatorMode::kPaper;
   Estimator estimator(robot_, setup_, rig_, options_);

@@ -165,6 +165,17 @@ TEST_F(World, BothCamerasDie) {
           .words = "no pictures on ICUB_CAMERAS for", .level = HealthLevel::kStale});
 }
 
+TEST_F(World, CameraFreezes) {
+  std::vector<std::uint8_t> frozen;
+  suffer({.name = "left camera freezes",
+          .faults = {.pictures = [frozen](images_t& p, LcmLink&) mutable {
+                       if (frozen.empty()) frozen = p.images[0].data;
+                       p.images[0].data = frozen;
+                       return true;
+                     }, .joints = {}},
+          .words = "the left camera has shown the same picture for", .notice_s = 15.0});
+}
+
 TEST_F(World, CamerasSwapped) {
   suffer({.name = "left and right swapped",
           .faults = {.pictures = [](images_t& p, LcmLink&) {

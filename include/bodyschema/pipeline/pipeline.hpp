@@ -11,6 +11,7 @@
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/effects/error_model.hpp"
 #include "bodyschema/estimator/estimator.hpp"
+#include "bodyschema/pipeline/frozen_picture.hpp"
 #include "bodyschema/robot/robot_model.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
 #include "bodyschema/vision/segmenter.hpp"
@@ -31,7 +32,8 @@ class Pipeline {
 
   /// Fills in the observation's masks and takes one step of the estimator: segment(), estimate().
   Estimate process(Observation& observation);
-  /// Straightens the pictures and fills in the masks. False while the background is being learned.
+  /// Straightens the pictures and fills in the masks. A camera that repeats its last picture while
+  /// the arm moves gets none: it is frozen. False while the background is being learned.
   bool segment(Observation& observation);
   /// One step of the estimator on an observation that has its masks.
   Estimate estimate(const Observation& observation);
@@ -63,6 +65,7 @@ class Pipeline {
   struct Eye {
     Segmenter segmenter;
     std::optional<Undistorter> undistorter;
+    FrozenPicture frozen{};
   };
   void straighten(CameraObservation& seen, std::size_t camera);
 
