@@ -55,9 +55,20 @@ class LogDiagnosis {
     };
     diagnosis.before_iteration = [this](int iteration) {
       constexpr double kSearch_px[] = {8.0, 6.0, 4.0};
-      measurement_.set_search(kSearch_px[std::min(iteration, 2)]);
+      constexpr double kRefitSearch_px[] = {24.0, 18.0, 14.0, 10.0, 7.0, 5.0, 4.0};
+      if (iteration >= kRefit && wide_refit_) {
+        measurement_.set_search(kRefitSearch_px[std::min<std::size_t>(refits_++, std::size(kRefitSearch_px) - 1)]);
+      } else {
+        measurement_.set_search(kSearch_px[std::min(iteration, 2)]);
+      }
     };
     auto report = diagnosed(diagnosis);
+    if (report.before.rms_px > 0.0 && report.after.rms_px <= 0.0) {
+      // Causes so large that their linear estimate lost the outlines: look for them further off.
+      wide_refit_ = true;
+      diagnosis.refit_iterations = std::max(diagnosis.refit_iterations, 12);
+      report = diagnosed(diagnosis);
+    }
     add_remarks(report);
     LogPictures::place_hand(pipeline_, measurement_.views(), report);
     if (!options_.out.empty()) {
@@ -257,6 +268,7 @@ class LogDiagnosis {
   }
 
   static constexpr Microseconds kLearnEvery = 90'000;
+  static constexpr int kRefit = 1000;  ///< DiagnosisOptions::before_iteration counts the refit from here
   static constexpr double kMostStep_rad = 0.2;
   static constexpr double kShapeError_px = 0.8;  ///< rms after the extension; a good model leaves 0.3
   static constexpr double kStill_rad = 0.5 * kPi / 180.0;
@@ -272,6 +284,8 @@ class LogDiagnosis {
     BusStatistics bus;
     std::vector<std::string> missing_joints;
   } facts_;  ///< of the last pass over the log
+  bool wide_refit_ = false;
+  std::size_t refits_ = 0;
   std::size_t pictures_seen_ = 0, pictures_with_arm_ = 0;
 };
 

@@ -39,16 +39,27 @@ Instant at_rest(Eigen::Index joints, std::size_t camera) {
   return at;
 }
 
-/// The rotation vector of a tilt in the joint's parent frame.
-Eigen::Vector3d tilt_in_parent(const std::shared_ptr<const RobotModel>& robot, const StereoRig& rig,
-                               Eigen::Index joint, const JointAdjustment& adjustment) {
+/// Where an adjustment puts the joint, in terms of the URDF: along its axis as written there, and a
+/// rotation vector in its parent's frame.
+JointPlacement placed(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                      const StereoRig& rig, Eigen::Index joint, const JointAdjustment& adjustment) {
   const auto& info = robot->joints()[static_cast<std::size_t>(joint)];
-  CorrectedKinematics kinematics(robot, {info.parent_link, info.child_link}, {rig.cameras.front().link});
-  std::vector<Pose> X_CL(2);
-  kinematics.compute(Eigen::VectorXd::Zero(robot->joint_count()), Corrections(robot->joint_count()), 0, X_CL);
+  CorrectedKinematics kinematics(robot, {info.parent_link, info.child_link, setup.hand_link},
+                                 {rig.cameras.front().link});
+  const Eigen::VectorXd q = Eigen::VectorXd::Zero(robot->joint_count());
+  Corrections corrections(robot->joint_count());
+  std::vector<Pose> X_CL(3), moved(3);
+  kinematics.compute(q, corrections, 0, X_CL);
+  corrections.adjustments[static_cast<std::size_t>(joint)].along_m = adjustment.along_m;
+  kinematics.compute(q, corrections, 0, moved);
+  // An adjustment counts away from the root, whichever way the URDF's axis points.
+  const Eigen::Vector3d axis_W = kinematics.tilt_axis(joint, 0).cross(kinematics.tilt_axis(joint, 1));
+  const Eigen::Vector3d step_W =
+      kinematics.X_WC().linear() * (moved[1].translation() - X_CL[1].translation());
   const Eigen::Vector3d tilt_W = adjustment.tilt_1_rad * kinematics.tilt_axis(joint, 0) +
                                  adjustment.tilt_2_rad * kinematics.tilt_axis(joint, 1);
-  return (kinematics.X_WC() * X_CL.front()).linear().transpose() * tilt_W;
+  return {info.name, axis_W.dot(step_W), Eigen::Vector3d::Zero(),
+          (kinematics.X_WC() * X_CL.front()).linear().transpose() * tilt_W};
 }
 
 /// The whole arm moved along the root's axes: its first joint, in the frame of the link that carries it.
@@ -95,11 +106,7 @@ std::vector<AppliedEffect> add_extended_model(const ErrorModel& model,
           const auto& name = robot->joints()[static_cast<std::size_t>(j)].name;
           if (change.dq[j] != 0.0) correction.known_offsets_rad.emplace_back(name, -change.dq[j]);
           const auto& adjustment = change.adjustments[static_cast<std::size_t>(j)];
-          if (adjustment.is_zero()) continue;
-          const bool tilted = adjustment.tilt_1_rad != 0.0 || adjustment.tilt_2_rad != 0.0;
-          correction.placements.push_back(
-              {name, adjustment.along_m, Eigen::Vector3d::Zero(),
-               tilted ? tilt_in_parent(robot, rig, j, adjustment) : Eigen::Vector3d::Zero().eval()});
+          if (!adjustment.is_zero()) correction.placements.push_back(placed(robot, setup, rig, j, adjustment));
         }
       }
     } else if (const auto remark = kRemarks.find(effect.name()); remark != kRemarks.end()) {
