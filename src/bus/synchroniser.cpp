@@ -22,11 +22,8 @@ std::uint64_t SynchroniserStatistics::total_dropped() const {
 }
 
 Microseconds Synchroniser::Camera::shortest_interval() const {
-  Microseconds shortest = 0;
-  for (const Microseconds interval : intervals) {
-    if (interval > 0 && (shortest == 0 || interval < shortest)) shortest = interval;
-  }
-  return shortest;
+  // The first few may all be long, pictures being lost: 0, that is any, until enough are known.
+  return *std::min_element(intervals.begin(), intervals.end());
 }
 
 Microseconds Synchroniser::Instant::utime() const { return images[0] ? images[0]->utime : images[1]->utime; }
