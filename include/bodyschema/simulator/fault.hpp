@@ -133,7 +133,7 @@ class FaultArguments {
 };
 
 /// Where a fault of a kind could sit, and how small it can be and still be found 90 % of the time
-/// in a 50 s log (shared/design figures of the diagnosis; `spec` lacks only its value).
+/// in a 50 s log (from trials of the diagnosis; `spec` lacks only its value).
 struct FaultTarget {
   FaultSpec spec;
   double detectable = 0.0;
