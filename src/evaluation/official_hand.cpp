@@ -2,15 +2,11 @@
 
 #include <tinyxml2.h>
 
-#include <Eigen/Geometry>
-#include <locale>
-#include <map>
 #include <set>
-#include <sstream>
-#include <spdlog/fmt/fmt.h>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/geometry/pose.hpp"
+#include "bodyschema/robot/urdf_origin.hpp"
 
 namespace bodyschema {
 namespace {
@@ -37,35 +33,19 @@ std::string name_of(const XMLElement* element) {
   return name != nullptr ? name : "";
 }
 
-Eigen::Vector3d triple(const XMLElement* element, const char* attribute) {
-  Eigen::Vector3d v = Eigen::Vector3d::Zero();
-  const char* text = element != nullptr ? element->Attribute(attribute) : nullptr;
-  if (text == nullptr) return v;
-  std::istringstream stream(text);
-  stream.imbue(std::locale::classic());
-  stream >> v.x() >> v.y() >> v.z();
-  return v;
-}
-
-/// URDF's origin: fixed-axis roll, pitch, yaw.
 Pose origin_of(const XMLElement* joint) {
   const XMLElement* origin = joint->FirstChildElement("origin");
-  const Eigen::Vector3d rpy = triple(origin, "rpy");
   Pose X = Pose::Identity();
-  X.linear() = (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
-                Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
-                Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
-                   .toRotationMatrix();
-  X.translation() = triple(origin, "xyz");
+  if (origin == nullptr) return X;
+  X.linear() = urdf_rotation(urdf_triple(origin->Attribute("rpy")));
+  X.translation() = urdf_triple(origin->Attribute("xyz"));
   return X;
 }
 
 void set_origin(XMLElement* joint, const Pose& X) {
-  const Eigen::Vector3d p = X.translation();
-  const Eigen::Vector3d ypr = X.linear().eulerAngles(2, 1, 0);
   XMLElement* origin = joint->InsertNewChildElement("origin");
-  origin->SetAttribute("xyz", fmt::format("{:.12g} {:.12g} {:.12g}", p.x(), p.y(), p.z()).c_str());
-  origin->SetAttribute("rpy", fmt::format("{:.12g} {:.12g} {:.12g}", ypr[2], ypr[1], ypr[0]).c_str());
+  origin->SetAttribute("xyz", urdf_text(X.translation()).c_str());
+  origin->SetAttribute("rpy", urdf_text(urdf_rpy(X.linear())).c_str());
 }
 
 /// Links beyond `root`, itself included.

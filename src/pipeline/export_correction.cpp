@@ -12,6 +12,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/geometry/pose.hpp"
+#include "bodyschema/robot/urdf_origin.hpp"
 #include "estimate_json.hpp"
 
 namespace bodyschema {
@@ -21,33 +22,7 @@ using tinyxml2::XMLElement;
 
 Eigen::Vector3d triple(const XMLElement* element, const char* attribute,
                        const Eigen::Vector3d& fallback) {
-  const char* text = element != nullptr ? element->Attribute(attribute) : nullptr;
-  if (text == nullptr) return fallback;
-  Eigen::Vector3d v = fallback;
-  std::istringstream stream(text);
-  stream.imbue(std::locale::classic());
-  stream >> v.x() >> v.y() >> v.z();
-  return v;
-}
-
-std::string text_of(const Eigen::Vector3d& v) {
-  return fmt::format("{:.12g} {:.12g} {:.12g}", v.x(), v.y(), v.z());
-}
-
-/// URDF's fixed-axis roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll).
-Eigen::Matrix3d rotation_of(const Eigen::Vector3d& rpy) {
-  return (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
-          Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
-          Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
-      .toRotationMatrix();
-}
-
-Eigen::Vector3d rpy_of(const Eigen::Matrix3d& R) {
-  const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
-  if (std::hypot(R(0, 0), R(1, 0)) < 1e-9) {  // roll and yaw turn about the same line: roll takes all
-    return {std::atan2(-R(1, 2), R(1, 1)), pitch, 0.0};
-  }
-  return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
+  return urdf_triple(element != nullptr ? element->Attribute(attribute) : nullptr, fallback);
 }
 
 /// The joint's origin, made where there is none.
@@ -64,13 +39,13 @@ void correct_joint(tinyxml2::XMLDocument& document, XMLElement* joint, double of
   XMLElement* origin = origin_of(document, joint);
   const Eigen::Vector3d axis =
       triple(joint->FirstChildElement("axis"), "xyz", Eigen::Vector3d::UnitX()).normalized();
-  const Eigen::Matrix3d R = rotation_of(triple(origin, "rpy", Eigen::Vector3d::Zero()));
+  const Eigen::Matrix3d R = urdf_rotation(triple(origin, "rpy", Eigen::Vector3d::Zero()));
   if (std::string(joint->Attribute("type")) == "prismatic") {
     const Eigen::Vector3d p = triple(origin, "xyz", Eigen::Vector3d::Zero()) - R * axis * offset;
-    origin->SetAttribute("xyz", text_of(p).c_str());
+    origin->SetAttribute("xyz", urdf_text(p).c_str());
   } else {
     const Eigen::Matrix3d turned = R * Eigen::AngleAxisd(-offset, axis).toRotationMatrix();
-    origin->SetAttribute("rpy", text_of(rpy_of(turned)).c_str());
+    origin->SetAttribute("rpy", urdf_text(urdf_rpy(turned)).c_str());
   }
   if (XMLElement* limit = joint->FirstChildElement("limit")) {
     for (const char* side : {"lower", "upper"}) {
@@ -85,9 +60,9 @@ void correct_joint(tinyxml2::XMLDocument& document, XMLElement* joint, double of
 /// Moves the joint by `step` of its own frame.
 void move_joint(tinyxml2::XMLDocument& document, XMLElement* joint, const Eigen::Vector3d& step) {
   XMLElement* origin = origin_of(document, joint);
-  const Eigen::Matrix3d R = rotation_of(triple(origin, "rpy", Eigen::Vector3d::Zero()));
+  const Eigen::Matrix3d R = urdf_rotation(triple(origin, "rpy", Eigen::Vector3d::Zero()));
   const Eigen::Vector3d p = triple(origin, "xyz", Eigen::Vector3d::Zero()) + R * step;
-  origin->SetAttribute("xyz", text_of(p).c_str());
+  origin->SetAttribute("xyz", urdf_text(p).c_str());
 }
 
 void place_joint(tinyxml2::XMLDocument& document, XMLElement* joint, const JointPlacement& placement) {
@@ -96,17 +71,17 @@ void place_joint(tinyxml2::XMLDocument& document, XMLElement* joint, const Joint
   move_joint(document, joint, placement.along_m * axis);
   XMLElement* origin = origin_of(document, joint);
   const Eigen::Vector3d p = triple(origin, "xyz", Eigen::Vector3d::Zero()) + placement.shift_m;
-  origin->SetAttribute("xyz", text_of(p).c_str());
+  origin->SetAttribute("xyz", urdf_text(p).c_str());
   const double angle = placement.tilt.norm();
   if (angle == 0.0) return;
   const Eigen::Matrix3d R =
-      rotation_of(triple(origin_of(document, joint), "rpy", Eigen::Vector3d::Zero()));
+      urdf_rotation(triple(origin_of(document, joint), "rpy", Eigen::Vector3d::Zero()));
   axis = R.transpose() * (Eigen::AngleAxisd(angle, placement.tilt / angle) * (R * axis));
   if (axis_element == nullptr) {
     axis_element = document.NewElement("axis");
     joint->InsertEndChild(axis_element);
   }
-  axis_element->SetAttribute("xyz", text_of(axis).c_str());
+  axis_element->SetAttribute("xyz", urdf_text(axis).c_str());
 }
 
 XMLElement* find_joint_of_child(XMLElement* robot, const std::string& link) {

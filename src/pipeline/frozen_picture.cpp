@@ -21,18 +21,17 @@ std::uint64_t digest_of(const Image& image) {
 
 }  // namespace
 
-bool FrozenPicture::look(const Image& image, const Eigen::VectorXd& q) {
+void FrozenPicture::look(const Image& image, const Eigen::VectorXd& q) {
   const std::uint64_t digest = digest_of(image);
-  const bool same = !first_ && digest == digest_ && q.size() == q_.size();
-  if (!same) {
-    first_ = false;
-    digest_ = digest;
-    q_ = q;
-    moved_rad_ = 0.0;
-    return false;
+  repeated_ = !first_ && digest == digest_ && q.size() == q_.size();
+  if (repeated_) {
+    moved_rad_ = std::max(moved_rad_, (q - q_).cwiseAbs().maxCoeff());
+    return;
   }
-  moved_rad_ = std::max(moved_rad_, (q - q_).cwiseAbs().maxCoeff());
-  return true;
+  first_ = false;
+  digest_ = digest;
+  q_ = q;
+  moved_rad_ = 0.0;
 }
 
 }  // namespace bodyschema

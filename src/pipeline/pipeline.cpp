@@ -127,8 +127,9 @@ bool Pipeline::segment(Observation& observation) {
   for (std::size_t c = 0; c < eyes_.size(); ++c) {
     if (!observation.cameras[c]) continue;
     CameraObservation& seen = *observation.cameras[c];
-    if (eyes_[c].frozen.look(seen.image, seen.joints.q) &&
-        eyes_[c].frozen.moved_rad() > kFrozenMotion_rad) {
+    FrozenPicture& picture = eyes_[c].picture;
+    picture.look(seen.image, seen.joints.q);
+    if (picture.repeated() && picture.moved_rad() > kFrozenMotion_rad) {
       seen.mask = seen.valid = BinaryMask();
       seen.coverage.clear();
       continue;

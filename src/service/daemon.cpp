@@ -14,7 +14,6 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/pipeline/estimate_line.hpp"
-#include "bodyschema/pipeline/frozen_picture.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/service/live_page.hpp"
 #include "bodyschema/service/notifier.hpp"
@@ -43,20 +42,6 @@ double ms_between(std::int64_t from_us, std::int64_t to_us) {
   return 1e-3 * static_cast<double>(to_us - from_us);
 }
 
-/// For how long a camera has sent one and the same picture.
-class FrozenPictureClock {
- public:
-  void look(const CameraObservation& seen, std::int64_t now_us, CameraFacts& facts) {
-    if (!picture_.look(seen.image, seen.joints.q)) since_us_ = now_us;
-    facts.unchanged_ms = ms_between(since_us_, now_us);
-    facts.moved_meanwhile_rad = picture_.moved_rad();
-  }
-
- private:
-  FrozenPicture picture_;
-  std::int64_t since_us_ = -1;
-};
-
 double brightness_of(const Image& image) {
   constexpr std::size_t kStep = 61;  // every channel and column gets its turn
   std::uint64_t sum = 0;
@@ -72,13 +57,13 @@ struct Session {
         queue(static_cast<std::size_t>(pipeline->bus().queue_frames)),
         link(lcm_url),
         receiver(link, pipeline->make_stream(), queue, recorder),
-        frozen(pipeline->rig().cameras.size()) {}
+        picture_since_us(pipeline->rig().cameras.size(), -1) {}
 
   std::unique_ptr<Pipeline> pipeline;
   ObservationQueue queue;
   LcmLink link;
   Receiver receiver;
-  std::vector<FrozenPictureClock> frozen;
+  std::vector<std::int64_t> picture_since_us;  ///< of each camera, when its picture was a new one
 };
 
 class Daemon {
@@ -276,7 +261,11 @@ class Daemon {
       progress_.camera_seen_us[c] = now;
       facts.mask_px = seen.mask.empty() ? 0 : seen.mask.count();
       facts.brightness = brightness_of(seen.image);
-      session_->frozen[c].look(seen, now, facts);
+      const FrozenPicture& picture = session_->pipeline->picture(c);
+      std::int64_t& since_us = session_->picture_since_us[c];
+      if (!picture.repeated() || since_us < 0) since_us = now;
+      facts.unchanged_ms = ms_between(since_us, now);
+      facts.moved_meanwhile_rad = picture.moved_rad();
     }
   }
 

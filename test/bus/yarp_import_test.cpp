@@ -202,7 +202,10 @@ TEST_F(YarpImport, ConfigurationErrorsNameTheKey) {
 /// be those of the pose that is held, although poses jump and pictures follow encoders late.
 TEST_F(YarpImport, RecordingGivesTheHeldEncodersAtEveryPicture) {
   const auto recording = data_folder() / "eyehand-sim";
-  if (!std::filesystem::exists(recording / "truth.json")) GTEST_SKIP() << "no test data at " << recording;
+  if (!std::filesystem::exists(recording / "truth.json")) {
+    GTEST_SKIP() << "the public recording, which is no part of this project, is not in " << recording
+                 << "; BODYSCHEMA_DATA names its folder";
+  }
   setenv("BODYSCHEMA_DATA", data_folder().c_str(), 0);
   const auto folder = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_unity";
   const auto import_configuration = Configuration::load(folder / "import.yaml");
@@ -273,7 +276,10 @@ TEST_F(YarpImport, RecordingGivesTheHeldEncodersAtEveryPicture) {
 }
 
 TEST(YarpImportConfiguration, OfTheOfficialRobotNamesItsJoints) {
-  if (!std::filesystem::exists(data_folder() / "icub-models")) GTEST_SKIP() << "no test data at " << data_folder();
+  if (!std::filesystem::exists(data_folder() / "icub-models")) {
+    GTEST_SKIP() << "the official iCub model, which is no part of this project, is not in " << data_folder()
+                 << "; BODYSCHEMA_DATA names its folder";
+  }
   setenv("BODYSCHEMA_DATA", data_folder().c_str(), 0);
   const auto folder = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_v2_5";
   const auto import_configuration = Configuration::load(folder / "import.yaml");

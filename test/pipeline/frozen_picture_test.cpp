@@ -13,15 +13,19 @@ TEST(FrozenPicture, TellsARepeatedPictureFromANewOneAndHowFarTheArmMoved) {
   image.data.assign(9, 7);
   Eigen::VectorXd q = Eigen::VectorXd::Zero(2);
   FrozenPicture frozen;
-  EXPECT_FALSE(frozen.look(image, q));
+  frozen.look(image, q);
+  EXPECT_FALSE(frozen.repeated());
   q(1) = 0.2;
-  EXPECT_TRUE(frozen.look(image, q));
+  frozen.look(image, q);
+  EXPECT_TRUE(frozen.repeated());
   EXPECT_DOUBLE_EQ(frozen.moved_rad(), 0.2);
   q(1) = 0.1;
-  EXPECT_TRUE(frozen.look(image, q));
+  frozen.look(image, q);
+  EXPECT_TRUE(frozen.repeated());
   EXPECT_DOUBLE_EQ(frozen.moved_rad(), 0.2) << "the furthest counts";
   image.data[8] = 8;
-  EXPECT_FALSE(frozen.look(image, q));
+  frozen.look(image, q);
+  EXPECT_FALSE(frozen.repeated());
   EXPECT_DOUBLE_EQ(frozen.moved_rad(), 0.0);
 }
 

@@ -72,7 +72,7 @@ TEST(SelfTest, MissingFilesFailAndTheRestIsStillChecked) {
 }
 
 TEST(SelfTest, AReachThatIsTooShortToConvergeFails) {
-  // Not a stub: the check must be able to fail.
+  // Two frames are too few to converge; so the check can fail.
   auto options = usual();
   options.frames = 2;
   EXPECT_EQ(check(options)["reach"].level, CheckLevel::kFail);

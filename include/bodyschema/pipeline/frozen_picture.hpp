@@ -13,13 +13,15 @@ namespace bodyschema {
 class FrozenPicture {
  public:
   /// @param q  joints at the picture's exposure, radians
-  /// Returns whether the picture is the same as the one before.
-  bool look(const Image& image, const Eigen::VectorXd& q);
+  void look(const Image& image, const Eigen::VectorXd& q);
+  /// Whether the last picture was the same as the one before.
+  [[nodiscard]] bool repeated() const { return repeated_; }
   /// The furthest that any joint has moved since the first of these pictures, radians.
   [[nodiscard]] double moved_rad() const { return moved_rad_; }
 
  private:
   bool first_ = true;
+  bool repeated_ = false;
   std::uint64_t digest_ = 0;
   Eigen::VectorXd q_;
   double moved_rad_ = 0.0;

@@ -55,6 +55,8 @@ class Pipeline {
   [[nodiscard]] const BusOptions& bus() const { return bus_; }
   [[nodiscard]] const EstimatorOptions& options() const { return options_; }
   [[nodiscard]] Estimator& estimator() { return estimator_; }
+  /// Whether a camera repeats its picture, as of the last observation that had one of it.
+  [[nodiscard]] const FrozenPicture& picture(std::size_t camera) const { return eyes_[camera].picture; }
   /// Time spent on masks in the last `process`, ms.
   [[nodiscard]] double segmentation_ms() const { return segmentation_ms_; }
   [[nodiscard]] const std::string& configuration_hash() const { return configuration_hash_; }
@@ -65,7 +67,7 @@ class Pipeline {
   struct Eye {
     Segmenter segmenter;
     std::optional<Undistorter> undistorter;
-    FrozenPicture frozen{};
+    FrozenPicture picture{};
   };
   void straighten(CameraObservation& seen, std::size_t camera);
 
