@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <numeric>
+#include <optional>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/estimator/body_pose_model.hpp"
@@ -321,6 +323,7 @@ struct Estimator::Impl {
     start = Clock::now();
     const double variance = options.residual_sd_px * options.residual_sd_px;
     Candidate best;
+    std::optional<Candidate> found;
     bool accepted = false;
     double gain = 0.0;  // what this frame could still win against the memory, chi-square
     if (fusion.frames() > 0.5) {
@@ -334,6 +337,14 @@ struct Estimator::Impl {
       const bool doubtful = gain > kDoubt && gain > kDoubtRatio * usual_pull;
       doubtful_frames = doubtful ? doubtful_frames + 1 : 0;
       accepted = fits(best.evidence) && gain < kSurprise && doubtful_frames < 2;
+      if (accepted && fusion.frames() < kYoungMemory_frames) {
+        // A memory of so few frames may hold a wrong minimum, or a frame whose two pictures saw the
+        // arm before and after a slip: it must not fit worse than what a new search finds.
+        found = search(observation);
+        place(observation, best.x, 0);
+        score_slots(1);
+        accepted = found->distance > kClearlyBetter * distance(0) || !fits(found->evidence);
+      }
     }
     if (accepted && doubtful_frames > 0) {
       // Not believed yet: the memory stays as it is.
@@ -349,8 +360,11 @@ struct Estimator::Impl {
       // Nothing known yet, or what is known no longer fits: look again from the best particles.
       doubtful_frames = 0;
       usual_pull = 0.0;
-      Candidate found = search(observation);
-      const bool good = fits(found.evidence) && found.distance < options.lock_distance;
+      if (!found) {
+        if (fusion.frames() > 0.5) suspect_slips(observation);
+        found = search(observation);
+      }
+      const bool good = fits(found->evidence) && found->distance < options.lock_distance;
       if (fusion.frames() > 0.5) {
         ++surprised_frames;
         if (good || surprised_frames > 5) {
@@ -359,7 +373,7 @@ struct Estimator::Impl {
           if (!good) filter.reset(state.head(joints));
         }
       }
-      best = std::move(found);
+      best = std::move(*found);
       if (good) {
         fusion.forget_all();
         fusion.add(best.evidence, best.x, variance, 1.0 / options.correlated_frames);
@@ -390,13 +404,36 @@ struct Estimator::Impl {
            evidence.rms_px() < options.lock_rms_px;
   }
 
+  /// What was known until now no longer fits: most likely one joint slipped. The worse half of the
+  /// particles makes way for slips of each joint, both ways and of all sizes up to the largest.
+  void suspect_slips(const Observation& observation) {
+    const std::vector<Eigen::Index> order = by_distance();
+    const Eigen::Index slips = filter.states().cols() / 2;
+    const Eigen::Index sizes = std::max<Eigen::Index>(1, slips / (2 * joints));  // each way
+    Eigen::VectorXd x(joints);
+    for (Eigen::Index i = 0; i < std::min(slips, 2 * sizes * joints); ++i) {
+      const Eigen::Index step = i / joints;
+      const double size = kLargestSlip_rad * static_cast<double>(step / 2 + 1) / static_cast<double>(sizes);
+      x = state.head(joints);
+      x(i % joints) += step % 2 == 0 ? size : -size;
+      filter.set_state(order[order.size() - 1 - static_cast<std::size_t>(i)], x);
+    }
+    score_particles(observation);
+  }
+
+  /// Particles, the one whose silhouette fits best first.
+  [[nodiscard]] std::vector<Eigen::Index> by_distance() const {
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(weights.size()));
+    std::iota(order.begin(), order.end(), Eigen::Index{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](Eigen::Index a, Eigen::Index b) { return distance(a) < distance(b); });
+    return order;
+  }
+
   /// The best of several hypotheses after refinement without memory.
   Candidate search(const Observation& observation) {
     static constexpr double kWide_px[] = {30.0, 20.0, 14.0, 10.0, 7.0, 5.0, 4.0};
-    std::vector<Eigen::Index> order(static_cast<std::size_t>(weights.size()));
-    for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<Eigen::Index>(i);
-    std::stable_sort(order.begin(), order.end(),
-                     [&](Eigen::Index a, Eigen::Index b) { return distance(a) < distance(b); });
+    const std::vector<Eigen::Index> order = by_distance();
     std::vector<Candidate> candidates(std::min<std::size_t>(3, order.size()));
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       candidates[i].x = state;
@@ -537,11 +574,14 @@ struct Estimator::Impl {
 
   static constexpr double kMaxStep_rad = 0.2;
   static constexpr double kSearchSpread_rad = 0.0349066;  ///< 2 deg
+  static constexpr double kLargestSlip_rad = 0.2094395;   ///< 12 deg; larger ones take more frames
   static constexpr double kUsualPull = 20.0;  ///< chi-square of a frame that agrees with the memory
   static constexpr double kSurprise = 400.0;  ///< chi-square of a frame that contradicts the memory
   /// Two frames in a row above this, and above so many times what was usual, contradict it too.
   static constexpr double kDoubt = 80.0;
   static constexpr double kDoubtRatio = 8.0;
+  static constexpr double kYoungMemory_frames = 3.5;
+  static constexpr double kClearlyBetter = 0.8;  ///< Hammoude distance against that of the memory
   static constexpr double kUsualFrames = 30.0;  ///< over which "usual" is averaged
 
   EstimatorOptions options;
