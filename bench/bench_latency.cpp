@@ -2,11 +2,13 @@
 // log at 30 Hz. One iteration is one frame; its time is its latency. See README.md.
 
 #include <benchmark/benchmark.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <string>
@@ -82,6 +84,18 @@ class Arrivals {
   std::jthread thread_;
 };
 
+/// Processor time a process has used so far, all its threads, s.
+double processor_s(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
+  std::string field;
+  std::getline(file, field, ')');  // the name may hold blanks
+  for (int i = 3; i < 14; ++i) file >> field;
+  double user = 0.0;
+  double system = 0.0;
+  file >> user >> system;
+  return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
+
 double quantile(std::vector<double> sorted, double share) {
   return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
@@ -98,6 +112,8 @@ void latency(benchmark::State& state, int seconds) {
   std::vector<double> all;
   offsets_status_t status;
   std::size_t published = 0;
+  double cores = 0.0;
+  double memory_before = 0.0;
   {
     Robot robot(url, reach_log());
     Robot::Faults watch;
@@ -106,8 +122,12 @@ void latency(benchmark::State& state, int seconds) {
       return true;
     };
     std::this_thread::sleep_for(std::chrono::seconds(5));  // background learned, caches warm
+    memory_before = static_cast<double>(arrivals.status().resident_bytes);
+    const auto start = Clock::now();
+    const double used_s = processor_s(daemon.pid());
     robot.set_faults(watch);
     std::this_thread::sleep_for(std::chrono::seconds(seconds));
+    cores = (processor_s(daemon.pid()) - used_s) / std::chrono::duration<double>(Clock::now() - start).count();
     robot.set_faults({});
     std::this_thread::sleep_for(std::chrono::milliseconds(1500));
     all = arrivals.latencies_ms();
@@ -127,6 +147,8 @@ void latency(benchmark::State& state, int seconds) {
   state.counters["median_ms"] = quantile(all, 0.5);
   state.counters["p99_ms"] = quantile(all, 0.99);
   state.counters["max_ms"] = all.back();
+  state.counters["daemon_cores"] = cores;
+  state.counters["memory_before_MiB"] = memory_before / (1 << 20);
   state.counters["memory_MiB"] = static_cast<double>(status.resident_bytes) / (1 << 20);
 }
 

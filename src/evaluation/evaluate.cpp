@@ -4,6 +4,8 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
+#include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/simulator/simulator_settings.hpp"
 #include "experiments.hpp"
 
 namespace bodyschema {
@@ -36,6 +38,11 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
     throw ConfigurationError("experiment '" + options.experiment + "' is not known; did you mean '" +
                              nearest_name(options.experiment, names) + "'?");
   }
+  // Whoever reads a section knows its keys; a mistyped one is an error before the work, not after.
+  const Pipeline reader(simulated);
+  simulator::SimulatorSettings::from(simulated.section("simulator"));
+  simulated.reject_unknown_keys();
+
   std::error_code error;
   std::filesystem::create_directories(options.out, error);
   std::ofstream file(options.out / "summary.json");
@@ -66,12 +73,11 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   summary["seed"] = options.seed;
   file << summary.dump(2) << '\n';
   if (!file.flush()) throw FileError((options.out / "summary.json").string() + ": cannot be written");
-  report.heading("Figures");
-  report.preformatted(table);
-  report.paragraph("Trials: " + std::to_string(options.trials) + ", seed " + std::to_string(options.seed) +
-                   (options.experiment == "diagnosis"
-                        ? "."
-                        : ". Simulated robot; means over trials of the mean over the last ten frames."));
+  report.figures_first(
+      table, "Trials: " + std::to_string(options.trials) + ", seed " + std::to_string(options.seed) +
+                 (options.experiment == "diagnosis"
+                      ? "."
+                      : ". Simulated robot; means over trials of the mean over the last ten frames."));
   report.write(options.out / "report.html");
   return table;
 }

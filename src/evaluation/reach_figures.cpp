@@ -2,6 +2,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <map>
+
 namespace bodyschema {
 namespace {
 
@@ -14,6 +16,14 @@ double frames_to_converge(const std::vector<FrameRecord>& frames, std::size_t ca
     if (frames[i].position_mm[camera] >= 1.0 || frames[i].rotation_deg[camera] >= 1.0) last_bad = i + 1;
   }
   return static_cast<double>(last_bad);
+}
+
+/// The same estimator in the same colour in every chart.
+int colour_of(const std::string& contestant) {
+  static const std::map<std::string, int> colours{
+      {"best.stereo", 0}, {"paper.stereo", 1}, {"best.mono", 2}, {"paper.mono", 3}};
+  const auto found = colours.find(contestant);
+  return found != colours.end() ? found->second : -1;
 }
 
 }  // namespace
@@ -95,6 +105,7 @@ void chart_errors(ExperimentContext& context, const std::string& title,
         series.x.push_back(static_cast<double>(f));
         series.y.push_back(Statistics::of(values).mean);
       }
+      series.colour = colour_of(contestants[i].name);
       chart.series.push_back(std::move(series));
     }
     context.report.chart(chart);

@@ -116,6 +116,10 @@ void Report::preformatted(const std::string& text) {
   body_ += "<pre>" + escaped(text) + "</pre>\n";
 }
 
+void Report::figures_first(const std::string& text, const std::string& note) {
+  first_ = "<pre>" + escaped(text) + "</pre>\n<p>" + escaped(note) + "</p>\n";
+}
+
 void Report::list(const std::vector<std::string>& items) {
   body_ += "<ul>\n";
   for (const auto& item : items) body_ += "<li>" + escaped(item) + "</li>\n";
@@ -243,7 +247,7 @@ std::string Report::html() const {
   std::string page = "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
                      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
                      escaped(title_) + "</title>\n<style>" + kStyle + "</style></head><body>\n<h1>" +
-                     escaped(title_) + "</h1>\n" + body_;
+                     escaped(title_) + "</h1>\n" + first_ + body_;
   for (auto tag = open_.rbegin(); tag != open_.rend(); ++tag) page += *tag;
   if (!script_.empty()) {
     page += "<script>";

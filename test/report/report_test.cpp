@@ -25,6 +25,15 @@ TEST(Report, EscapesEveryText) {
   EXPECT_THAT(html, HasSubstr("&lt;b&gt;title"));
 }
 
+TEST(Report, FiguresKnownLastStandFirst) {
+  Report report("figures");
+  report.heading("charts");
+  report.figures_first("best < paper", "of 3 trials");
+  const std::string html = report.html();
+  EXPECT_LT(html.find("best &lt; paper"), html.find("of 3 trials"));
+  EXPECT_LT(html.find("of 3 trials"), html.find("charts"));
+}
+
 TEST(Report, AChartHoldsItsNumbersAndNothingEndsItsScript) {
   Report report("charts");
   Chart chart;

@@ -49,6 +49,8 @@ class Report {
   /// @param rows  as wide as `head`; cells that look like numbers are set right
   void table(const std::vector<std::string>& head, const std::vector<std::vector<std::string>>& rows);
   void preformatted(const std::string& text);
+  /// Figures that stand before everything else, whenever they are known, and a note on them.
+  void figures_first(const std::string& text, const std::string& note);
   void list(const std::vector<std::string>& items);
   /// What follows until `end` stands side by side where the window is wide enough.
   void begin_grid();
@@ -64,6 +66,7 @@ class Report {
 
  private:
   std::string title_;
+  std::string first_;
   std::string body_;
   std::string script_;
   std::vector<const char*> open_;  ///< closing tags of open parts
