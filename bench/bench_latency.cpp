@@ -147,6 +147,10 @@ void latency(benchmark::State& state, int seconds) {
   state.counters["median_ms"] = quantile(all, 0.5);
   state.counters["p99_ms"] = quantile(all, 0.99);
   state.counters["max_ms"] = all.back();
+  for (std::size_t i = 0; i < status.stage_name.size(); ++i) {
+    state.counters[status.stage_name[i] + "_median_ms"] = status.stage_median_ms[i];
+    state.counters[status.stage_name[i] + "_p99_ms"] = status.stage_p99_ms[i];
+  }
   state.counters["daemon_cores"] = cores;
   state.counters["memory_before_MiB"] = memory_before / (1 << 20);
   state.counters["memory_MiB"] = static_cast<double>(status.resident_bytes) / (1 << 20);

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -233,6 +234,16 @@ Robot::Robot(const std::string& lcm_url, const fs::path& log, double speed) : li
     }
     messages_.push_back(std::move(message));
   }
+  first_us_ = messages_.front().time_us;
+  length_us_ = messages_.back().time_us - first_us_;
+  for (std::size_t i = 0; i < messages_.size(); ++i) {
+    const Message& m = messages_[i];
+    orders_[0].push_back({m.time_us - first_us_, i});
+    // Backwards it is the stamps that turn round; a message still comes out after what it tells of.
+    const Microseconds stamp = m.pictures ? m.pictures->images.back().utime : m.joints->utime;
+    orders_[1].push_back({length_us_ - (stamp - first_us_) + (m.time_us - stamp), i});
+  }
+  std::stable_sort(orders_[1].begin(), orders_[1].end());
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
@@ -244,25 +255,23 @@ void Robot::set_faults(Faults faults) {
 }
 
 void Robot::work(const std::stop_token& stop) {
-  const Microseconds first = messages_.front().time_us;
-  const Microseconds length = messages_.back().time_us - first;
+  constexpr Microseconds kBetweenLaps = 10'000;
   const auto start = Clock::now();
   for (Microseconds lap = 0; !stop.stop_requested(); ++lap) {
-    const bool forwards = lap % 2 == 0;
-    for (std::size_t i = 0; i < messages_.size() && !stop.stop_requested(); ++i) {
-      const Message& message = messages_[forwards ? i : messages_.size() - 1 - i];
-      const Microseconds along = forwards ? message.time_us - first : length - (message.time_us - first);
-      const Microseconds now = lap * (length + 10'000) + along;
+    const Microseconds begin = lap * (length_us_ + kBetweenLaps);
+    for (const auto& [due, index] : orders_[static_cast<std::size_t>(lap % 2)]) {
+      if (stop.stop_requested()) return;
       std::this_thread::sleep_until(
-          start + std::chrono::duration_cast<Clock::duration>(Seconds(seconds(now) / speed_)));
-      publish(message, forwards, first + now);
+          start + std::chrono::duration_cast<Clock::duration>(Seconds(seconds(begin + due) / speed_)));
+      publish(messages_[index], lap % 2 == 0, first_us_ + begin);
     }
   }
 }
 
-void Robot::publish(const Message& message, bool forwards, Microseconds now) {
+void Robot::publish(const Message& message, bool forwards, Microseconds lap_begin) {
   const auto moved = [&](Microseconds stamp) {
-    return forwards ? now + (stamp - message.time_us) : now - (stamp - message.time_us);
+    const Microseconds along = stamp - first_us_;
+    return lap_begin + (forwards ? along : length_us_ - along);
   };
   const std::lock_guard lock(mutex_);
   if (message.pictures) {
@@ -270,7 +279,7 @@ void Robot::publish(const Message& message, bool forwards, Microseconds now) {
     pictures.utime = moved(pictures.utime);
     for (auto& image : pictures.images) image.utime = moved(image.utime);
     if (faults_.pictures && !faults_.pictures(pictures, link_)) return;
-    link_.publish_message("ICUB_CAMERAS", now, pictures);
+    link_.publish_message("ICUB_CAMERAS", pictures.utime, pictures);
   } else {
     bot_core::joint_state_t joints = *message.joints;
     joints.utime = moved(joints.utime);
@@ -278,7 +287,7 @@ void Robot::publish(const Message& message, bool forwards, Microseconds now) {
       for (auto& velocity : joints.joint_velocity) velocity = -velocity;
     }
     if (faults_.joints && !faults_.joints(joints, link_)) return;
-    link_.publish_message("ICUB_JOINT_STATE", now, joints);
+    link_.publish_message("ICUB_JOINT_STATE", joints.utime, joints);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <sys/types.h>
 
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
@@ -136,11 +137,14 @@ class Robot {
     std::optional<bot_core::joint_state_t> joints;
   };
   void work(const std::stop_token& stop);
-  void publish(const Message& message, bool forwards, Microseconds now);
+  void publish(const Message& message, bool forwards, Microseconds lap_begin);
 
   LcmLink link_;
   double speed_;
   std::vector<Message> messages_;
+  Microseconds first_us_ = 0, length_us_ = 0;
+  /// When each message is due after a lap's begin, forwards and backwards: (due, index).
+  std::array<std::vector<std::pair<Microseconds, std::size_t>>, 2> orders_;
   std::mutex mutex_;
   Faults faults_;
   std::jthread thread_;
