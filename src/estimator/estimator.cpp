@@ -12,6 +12,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/estimator/body_pose_model.hpp"
 #include "bodyschema/estimator/offset_fusion.hpp"
+#include "bodyschema/estimator/pull_judge.hpp"
 #include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/filter/particle_filter.hpp"
 
@@ -22,58 +23,6 @@ using Clock = std::chrono::steady_clock;
 
 double elapsed_ms(Clock::time_point since) {
   return std::chrono::duration<double, std::milli>(Clock::now() - since).count();
-}
-
-/// Head joints that move every camera. A joint of one eye alone changes the vergence, which is a
-/// parameter of its own.
-std::vector<std::string> shared_head_joints(const std::shared_ptr<const RobotModel>& robot,
-                                            const RobotSetup& setup, const StereoRig& rig) {
-  std::vector<std::string> links;
-  for (const auto& camera : rig.cameras) links.push_back(camera.link);
-  const ForwardKinematics kinematics(robot, links);
-  std::vector<std::string> joints;
-  for (const auto& name : setup.head_joints) {
-    bool all = true;
-    for (std::size_t c = 0; c < links.size(); ++c) {
-      all = all && kinematics.moves(robot->joint_index(name), c);
-    }
-    if (all) joints.push_back(name);
-  }
-  return joints;
-}
-
-std::vector<Parameter> make_parameters(const std::shared_ptr<const RobotModel>& model,
-                                       const RobotSetup& setup, const StereoRig& rig,
-                                       const EstimatorOptions& options) {
-  const RobotModel& robot = *model;
-  std::vector<Parameter> parameters;
-  for (const auto& name : setup.estimated_joints) {
-    parameters.push_back({name, ParameterKind::kJointOffset, robot.joint_index(name),
-                          options.filter.initial_sd_rad});
-  }
-  if (options.mode == EstimatorMode::kPaper) return parameters;
-  const NuisancePriors& priors = options.priors;
-  if (priors.head_rad > 0.0) {
-    for (const auto& name : shared_head_joints(model, setup, rig)) {
-      parameters.push_back(
-          {name, ParameterKind::kJointOffset, robot.joint_index(name), priors.head_rad});
-    }
-  }
-  const auto add = [&](const char* name, ParameterKind kind, double sd) {
-    if (sd > 0.0) parameters.push_back({name, kind, -1, sd});
-  };
-  add("finger_curl", ParameterKind::kFingerCurl, priors.finger_curl_rad);
-  if (rig.cameras.size() > 1) {
-    add("vergence", ParameterKind::kVergence, priors.vergence_rad);
-    add("principal_difference_x", ParameterKind::kPrincipalDifferenceX,
-        priors.principal_difference_px);
-    add("principal_difference_y", ParameterKind::kPrincipalDifferenceY,
-        priors.principal_difference_px);
-  }
-  add("focal_scale", ParameterKind::kFocalScale, priors.focal_scale);
-  add("mesh_scale", ParameterKind::kMeshScale, priors.mesh_scale);
-  add("dilation", ParameterKind::kDilation, priors.dilation_px);
-  return parameters;
 }
 
 SilhouetteModel make_silhouette_model(const RobotModel& robot, const RobotSetup& setup) {
@@ -117,25 +66,11 @@ const char* to_string(EstimatorState state) {
   return "unknown";
 }
 
-const char* unit_of(ParameterKind kind) {
-  switch (kind) {
-    case ParameterKind::kJointOffset:
-    case ParameterKind::kFingerCurl:
-    case ParameterKind::kVergence: return "rad";
-    case ParameterKind::kPrincipalDifferenceX:
-    case ParameterKind::kPrincipalDifferenceY:
-    case ParameterKind::kDilation: return "px";
-    case ParameterKind::kFocalScale:
-    case ParameterKind::kMeshScale: return "1";
-  }
-  return "1";
-}
-
 struct Estimator::Impl {
   Impl(std::shared_ptr<const RobotModel> robot_model, const RobotSetup& robot_setup,
        const StereoRig& stereo_rig, const EstimatorOptions& estimator_options)
       : options(estimator_options), setup(robot_setup), rig(stereo_rig),
-        parameters(make_parameters(robot_model, setup, rig, options)),
+        parameters(estimated_parameters(robot_model, setup, rig, options)),
         silhouettes(make_silhouette_model(*robot_model, setup)),
         intrinsics(rig.intrinsics()),
         body(robot_model, setup, rig, parameters),
@@ -333,10 +268,7 @@ struct Estimator::Impl {
       const Eigen::VectorXd alone =
           first_look.solve_with(best.evidence, best.x, variance) - best.x;
       gain = (best.evidence.cost - predicted_cost(best.evidence, alone)) / variance;
-      // A slip shows as frames that pull far more than frames did until now. One may be a stray.
-      const bool doubtful = gain > kDoubt && gain > kDoubtRatio * usual_pull;
-      doubtful_frames = doubtful ? doubtful_frames + 1 : 0;
-      accepted = fits(best.evidence) && gain < kSurprise && doubtful_frames < 2;
+      accepted = pulls.judge(gain) != PullJudge::Verdict::kContradicts && fits(best.evidence);
       if (accepted && fusion.frames() < kYoungMemory_frames) {
         // A memory of so few frames may hold a wrong minimum, or a frame whose two pictures saw the
         // arm before and after a slip: it must not fit worse than what a new search finds.
@@ -346,11 +278,10 @@ struct Estimator::Impl {
         accepted = found->distance > kClearlyBetter * distance(0) || !fits(found->evidence);
       }
     }
-    if (accepted && doubtful_frames > 0) {
+    if (accepted && pulls.doubting()) {
       // Not believed yet: the memory stays as it is.
     } else if (accepted) {
       surprised_frames = 0;
-      usual_pull += (gain - usual_pull) / kUsualFrames;
       // What no constant offset explains (an error that is not in the model) shows as frames that
       // keep pulling away; then only recent ones are worth remembering.
       const double pull = std::max(1.0, gain / kUsualPull);
@@ -358,8 +289,7 @@ struct Estimator::Impl {
       fusion.add(best.evidence, best.x, variance, 1.0 / options.correlated_frames);
     } else {
       // Nothing known yet, or what is known no longer fits: look again from the best particles.
-      doubtful_frames = 0;
-      usual_pull = 0.0;
+      pulls.forget();
       if (!found) {
         if (fusion.frames() > 0.5) suspect_slips(observation);
         found = search(observation);
@@ -381,7 +311,7 @@ struct Estimator::Impl {
     }
     state = fusion.frames() > 0.5 ? fusion.mean() : best.x;
     // A frame that the memory contradicts speaks for itself alone, with the uncertainty that has.
-    contradicted = fusion.frames() > 0.5 && (doubtful_frames > 0 || surprised_frames > 0);
+    contradicted = fusion.frames() > 0.5 && (pulls.doubting() || surprised_frames > 0);
     frame_state = (contradicted ? first_look : fusion).frame_state(best.evidence, best.x, variance);
     contour_rms_px = best.evidence.rms_px();
     place(observation, frame_state.x, 0);
@@ -507,7 +437,7 @@ struct Estimator::Impl {
         estimate.hand_sd_m = hand_sd(*seen, c);
       }
     }
-    estimate.weakest = weakest(estimate.covariance_rad2);
+    estimate.weakest = weakest_direction(estimate.covariance_rad2, setup.estimated_joints);
     if (!particles_only() && !contradicted && current == EstimatorState::kConverging &&
         fusion.frames() > 4.5 && estimate.hand_sd_m < options.converged_hand_sd_m) {
       current = EstimatorState::kConverged;
@@ -535,30 +465,6 @@ struct Estimator::Impl {
     return std::sqrt(std::max(0.0, (J * frame_state.covariance * J.transpose()).trace()));
   }
 
-  WeakestDirection weakest(const Eigen::MatrixXd& covariance) const {
-    WeakestDirection result;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
-    result.direction = solver.eigenvectors().col(covariance.cols() - 1);
-    Eigen::Index largest = 0;
-    result.direction.cwiseAbs().maxCoeff(&largest);
-    if (result.direction(largest) < 0) result.direction = -result.direction;
-    result.sd_rad = std::sqrt(std::max(0.0, solver.eigenvalues()(covariance.cols() - 1)));
-    for (Eigen::Index k = 0; k < joints; ++k) {
-      if (std::abs(result.direction(k)) < 0.3) continue;
-      char term[96];
-      std::snprintf(term, sizeof term, "%s%.2f %s",
-                    result.text.empty() ? (result.direction(k) < 0 ? "-" : "")
-                                        : (result.direction(k) < 0 ? " - " : " + "),
-                    std::abs(result.direction(k)),
-                    setup.estimated_joints[static_cast<std::size_t>(k)].c_str());
-      result.text += term;
-    }
-    char sd_text[40];
-    std::snprintf(sd_text, sizeof sd_text, ": sd %.2f deg", degrees(result.sd_rad));
-    result.text += sd_text;
-    return result;
-  }
-
   void reset() {
     filter = ParticleFilter(joints, options.filter);
     fusion.forget_all();
@@ -567,8 +473,8 @@ struct Estimator::Impl {
     current = EstimatorState::kHandNotInView;
     cloud_covariance.resize(0, 0);
     best_likelihood = effective_size = contour_rms_px = 0.0;
-    surprised_frames = doubtful_frames = 0;
-    usual_pull = 0.0;
+    surprised_frames = 0;
+    pulls.forget();
     contradicted = false;
   }
 
@@ -576,13 +482,8 @@ struct Estimator::Impl {
   static constexpr double kSearchSpread_rad = 0.0349066;  ///< 2 deg
   static constexpr double kLargestSlip_rad = 0.2094395;   ///< 12 deg; larger ones take more frames
   static constexpr double kUsualPull = 20.0;  ///< chi-square of a frame that agrees with the memory
-  static constexpr double kSurprise = 400.0;  ///< chi-square of a frame that contradicts the memory
-  /// Two frames in a row above this, and above so many times what was usual, contradict it too.
-  static constexpr double kDoubt = 80.0;
-  static constexpr double kDoubtRatio = 8.0;
   static constexpr double kYoungMemory_frames = 3.5;
   static constexpr double kClearlyBetter = 0.8;  ///< Hammoude distance against that of the memory
-  static constexpr double kUsualFrames = 30.0;  ///< over which "usual" is averaged
 
   EstimatorOptions options;
   RobotSetup setup;
@@ -606,9 +507,8 @@ struct Estimator::Impl {
   double effective_size = 0.0;
   double contour_rms_px = 0.0;
   int surprised_frames = 0;
-  int doubtful_frames = 0;
   bool contradicted = false;
-  double usual_pull = 0.0;  ///< recent mean of what frames pulled, chi-square
+  PullJudge pulls;
   Eigen::MatrixXd cloud_covariance;
   StageTimes times;
 

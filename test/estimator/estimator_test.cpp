@@ -2,49 +2,19 @@
 
 #include <gtest/gtest.h>
 
+#include "estimator/own_robot.hpp"
 #include "estimator/synthetic_reach.hpp"
 
 namespace bodyschema {
 namespace {
 
-const std::filesystem::path kRobot =
-    std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/robot.yaml";
-
 /// Our own robot before its eyes, with the paper's offsets.
-class EstimatorOnOwnRobot : public ::testing::Test {
+class EstimatorOnOwnRobot : public OwnRobot {
  protected:
-  EstimatorOnOwnRobot() : configuration_(Configuration::load(kRobot)) {
-    setup_ = RobotSetup::from(configuration_.section("robot"));
-    robot_ = setup_.load();
-    rig_ = StereoRig::from(configuration_.section("cameras"));
-    offset_rad_.resize(7);
-    offset_rad_ << 5, 4, 3, -2, 3, -7, 3;
-    offset_rad_ *= kPi / 180.0;
+  EstimatorOnOwnRobot() : offset_rad_(paper_offsets_rad()) {
     reach_ = std::make_unique<SyntheticReach>(robot_, setup_, rig_, offset_rad_);
     options_ = EstimatorOptions::from(configuration_);
     options_.silhouette.engine = "contour";
-  }
-
-  /// A joint vector of the reach, s from 0 (low and right) to 1.
-  [[nodiscard]] Eigen::VectorXd pose(double s) const {
-    Eigen::VectorXd q = setup_.default_joints(*robot_);
-    const auto set = [&](const char* name, double from_deg, double to_deg) {
-      q(robot_->joint_index(name)) = radians(from_deg + s * (to_deg - from_deg));
-    };
-    set("neck_pitch", -10, -10);
-    set("eyes_tilt", -10, -10);
-    set("r_shoulder_pitch", -68, -74);
-    set("r_shoulder_roll", 20, 24);
-    set("r_shoulder_yaw", 18, 14);
-    set("r_elbow", 72, 78);
-    set("r_wrist_prosup", 50, 42);
-    set("r_wrist_pitch", -20, -12);
-    set("r_wrist_yaw", 5, 2);
-    set("r_thumb_oppose", 50, 50);
-    set("r_index_proximal", 20, 20);
-    set("r_middle_distal", 40, 40);
-    set("r_pinky", 60, 60);
-    return q;
   }
 
   /// What is seen at `frame` of a reach that takes so many frames, at 30 Hz.
@@ -59,10 +29,6 @@ class EstimatorOnOwnRobot : public ::testing::Test {
     return estimate;
   }
 
-  Configuration configuration_;
-  RobotSetup setup_;
-  std::shared_ptr<const RobotModel> robot_;
-  StereoRig rig_;
   Eigen::VectorXd offset_rad_;
   std::unique_ptr<SyntheticReach> reach_;
   EstimatorOptions options_;

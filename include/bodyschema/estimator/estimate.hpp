@@ -8,6 +8,7 @@
 
 #include "bodyschema/core/time.hpp"
 #include "bodyschema/geometry/pose.hpp"
+#include "bodyschema/estimator/weakest_direction.hpp"
 
 namespace bodyschema {
 
@@ -20,15 +21,6 @@ enum class EstimatorState {
   kDiverged,       ///< the best prediction no longer fits the pictures; searching again
 };
 const char* to_string(EstimatorState state);
-
-/// The combination of joint offsets that the pictures say least about: unit vector over the
-/// estimated joints and its standard deviation.
-struct WeakestDirection {
-  Eigen::VectorXd direction;
-  double sd_rad = 0.0;
-  /// "0.71 r_wrist_prosup - 0.70 r_wrist_pitch: sd 0.4 deg"
-  std::string text;
-};
 
 /// Time spent in each stage of one step, ms of wall clock.
 struct StageTimes {

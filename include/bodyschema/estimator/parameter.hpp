@@ -1,10 +1,17 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/robot/robot_model.hpp"
+#include "bodyschema/robot/robot_setup.hpp"
+
 namespace bodyschema {
+
+struct EstimatorOptions;
 
 /// What one number of the estimator's state does to the predicted pictures. Every kind is zero
 /// when the robot is as its model says. Joint offsets follow the paper's sign: encoder = true +
@@ -30,5 +37,12 @@ struct Parameter {
   Eigen::Index joint = -1;  ///< kJointOffset: index in RobotModel order
   double prior_sd = 0.0;    ///< in the unit of the kind
 };
+
+/// What an estimator with these options estimates: the offsets of the arm's joints and, in mode best,
+/// every nuisance whose prior is not zero. Of the head's joints those that move all cameras; one that
+/// turns one eye alone is the vergence.
+std::vector<Parameter> estimated_parameters(const std::shared_ptr<const RobotModel>& robot,
+                                            const RobotSetup& setup, const StereoRig& rig,
+                                            const EstimatorOptions& options);
 
 }  // namespace bodyschema
