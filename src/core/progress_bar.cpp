@@ -5,13 +5,19 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <cstdio>
+#include <mutex>
+#include <thread>
+#include <vector>
 
 namespace bodyschema {
 namespace {
 
 constexpr double kQuiet_s = 2.0;
 constexpr double kRedraw_s = 0.1;
+constexpr std::chrono::milliseconds kWatch{500};  // drawn this often between two steps
+constexpr double kRepeat_s = 30.0;                // the same without a terminal
 constexpr int kWidth = 30;
 
 std::int64_t now_ns() {
@@ -25,13 +31,50 @@ std::string duration_text(double duration_s) {
   return text;
 }
 
+/// Draws all bars of the process now and then, so that a single long step shows too.
+class Watcher {
+ public:
+  static Watcher& instance() {
+    static Watcher watcher;
+    return watcher;
+  }
+  void add(ProgressBar* bar) {
+    const std::lock_guard lock(mutex_);
+    bars_.push_back(bar);
+    if (!thread_.joinable()) thread_ = std::jthread([this](const std::stop_token& stop) { watch(stop); });
+  }
+  void remove(ProgressBar* bar) {
+    const std::lock_guard lock(mutex_);
+    std::erase(bars_, bar);
+  }
+  /// Guards every bar. Recursive: the watcher holds it while it draws.
+  [[nodiscard]] std::recursive_mutex& mutex() { return mutex_; }
+
+ private:
+  void watch(const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    while (!stop.stop_requested()) {
+      wake_.wait_for(lock, stop, kWatch, [] { return false; });
+      for (ProgressBar* bar : bars_) bar->advance(0);
+    }
+  }
+
+  std::recursive_mutex mutex_;
+  std::condition_variable_any wake_;
+  std::vector<ProgressBar*> bars_;
+  std::jthread thread_;  // last: everything else is there when it starts
+};
+
 }  // namespace
 
 ProgressBar::ProgressBar(std::string label, std::uint64_t total)
     : label_(std::move(label)), total_(std::max<std::uint64_t>(total, 1)), start_ns_(now_ns()),
-      terminal_(isatty(STDERR_FILENO) != 0) {}
+      terminal_(isatty(STDERR_FILENO) != 0) {
+  Watcher::instance().add(this);
+}
 
 ProgressBar::~ProgressBar() {
+  Watcher::instance().remove(this);
   if (!drawn_) return;
   const double elapsed_s = static_cast<double>(now_ns() - start_ns_) * 1e-9;
   if (terminal_) {
@@ -41,9 +84,13 @@ ProgressBar::~ProgressBar() {
   }
 }
 
-void ProgressBar::advance(std::uint64_t steps) { set(done_ + steps); }
+void ProgressBar::advance(std::uint64_t steps) {
+  const std::lock_guard lock(Watcher::instance().mutex());
+  set(done_ + steps);
+}
 
 void ProgressBar::set(std::uint64_t done) {
+  const std::lock_guard lock(Watcher::instance().mutex());
   done_ = std::min(done, total_);
   draw();
 }
@@ -65,7 +112,8 @@ void ProgressBar::draw() {
     std::fflush(stderr);
   } else {
     const int decile = static_cast<int>(share * 10.0);
-    if (decile == last_decile_ && drawn_) return;
+    const bool long_ago = static_cast<double>(now - last_draw_ns_) * 1e-9 > kRepeat_s;
+    if (decile == last_decile_ && drawn_ && !long_ago) return;
     last_decile_ = decile;
     std::fprintf(stderr, "%s: %d %%, %s left\n", label_.c_str(), decile * 10, left.c_str());
   }

@@ -59,15 +59,18 @@ Image draw_overlay(const std::vector<OverlayView>& views, const std::string& cap
   }
   cv::Mat row;
   cv::hconcat(pictures, row);
-  cv::Mat page(row.rows + kCaptionHeight_px, row.cols, CV_8UC3, cv::Scalar(24, 24, 28));
-  row.copyTo(page.rowRange(kCaptionHeight_px, page.rows));
+  const int bar_px = caption.empty() ? 0 : kCaptionHeight_px;
+  cv::Mat page(row.rows + bar_px, row.cols, CV_8UC3, cv::Scalar(24, 24, 28));
+  row.copyTo(page.rowRange(bar_px, page.rows));
   const auto write = [&](const std::string& text, int x, const cv::Scalar& colour) {
     cv::putText(page, text, {x, 18}, cv::FONT_HERSHEY_SIMPLEX, 0.45, colour, 1, cv::LINE_AA);
     return x + cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, 0.45, 1, nullptr).width + 16;
   };
-  int x = write(caption, 8, cv::Scalar(230, 230, 230));
-  x = write(names.nominal, x, kRed);
-  write(names.corrected, x, kGreen);
+  if (!caption.empty()) {
+    int x = write(caption, 8, cv::Scalar(230, 230, 230));
+    x = write(names.nominal, x, kRed);
+    write(names.corrected, x, kGreen);
+  }
   Image result(page.cols, page.rows, 3);
   std::copy(page.datastart, page.dataend, result.data.begin());
   return result;

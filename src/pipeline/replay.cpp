@@ -272,13 +272,14 @@ class Replay {
     const std::array<std::string, 2> names = {"left", "right"};
     std::string table = fmt::format("\n{:<34} {:>16} {:>16} {:>18} {:>18}\n", "error, before -> after",
                                     "position mm", "rotation deg", "fingertips mm", "fingertips px");
+    const bool tips = !pipeline_.setup().fingertip_links.empty();
     const auto row = [&](const std::string& name, const ErrorTotals& t) {
       const auto cell = [](const BeforeAfter& v) {
         const double n = static_cast<double>(std::max<std::size_t>(v.n, 1));
         return fmt::format("{:.2f} -> {:.2f}", v.before / n, v.after / n);
       };
       table += fmt::format("{:<34} {:>16} {:>16} {:>18} {:>18}\n", name, cell(t.position_mm),
-                           cell(t.rotation_deg), cell(t.tip_mm), cell(t.tip_px));
+                           cell(t.rotation_deg), tips ? cell(t.tip_mm) : "-", tips ? cell(t.tip_px) : "-");
     };
     for (std::size_t c = 0; c < pipeline_.rig().cameras.size(); ++c) {
       ErrorTotals last_frames;

@@ -32,6 +32,13 @@ std::string attribute(const XMLElement* element, const char* name) {
   return text != nullptr ? text : "";
 }
 
+/// NAME of package://NAME/...; empty: another kind of name.
+std::string package_of(const std::string& mesh) {
+  static const std::string kScheme = "package://";
+  if (mesh.rfind(kScheme, 0) != 0) return "";
+  return mesh.substr(kScheme.size(), mesh.find('/', kScheme.size()) - kScheme.size());
+}
+
 /// Which link hangs on which, and which have a shape.
 class Tree {
  public:
@@ -49,7 +56,14 @@ class Tree {
     for (auto* link = robot->FirstChildElement("link"); link != nullptr;
          link = link->NextSiblingElement("link")) {
       names_.push_back(attribute(link, "name"));
-      if (link->FirstChildElement("visual") != nullptr) with_shape_.insert(names_.back());
+      for (auto* visual = link->FirstChildElement("visual"); visual != nullptr;
+           visual = visual->NextSiblingElement("visual")) {
+        with_shape_.insert(names_.back());
+        const auto* geometry = visual->FirstChildElement("geometry");
+        const auto* mesh = geometry != nullptr ? geometry->FirstChildElement("mesh") : nullptr;
+        if (const auto package = package_of(attribute(mesh, "filename")); !package.empty())
+          packages_.insert(package);
+      }
     }
     for (auto* element = robot->FirstChildElement("joint"); element != nullptr;
          element = element->NextSiblingElement("joint")) {
@@ -93,11 +107,25 @@ class Tree {
     }
   }
   [[nodiscard]] bool has_shape(const std::string& link) const { return with_shape_.contains(link); }
+  /// Folders above the URDF that hold the packages its meshes are in, as in a ROS workspace.
+  [[nodiscard]] std::vector<fs::path> mesh_roots() const {
+    std::vector<fs::path> roots;
+    for (const auto& package : packages_) {
+      fs::path folder = fs::absolute(urdf_).lexically_normal().parent_path();
+      std::error_code ignored;
+      while (folder.has_relative_path() && !fs::is_directory(folder / package, ignored))
+        folder = folder.parent_path();
+      if (!fs::is_directory(folder / package, ignored)) continue;
+      if (std::find(roots.begin(), roots.end(), folder) == roots.end()) roots.push_back(folder);
+    }
+    return roots;
+  }
 
  private:
   fs::path urdf_;
   std::vector<std::string> names_;
   std::set<std::string> with_shape_;
+  std::set<std::string> packages_;                   ///< named by the meshes
   std::map<std::string, Joint> above_;               ///< by child
   std::map<std::string, std::vector<Joint>> below_;  ///< by parent
 };
@@ -157,18 +185,24 @@ Parts parts_of(const Tree& tree, const StarterOptions& options) {
   return parts;
 }
 
-std::string robot_yaml(const StarterOptions& options, const Parts& parts, double focal_px) {
+std::string robot_yaml(const StarterOptions& options, const Parts& parts,
+                       const std::vector<fs::path>& mesh_roots, double focal_px) {
+  const auto from_here = [&](const fs::path& path) {
+    return fs::proximate(fs::absolute(path), fs::absolute(options.out)).string();
+  };
+  std::vector<std::string> roots;
+  for (const auto& root : mesh_roots)
+    roots.push_back(from_here(root));
   std::string text = fmt::format(
       "# Written from {}; every key is explained in config/icub_right/robot.yaml.\n"
       "version: 1\n\nrobot:\n  urdf: {}\n"
-      "  mesh_search_roots: []             # folders in which package://... is looked for\n"
+      "  mesh_search_roots: {}             # folders in which package://... is looked for\n"
       "  # What the cameras see moving; leave out what is always hidden.\n"
       "  rendered_links: {}\n  hand_link: {}\n"
       "  fingertip_links: []               # links at the fingertips, for errors there\n"
       "  estimated_joints: {}\n",
       options.urdf.filename().string(),
-      yaml(fs::proximate(fs::absolute(options.urdf), fs::absolute(options.out)).string()),
-      list(parts.rendered), yaml(options.hand_link), list(parts.arm));
+      yaml(from_here(options.urdf)), list(roots), list(parts.rendered), yaml(options.hand_link), list(parts.arm));
   if (!parts.head.empty()) text += fmt::format("  head_joints: {}\n", list(parts.head));
   if (!parts.others.empty()) {
     text += "  # deg; take out the joints that the robot publishes.\n  fixed_joints_deg:\n";
@@ -234,7 +268,7 @@ std::string write_starter_configuration(const StarterOptions& options) {
                               : 0.5 * options.width / std::tan(0.5 * kGuessedFieldOfView_rad);
   std::error_code error;
   fs::create_directories(options.out, error);
-  write_new(options.out / "robot.yaml", robot_yaml(options, parts, focal_px));
+  write_new(options.out / "robot.yaml", robot_yaml(options, parts, tree.mesh_roots(), focal_px));
   write_new(options.out / "estimator.yaml", estimator_yaml(options));
 
   std::string told = fmt::format("arm: {}\n", fmt::join(parts.arm, ", "));

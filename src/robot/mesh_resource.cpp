@@ -41,7 +41,8 @@ fs::path resolve_mesh(const std::string& filename, const std::string& where,
   }
   if (package && bases.empty()) {
     throw FileError(where + ": mesh '" + filename +
-                    "' needs an entry in mesh_search_roots, there is none");
+                    "' needs an entry in mesh_search_roots: the folder that holds '" +
+                    rest.substr(0, rest.find('/')) + "/'");
   }
 
   std::string tried;

@@ -15,6 +15,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/pipeline/estimate_line.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/service/health.hpp"
 #include "bodyschema/service/live_page.hpp"
 #include "bodyschema/service/notifier.hpp"
 #include "bodyschema/service/offsets_message.hpp"
@@ -234,7 +235,7 @@ class Daemon {
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
       if (!observation.cameras[c]) continue;
       pictures.push_back({c, {}, estimator.predicted_silhouette(observation, c, false),
-                          estimator.predicted_silhouette(observation, c, true)});
+                          estimator.predicted_silhouette(observation, c, true), is_frozen(progress_.cameras[c])});
       pictures.back().image = std::move(observation.cameras[c]->image);
     }
     page_->set_pictures(std::move(pictures));

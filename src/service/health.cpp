@@ -141,7 +141,7 @@ std::optional<std::string> camera_warning(const HealthFacts& f) {
                  : fmt::format("nothing from the {} camera for {}; working with the other", camera.name,
                                age(camera.age_ms));
     }
-    if (camera.unchanged_ms > kFrozen_ms && camera.moved_meanwhile_rad > kFrozenMotion_rad) {
+    if (is_frozen(camera)) {
       return fmt::format("the {} camera has shown the same picture for {} while the arm moved by {:.0f} deg",
                          camera.name, age(camera.unchanged_ms), degrees(camera.moved_meanwhile_rad));
     }
@@ -190,6 +190,10 @@ const char* to_string(HealthLevel level) {
     case HealthLevel::kStale: return "STALE";
   }
   return "ERROR";
+}
+
+bool is_frozen(const CameraFacts& camera) {
+  return camera.unchanged_ms > kFrozen_ms && camera.moved_meanwhile_rad > kFrozenMotion_rad;
 }
 
 Health assess(const HealthFacts& facts) {

@@ -6,6 +6,7 @@
 
 #include <httplib.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <atomic>
@@ -34,11 +35,13 @@ constexpr std::int64_t kWatched_us = 3'000'000;     // since the last question o
 constexpr std::size_t kThreads = 6;
 constexpr int kJpegQuality = 85;
 constexpr int kEnlargement = 2;
+constexpr int kNice = 19;  // the least important, whatever the service itself was given
 
 /// One row of the charts.
 struct Moment {
   std::uint64_t sequence = 0;
   std::int64_t at_us = 0;  ///< monotonic
+  std::string state{};     ///< of the estimator
   std::vector<double> offset_deg;
   std::vector<double> sd_deg;
   double contour_rms_px = 0.0;
@@ -140,7 +143,11 @@ struct LivePage::Impl {
       throw DeviceError("the live page cannot have port " + std::to_string(wanted_port) +
                         " on localhost; is it in use?");
     }
-    thread = std::thread([this] { server.listen_after_bind(); });
+    thread = std::thread([this] {
+      // Of this thread and of those it makes: drawing pictures must not take time from the estimator.
+      setpriority(PRIO_PROCESS, 0, kNice);
+      server.listen_after_bind();
+    });
     // stop() only stops a server that runs.
     while (!server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
@@ -173,6 +180,7 @@ struct LivePage::Impl {
         if (m.sequence <= newest && newest < next_sequence) continue;
         moments.push_back({{"sequence", m.sequence},
                            {"age_s", age_s(m.at_us)},
+                           {"state", m.state},
                            {"offset_deg", m.offset_deg},
                            {"sd_deg", m.sd_deg},
                            {"contour_rms_px", m.contour_rms_px},
@@ -181,7 +189,8 @@ struct LivePage::Impl {
       }
       Json& pictures = json["cameras"] = Json::array();
       for (const Shown& camera : cameras) {
-        pictures.push_back({{"name", camera.name}, {"sequence", camera.sequence}, {"age_s", age_s(camera.at_us)}});
+        pictures.push_back({{"name", camera.name}, {"sequence", camera.sequence}, {"age_s", age_s(camera.at_us)},
+                            {"frozen", camera.picture.frozen}});
       }
       json["status_age_s"] = age_s(status_us);
       if (status_us >= 0) {
@@ -202,6 +211,7 @@ struct LivePage::Impl {
         s["memory_mb"] = 1e-6 * static_cast<double>(status.resident_bytes);
         s["weakest"] = status.weakest_direction;
         s["version"] = status.version;
+        s["model_hash"] = status.model_hash;
         s["config_hash"] = status.config_hash;
       }
     }
@@ -212,7 +222,6 @@ struct LivePage::Impl {
   std::string picture(std::size_t camera) {
     const std::lock_guard one_at_a_time(encoding);
     CameraPicture copy;
-    std::string name;
     std::uint64_t sequence = 0;
     {
       const std::lock_guard lock(mutex);
@@ -220,10 +229,9 @@ struct LivePage::Impl {
       const Shown& shown = cameras[camera];
       if (shown.encoded_sequence == shown.sequence) return shown.jpeg;
       copy = shown.picture;
-      name = shown.name;
       sequence = shown.sequence;
     }
-    const Image drawn = draw_overlay({{&copy.image, copy.nominal, copy.corrected}}, name, kEnlargement);
+    const Image drawn = draw_overlay({{&copy.image, copy.nominal, copy.corrected, {}}}, "", kEnlargement);
     const auto message = to_jpeg_message(drawn, 0, kJpegQuality);
     std::string jpeg(message.data.begin(), message.data.end());
     const std::lock_guard lock(mutex);
@@ -261,6 +269,7 @@ void LivePage::add(const Estimate& estimate) {
   Moment moment;
   moment.sequence = impl_->next_sequence++;
   moment.at_us = now;
+  moment.state = to_string(estimate.state);
   for (Eigen::Index k = 0; k < estimate.offset_rad.size(); ++k) {
     moment.offset_deg.push_back(degrees(estimate.offset_rad(k)));
     moment.sd_deg.push_back(degrees(std::sqrt(std::max(0.0, estimate.covariance_rad2(k, k)))));

@@ -345,7 +345,10 @@ Eigen::VectorXd MotionPlanner::rest_posture(const Eigen::VectorXd& like) {
       best = q;
     }
   }
-  if (best.size() == 0) throw DataError("no posture found with the arm out of both views");
+  if (best.size() == 0) {
+    throw DataError(
+        "no posture found with the arm out of both views; simulator.motion.background_frames: 0 asks for none");
+  }
   return best;
 }
 

@@ -5,6 +5,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 #include <fstream>
@@ -303,6 +304,73 @@ TEST_F(Service, StatusFollowsWhatHappens) {
   for (const auto count : silent->latency_count) estimates += count;
   EXPECT_EQ(estimates, silent->frames_estimated);
   EXPECT_EQ(silent->level, offsets_status_t::STALE);
+}
+
+TEST_F(Service, StatusCarriesTheTimeOfEveryStageAndWhatIsRunning) {
+  Listener listener(url_);
+  Process service(daemon(), scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  Robot robot(url_, reach_log(), 0.5);
+  const auto status = listener.wait_status(
+      [](const offsets_status_t& s) { return s.state == "converged" && s.frames_estimated > 30; }, Seconds(60));
+  if (!status && listener.statuses().back().frames_dropped > 0) GTEST_SKIP() << "this machine is too busy";
+  ASSERT_TRUE(status);
+  std::map<std::string, double> median, p99;
+  for (std::size_t i = 0; i < status->stage_name.size(); ++i) {
+    median[status->stage_name[i]] = status->stage_median_ms[i];
+    p99[status->stage_name[i]] = status->stage_p99_ms[i];
+  }
+  for (const char* stage : {"segmentation", "scoring", "refinement", "latency"}) {
+    ASSERT_TRUE(median.contains(stage)) << stage;
+    EXPECT_GT(p99[stage], 0.0) << stage;
+    EXPECT_GE(p99[stage], median[stage]) << stage;
+    EXPECT_LE(median[stage], p99["latency"]) << stage;
+  }
+  ASSERT_EQ(status->latency_bin_upper_ms.size(), status->latency_count.size());
+  EXPECT_TRUE(std::is_sorted(status->latency_bin_upper_ms.begin(), status->latency_bin_upper_ms.end()));
+  EXPECT_THAT(status->model_hash, testing::MatchesRegex("[0-9a-f]+"));
+  EXPECT_THAT(status->config_hash, testing::MatchesRegex("[0-9a-f]+"));
+  EXPECT_THAT(status->weakest_direction, testing::ContainsRegex("r_[a-z_]+.*: sd [0-9.]+ deg"));
+  if (status->level == offsets_status_t::OK) {  // on a slow machine the sentence tells of that instead
+    EXPECT_THAT(status->sentence, HasSubstr("weakest " + status->weakest_direction));
+  }
+  const auto published = listener.offsets();
+  ASSERT_FALSE(published.empty());
+  EXPECT_EQ(published.back().model_hash, status->model_hash);
+  EXPECT_EQ(published.back().config_hash, status->config_hash);
+  service.signal(SIGTERM);
+  EXPECT_EQ(service.wait(Seconds(10)), 0);
+}
+
+TEST_F(Service, SaysWhichCameraSeesNothingOfTheArm) {
+  bot_core::images_t empty;  // the first pictures of the log show the background alone
+  LogReader log(reach_log());
+  for (LogEvent event; log.next(event);) {
+    if (event.channel != "ICUB_CAMERAS") continue;
+    ASSERT_GT(empty.decode(event.data.data(), 0, static_cast<int>(event.data.size())), 0);
+    break;
+  }
+  Listener listener(url_);
+  Process service(daemon(), scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  Robot robot(url_, reach_log(), 0.5);
+  ASSERT_TRUE(listener.wait_status([](const offsets_status_t& s) { return s.state == "converged"; }, Seconds(60)));
+  int n = 0;
+  robot.set_faults({.pictures = [&](bot_core::images_t& pictures, LcmLink&) {
+                      pictures.images[0].data = empty.images[0].data;
+                      pictures.images[0].data[0] = static_cast<std::uint8_t>(++n);  // not frozen, only empty
+                      return true;
+                    },
+                    .joints = {}});
+  EXPECT_TRUE(listener.wait_status(
+      [](const offsets_status_t& s) {
+        return s.level == offsets_status_t::WARN && s.sentence == "mask empty in the left camera";
+      },
+      Seconds(20)))
+      << listener.statuses().back().sentence;
+  robot.set_faults({});
+  service.signal(SIGTERM);
+  EXPECT_EQ(service.wait(Seconds(10)), 0);
 }
 
 TEST_F(Service, WrongInputEndsWithOneClearErrorAndStatusTwo) {

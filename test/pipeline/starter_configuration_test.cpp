@@ -57,6 +57,40 @@ TEST_F(StarterConfiguration, FindsTheArmBetweenRootAndHand) {
   EXPECT_EQ(pipeline.bus().channels().cameras, "ROBOT_CAMERAS");
 }
 
+/// As in a ROS workspace: package://NAME/ stands for a folder above the URDF.
+TEST_F(StarterConfiguration, FindsTheFolderOfThePackageThatHoldsTheMeshes) {
+  const fs::path package = folder_ / "src/lab/pointer_description";
+  fs::create_directories(package / "urdf");
+  fs::create_directories(package / "meshes");
+  std::ofstream(package / "meshes/wedge.stl")
+      << "solid wedge\n"
+         "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 100 0 0\nvertex 0 100 0\nendloop\nendfacet\n"
+         "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0 100 0\nvertex 0 0 100\nendloop\nendfacet\n"
+         "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0 0 100\nvertex 100 0 0\nendloop\nendfacet\n"
+         "facet normal 0 0 1\nouter loop\nvertex 100 0 0\nvertex 0 0 100\nvertex 0 100 0\nendloop\nendfacet\n"
+         "endsolid wedge\n";
+  std::ofstream(package / "urdf/pointer.urdf") << R"(<robot name="pointer">
+  <link name="base"/><link name="eye"/>
+  <link name="tip"><visual><geometry>
+    <mesh filename="package://pointer_description/meshes/wedge.stl" scale="0.001 0.001 0.001"/>
+  </geometry></visual></link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+  <joint name="mount" type="fixed"><parent link="base"/><child link="eye"/></joint>
+</robot>)";
+  StarterOptions o;
+  o.urdf = package / "urdf/pointer.urdf";
+  o.hand_link = "tip";
+  o.camera_links = {"eye"};
+  o.out = folder_ / "mine";
+  EXPECT_THAT(write_starter_configuration(o), HasSubstr("robot and meshes load"));
+
+  fs::rename(package, folder_ / "elsewhere");
+  o.urdf = folder_ / "elsewhere/urdf/pointer.urdf";
+  o.out = folder_ / "astray";
+  EXPECT_THAT(write_starter_configuration(o), HasSubstr("the folder that holds 'pointer_description/'"));
+}
+
 TEST_F(StarterConfiguration, AHumanoidsTorsoIsSharedAndItsHeadIsNoArm) {
   auto o = options();
   o.urdf = kSource / "meshes/icub_right/icub_right.urdf";

@@ -115,6 +115,7 @@ TEST_F(LivePageTest, ShowsEstimateStatusAndPictures) {
   EXPECT_NEAR(json["history"][0]["offset_deg"][0].get<double>(), 5.7296, 1e-3);
   EXPECT_NEAR(json["history"][0]["sd_deg"][0].get<double>(), 0.57296, 1e-4);
   EXPECT_EQ(json["joints"][0], "elbow");
+  EXPECT_EQ(json["history"][0]["state"], "hand_not_in_view");
   EXPECT_EQ(json["status"]["level"], "WARN");
   EXPECT_EQ(json["status"]["sentence"], "hand not in view <script>");
   EXPECT_EQ(json["cameras"][1]["name"], "right");
@@ -127,7 +128,8 @@ TEST_F(LivePageTest, ShowsEstimateStatusAndPictures) {
   EXPECT_TRUE(page_->wants_pictures(true));
   Image image(64, 48, 3);
   BinaryMask mask(64, 48);
-  page_->set_pictures({{0, image, mask, mask}});
+  page_->set_pictures({{0, image, mask, mask, true}});
+  EXPECT_TRUE(nlohmann::json::parse(body(get(port(), "/state.json")))["cameras"][0]["frozen"].get<bool>());
   EXPECT_FALSE(page_->wants_pictures(true)) << "at a bounded rate";
   const std::string jpeg = body(get(port(), "/camera/0.jpg"));
   EXPECT_THAT(jpeg, StartsWith("\xFF\xD8\xFF"));
@@ -152,7 +154,7 @@ TEST_F(LivePageTest, ManyViewersAtOnceWhileTheEstimatorWrites) {
     }
     for (int i = 0; i < 100; ++i) {
       page_->add(estimate);
-      page_->set_pictures({{0, Image(64, 48, 1), BinaryMask(64, 48), BinaryMask(64, 48)}});
+      page_->set_pictures({{0, Image(64, 48, 1), BinaryMask(64, 48), BinaryMask(64, 48), false}});
       page_->set_status(offsets_status_t{});
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }

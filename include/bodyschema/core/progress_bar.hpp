@@ -6,7 +6,7 @@
 namespace bodyschema {
 
 /// Progress of a long command on standard error: a bar with time left on a terminal, otherwise one
-/// plain line every ten per cent. Silent for work that ends within two seconds. One thread.
+/// plain line every ten per cent. Silent for work that ends within two seconds. Any thread may call.
 class ProgressBar {
  public:
   ProgressBar(std::string label, std::uint64_t total);

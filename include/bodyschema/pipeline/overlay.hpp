@@ -26,7 +26,7 @@ struct OverlayNames {
   std::string corrected = "corrected";
 };
 
-/// Left and right side by side, enlarged, with a legend. RGB.
+/// Left and right side by side, enlarged, with a legend (none for an empty caption). RGB.
 Image draw_overlay(const std::vector<OverlayView>& views, const std::string& caption,
                    int enlargement = 2, const OverlayNames& names = {});
 /// Throws FileError when the picture cannot be written.

@@ -27,6 +27,9 @@ struct CameraFacts {
   double moved_meanwhile_rad = 0.0;  ///< largest joint motion in that time
 };
 
+/// Whether its pictures have stayed the same although the arm moved.
+[[nodiscard]] bool is_frozen(const CameraFacts& camera);
+
 /// Everything the verdict rests on. Ages as in CameraFacts.
 struct HealthFacts {
   std::string cameras_channel;

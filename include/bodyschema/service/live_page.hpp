@@ -17,14 +17,15 @@ struct CameraPicture {
   Image image;
   BinaryMask nominal;    ///< encoders as they are
   BinaryMask corrected;  ///< with the estimated offsets taken off
+  bool frozen = false;   ///< the same picture again and again although the arm moves
 };
 
 /// A web page on this machine that shows what the service sees and thinks, for several viewers.
 ///
 /// Answers GET on 127.0.0.1 only, for a handful of fixed paths; nothing is read from disk, nothing
 /// can be changed, other hosts' pages cannot read it. The estimator hands over copies at a bounded
-/// rate, and none at all while nobody watches; drawing and encoding happen in the page's threads.
-/// Any thread may call.
+/// rate, and none at all while nobody watches; drawing and encoding happen in the page's threads, which
+/// the scheduler serves after the estimator's. Any thread may call.
 class LivePage {
  public:
   /// Throws DeviceError when the port cannot be had or the page was not built in.

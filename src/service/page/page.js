@@ -17,6 +17,7 @@ const line = style.getPropertyValue('--line').trim();
 if (window.Chart) {
   Chart.defaults.color = quiet;
   Chart.defaults.borderColor = line;
+  Chart.defaults.font.family = getComputedStyle(document.body).fontFamily;
 }
 
 let since = 0;
@@ -55,6 +56,8 @@ function setHealth(level, sentence) {
 }
 
 const age = (s) => (s < 10 ? s.toFixed(1) : s.toFixed(0)) + ' s';
+const length = (s) => (s < 120 ? s.toFixed(0) + ' s' : s < 7200 ? (s / 60).toFixed(0) + ' min'
+  : (s / 3600).toFixed(0) + ' h');
 
 function setCameras(cameras) {
   const place = byId('cameras');
@@ -71,10 +74,13 @@ function setCameras(cameras) {
     const figure = place.children[i];
     const image = figure.firstChild;
     image.alt = camera.name + ' camera with predicted outlines';
-    const dead = camera.age_s < 0 || camera.age_s > kDeadCameraS;
-    figure.classList.toggle('dead', dead);
-    figure.lastChild.textContent = camera.age_s < 0 ? camera.name + ': no picture yet'
-      : dead ? camera.name + ': no picture for ' + age(camera.age_s) : camera.name;
+    const never = camera.age_s < 0;
+    const silent = never || camera.age_s > kDeadCameraS;
+    figure.classList.toggle('dead', silent || camera.frozen);
+    figure.classList.toggle('never', never);
+    figure.lastChild.textContent = never ? camera.name + ': no picture yet'
+      : silent ? camera.name + ': no picture for ' + age(camera.age_s)
+        : camera.frozen ? camera.name + ': the same picture again and again, although the arm moves' : camera.name;
     if (camera.sequence !== 0 && figure.dataset.sequence !== String(camera.sequence)) {
       figure.dataset.sequence = String(camera.sequence);
       // Shown once it is there, so that the picture never flickers.
@@ -84,6 +90,10 @@ function setCameras(cameras) {
     }
   });
 }
+
+// With the hand out of view the offsets are kept, and there is nothing to fit.
+const held = (m) => m.state === 'hand_not_in_view' || m.state === 'learning_background';
+const fitted = (m) => !held(m) && m.contour_rms_px > 0;
 
 function setOffsets() {
   const last = moments[moments.length - 1];
@@ -105,28 +115,30 @@ function setOffsets() {
     body.rows[k].cells[1].textContent = last.offset_deg[k].toFixed(2) + '\u00b0';
     body.rows[k].cells[2].textContent = '\u00b1 ' + last.sd_deg[k].toFixed(2) + '\u00b0';
   });
-  show('fit', last.contour_rms_px > 0 ? last.contour_rms_px.toFixed(2) + ' px' : '-');
+  show('fit', fitted(last) ? last.contour_rms_px.toFixed(2) + ' px' : '-');
   show('hand', last.hand_sd_mm.toFixed(1) + ' mm');
 }
 
 function draw(now) {
   if (!window.Chart) return;
   const x = (m) => m.at - now;
+  const dashed = moments.map(held);
   const sets = [];
   joints.forEach((name, k) => {
     const colour = kColours[k % kColours.length];
     const mean = (m) => m.offset_deg[k];
-    sets.push({label: name, borderColor: colour, data: moments.map((m) => ({x: x(m), y: mean(m)}))});
-    sets.push({borderWidth: 0, data: moments.map((m) => ({x: x(m), y: mean(m) + m.sd_deg[k]}))});
-    sets.push({borderWidth: 0, backgroundColor: colour + '33', fill: '-1',
-      data: moments.map((m) => ({x: x(m), y: mean(m) - m.sd_deg[k]}))});
+    const edge = (sign) => moments.map((m) => ({x: x(m), y: held(m) ? NaN : mean(m) + sign * m.sd_deg[k]}));
+    sets.push({label: name, borderColor: colour, segment: {borderDash: (s) => (dashed[s.p1DataIndex] ? [3, 4] : undefined)},
+      data: moments.map((m) => ({x: x(m), y: m.state === 'learning_background' ? NaN : mean(m)}))});
+    sets.push({borderWidth: 0, data: edge(1)});
+    sets.push({borderWidth: 0, backgroundColor: colour + '33', fill: '-1', data: edge(-1)});
   });
   offsetChart.data.datasets = sets;
   fitChart.data.datasets = [{borderColor: kColours[0],
-    data: moments.map((m) => ({x: x(m), y: m.contour_rms_px}))}];
+    data: moments.map((m) => ({x: x(m), y: fitted(m) ? m.contour_rms_px : NaN}))}];
   overlapChart.data.datasets = [{borderColor: kColours[4],
     // NaN leaves a gap: with the hand out of view there is nothing to overlap.
-    data: moments.map((m) => ({x: x(m), y: m.likelihood > 0 ? m.likelihood : NaN}))}];
+    data: moments.map((m) => ({x: x(m), y: !held(m) && m.likelihood > 0 ? m.likelihood : NaN}))}];
   const oldest = moments.length ? Math.min(-10, x(moments[0])) : -10;
   for (const chart of [offsetChart, fitChart, overlapChart]) {
     chart.options.scales.x.min = Math.max(-kSpanS, Math.floor(oldest / 10) * 10);
@@ -153,6 +165,7 @@ function take(state) {
     since = Math.max(since, m.sequence);
   }
   moments = moments.filter((m) => now - m.at < kSpanS && m.offset_deg.length === joints.length);
+  document.body.classList.toggle('empty', moments.length === 0);
   setCameras(state.cameras);
   setOffsets();
   draw(now);
@@ -164,11 +177,12 @@ function take(state) {
     setHealth(s.level, s.sentence);
   }
   show('rate', s.frame_rate_hz.toFixed(1));
-  show('latency', s.latency_median_ms.toFixed(1) + ' ms');
+  show('latency', s.frame_rate_hz > 0 ? s.latency_median_ms.toFixed(1) + ' ms' : '-');
+  show('uptime', length(s.uptime_s));
   show('dropped', s.frames_dropped + ' of ' + s.frames_in);
   show('weakest', s.weakest ? 'weakest direction: ' + s.weakest : '');
   show('about', 'version ' + s.version + ', ' + s.engine + ', ' + s.particles + ' particles, ' +
-    s.memory_mb.toFixed(0) + ' MB, configuration ' + s.config_hash);
+    s.memory_mb.toFixed(0) + ' MB, model ' + s.model_hash + ', configuration ' + s.config_hash);
 }
 
 async function ask() {
