@@ -15,6 +15,8 @@ constexpr float kSpacing_px = 3.0f;
 constexpr double kStep_px = 0.5;
 constexpr double kHalf = 127.5;
 constexpr double kHuber_px = 1.0;
+/// A counterpart this far away says no more than none.
+constexpr double kFar_px = 10.0;
 constexpr std::size_t kFewestPoints = 20;
 /// A picture in which less of the outline is found than this shows something else.
 constexpr double kLeastShare = 0.3;
@@ -41,23 +43,29 @@ class Coverage {
     return (1 - b) * ((1 - a) * row[0] + a * row[1]) + b * ((1 - a) * below[0] + a * below[1]);
   }
 
-  /// Distance along the normal to the nearest place where the robot ends.
+  /// Distance along the normal to the nearest place where the robot ends. Looks outwards, so that a
+  /// good prediction costs few pixels.
   [[nodiscard]] std::optional<double> edge(const Eigen::Vector2d& pixel, const Eigen::Vector2d& normal,
                                            double search_px) const {
     const int steps = static_cast<int>(std::ceil(search_px / kStep_px));
-    std::optional<double> best;
-    double previous = -1.0;
-    for (int i = -steps; i <= steps; ++i) {
-      const double t = i * kStep_px;
-      const double value = at(pixel.x() + t * normal.x(), pixel.y() + t * normal.y());
-      if (value >= 0.0 && previous >= kHalf && value < kHalf) {
-        const double crossing = t - kStep_px * (kHalf - value) / (previous - value);
-        if (!best || std::abs(crossing) < std::abs(*best)) best = crossing;
-        if (t > 0.0) break;
-      }
-      previous = value;
+    const auto value_at = [&](int step) {
+      return at(pixel.x() + step * kStep_px * normal.x(), pixel.y() + step * kStep_px * normal.y());
+    };
+    // Between a step and the next one outwards along the normal.
+    const auto crossing = [](int step, double inner, double outer) -> std::optional<double> {
+      if (inner < kHalf || outer < 0.0 || outer >= kHalf) return std::nullopt;
+      return kStep_px * (step + (inner - kHalf) / (inner - outer));
+    };
+    double last_out = value_at(0), last_in = last_out;
+    for (int i = 1; i <= steps; ++i) {
+      const double out = value_at(i), in = value_at(-i);
+      const auto outside = crossing(i - 1, last_out, out), inside = crossing(-i, in, last_in);
+      if (outside && inside) return *outside < -*inside ? outside : inside;
+      if (outside || inside) return outside ? outside : inside;
+      last_out = out;
+      last_in = in;
     }
-    return best;
+    return std::nullopt;
   }
 
  private:
@@ -118,6 +126,7 @@ struct ImageMeasurement::Worker {
     const auto outline = extractor.extract(X_CB, view.camera, kSpacing_px);
     const Coverage coverage(seen.coverage, seen.valid, k.width, k.height);
     points.clear();
+    double misfit = 0.0;
     for (const auto& point : outline) {
       const Eigen::Vector3d p_C = unwarp * point.p_C.cast<double>();
       const Eigen::Vector2d normal = point.normal.cast<double>();
@@ -125,18 +134,27 @@ struct ImageMeasurement::Worker {
       const Eigen::Vector2d bent(corrected.fx * x.x(), corrected.fy * x.y());
       const Eigen::Vector2d pixel = point.pixel.cast<double>() +
                                     c.camera.k1 * x.squaredNorm() * bent + c.dilation_px * normal;
-      const auto distance = coverage.edge(pixel, normal, search_px);
+      const auto distance = coverage.edge(pixel, normal, std::max(search_px, kFar_px));
+      const double far = distance ? std::min(kFar_px, std::abs(*distance)) : kFar_px;
+      misfit += far <= kHuber_px ? far * far : kHuber_px * (2.0 * far - kHuber_px);
       if (!distance || std::abs(*distance) > search_px) continue;
-      const double far = std::abs(*distance);
       points.push_back({point.part, p_C, normal, *distance, far <= kHuber_px ? 1.0 : kHuber_px / far});
     }
-    const auto n = compressor.layout().size();
     if (points.size() < kFewestPoints ||
         static_cast<double>(points.size()) < kLeastShare * static_cast<double>(outline.size())) {
-      out = {Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n), 0.0, 0.0};
-      return;
+      leave_out(out);
+    } else {
+      compressor.compress(points, corrected, out);
     }
-    compressor.compress(points, corrected, out);
+    out.misfit = misfit;
+    out.outline = static_cast<double>(outline.size());
+  }
+
+  void leave_out(CompressedView& out) const {
+    const auto n = compressor.layout().size();
+    out.information.setZero(n, n);
+    out.vector.setZero(n);
+    out.square = out.weight = out.misfit = out.outline = 0.0;
   }
 
   ViewCompressor compressor;
@@ -192,6 +210,10 @@ void ImageMeasurement::compress(std::span<const Corrections> corrections,
   std::atomic<std::size_t> next{0};
   const auto work = [&](Worker& worker) {
     for (std::size_t v; (v = next++) < views_.size();) {
+      if (v / rig_.cameras.size() % every_ != 0) {
+        worker.leave_out(out[v]);
+        continue;
+      }
       worker.compress(views_[v], seen_[v], corrections[v], rig_.cameras[views_[v].camera],
                       search_px_, out[v]);
     }

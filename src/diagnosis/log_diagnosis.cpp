@@ -1,11 +1,7 @@
 #include "bodyschema/diagnosis/log_diagnosis.hpp"
 
-#include <Eigen/Cholesky>
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <optional>
 
@@ -47,28 +43,15 @@ class LogDiagnosis {
     refuse_unusable();
     auto diagnosis = options_.diagnosis;
     if (diagnosis.nuisances.empty()) diagnosis.nuisances = usual_nuisances(measurement_.roles());
-    if (diagnosis.start_offsets.empty()) diagnosis.start_offsets = fitted_offsets();
+    if (diagnosis.start_offsets.empty()) diagnosis.start_offsets = start_offsets_;
     std::optional<ProgressBar> bar;
     if (!options_.quiet) bar.emplace("diagnosis", 100);
     diagnosis.progress = [&](double share) {
       if (bar) bar->set(static_cast<std::uint64_t>(100.0 * share));
     };
-    diagnosis.before_iteration = [this](int iteration) {
-      constexpr double kSearch_px[] = {8.0, 6.0, 4.0};
-      constexpr double kRefitSearch_px[] = {24.0, 18.0, 14.0, 10.0, 7.0, 5.0, 4.0};
-      if (iteration >= kRefit && wide_refit_) {
-        measurement_.set_search(kRefitSearch_px[std::min<std::size_t>(refits_++, std::size(kRefitSearch_px) - 1)]);
-      } else {
-        measurement_.set_search(kSearch_px[std::min(iteration, 2)]);
-      }
-    };
+    diagnosis.noise_rms_px = kNoise_px;
+    diagnosis.trusted_rms_px = kShapeError_px;
     auto report = diagnosed(diagnosis);
-    if (report.before.rms_px > 0.0 && report.after.rms_px <= 0.0) {
-      // Causes so large that their linear estimate lost the outlines: look for them further off.
-      wide_refit_ = true;
-      diagnosis.refit_iterations = std::max(diagnosis.refit_iterations, 12);
-      report = diagnosed(diagnosis);
-    }
     add_remarks(report);
     LogPictures::place_hand(pipeline_, measurement_.views(), report);
     if (!options_.out.empty()) {
@@ -102,57 +85,8 @@ class LogDiagnosis {
     facts_ = {stream.statistics(), stream.synchroniser().joints().missing_joints()};
   }
 
-  /// Offsets that fit the whole log best when nothing else is wrong. The estimator's own are only
-  /// the start: where the model errs much, head and cameras have taken up a part of them, and nuisances
-  /// let loose on outlines tens of pixels away run off.
-  std::map<std::string, double> fitted_offsets() {
-    const auto& roles = measurement_.roles();
-    const auto arm = static_cast<Eigen::Index>(roles.arm.size());
-    Corrections corrections(static_cast<Eigen::Index>(roles.names.size()));
-    for (const auto joint : roles.arm) {
-      const auto start = start_offsets_.find(roles.names[static_cast<std::size_t>(joint)]);
-      if (start != start_offsets_.end()) corrections.dq[joint] = -start->second;
-    }
-    std::vector<CompressedView> views;
-    for (const double search_px : {40.0, 30.0, 24.0, 18.0, 14.0, 11.0, 9.0, 8.0}) {
-      measurement_.set_search(search_px);
-      measurement_.compress(std::vector<Corrections>(measurement_.views().size(), corrections), views);
-      Eigen::MatrixXd A = Eigen::MatrixXd::Zero(arm, arm);
-      Eigen::VectorXd b = Eigen::VectorXd::Zero(arm);
-      for (const auto& view : views) {  // the arm's joints are the layout's first coordinates
-        A += view.information.topLeftCorner(arm, arm);
-        b += view.vector.head(arm);
-      }
-      A.diagonal().array() += 1e-6 * std::max(1e-9, A.diagonal().maxCoeff());
-      const Eigen::VectorXd step = A.ldlt().solve(b);
-      for (Eigen::Index j = 0; j < arm; ++j) {
-        corrections.dq[roles.arm[static_cast<std::size_t>(j)]] += std::clamp(step[j], -kMostStep_rad, kMostStep_rad);
-      }
-    }
-    std::map<std::string, double> offsets;
-    for (const auto joint : roles.arm) offsets[roles.names[static_cast<std::size_t>(joint)]] = -corrections.dq[joint];
-    return offsets;
-  }
-
-  /// What no regression says: that something is left which is no cause of the catalogue, and which
-  /// motion is missing altogether.
+  /// What no regression says: which motion is missing altogether.
   void add_remarks(DiagnosisReport& report) const {
-    if (report.before.rms_px > 0.0 && report.after.rms_px <= 0.0) {
-      report.verdict = "unexplained";
-      report.sentence = "What was found could not be fitted to the log: with it the outlines are lost, so nothing is "
-                        "named. The model is wrong in more than one way at once; mend what is known and diagnose again.";
-      report.causes.clear();
-      report.extended_model = report.baseline_model;
-      report.after = report.before;
-    }
-    if (report.after.rms_px > kShapeError_px) {
-      char text[200];
-      std::snprintf(text, sizeof text,
-                    " It still misses the outlines by %.1f px (rms); good meshes and masks leave 0.3 px. The parts "
-                    "probably have another shape, and causes named here may stand in for it.",
-                    report.after.rms_px);
-      report.sentence += text;
-    }
     const auto& roles = measurement_.roles();
     if (!roles.head.empty() && range_of(roles.head) < kStill_rad) {
       report.warnings.push_back(
@@ -268,9 +202,8 @@ class LogDiagnosis {
   }
 
   static constexpr Microseconds kLearnEvery = 90'000;
-  static constexpr int kRefit = 1000;  ///< DiagnosisOptions::before_iteration counts the refit from here
-  static constexpr double kMostStep_rad = 0.2;
-  static constexpr double kShapeError_px = 0.8;  ///< rms after the extension; a good model leaves 0.3
+  static constexpr double kNoise_px = 0.5;       ///< rms after the extension; a good model leaves 0.3
+  static constexpr double kShapeError_px = 0.8;  ///< ... and where this is left, parts have another shape
   static constexpr double kStill_rad = 0.5 * kPi / 180.0;
   static constexpr const char* kAdvice =
       " for 60 to 120 s: slow and fast, the same postures in both directions, 15 s of rest";
@@ -284,8 +217,6 @@ class LogDiagnosis {
     BusStatistics bus;
     std::vector<std::string> missing_joints;
   } facts_;  ///< of the last pass over the log
-  bool wide_refit_ = false;
-  std::size_t refits_ = 0;
   std::size_t pictures_seen_ = 0, pictures_with_arm_ = 0;
 };
 

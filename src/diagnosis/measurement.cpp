@@ -147,6 +147,9 @@ void ViewCompressor::compress(std::span<const OutlinePoint> points,
   out.vector.noalias() = rows_ * weights_.cwiseProduct(residuals_);
   out.square = weights_.dot(residuals_.cwiseAbs2());
   out.weight = weights_.sum();
+  // Huber's cost: with w = h / |r| it is 2 h |r| - h^2.
+  out.misfit = (weights_.array() * (2.0 - weights_.array()) * residuals_.array().square()).sum();
+  out.outline = static_cast<double>(n);
   rows_ *= weights_.cwiseSqrt().asDiagonal();
   out.information.selfadjointView<Eigen::Lower>().rankUpdate(rows_);
   out.information = out.information.selfadjointView<Eigen::Lower>();

@@ -112,6 +112,40 @@ TEST(BlockStatistics, AColumnCanBeginWithABlock) {
   EXPECT_NEAR(fit.estimate[3], 3.0, 0.05);
 }
 
+TEST(NestedFits, AgreeWithFitsOfAllColumns) {
+  const auto r = regression(test::seed(), 0.3, 0.2);
+  const auto statistics = r.statistics();
+  for (const std::size_t group : {std::size_t{1}, std::size_t{3}}) {
+    const NestedFits nested(statistics, {{0}, {1}}, group);
+    // A column of its own, and the constant once more from a block on.
+    for (const Columns& more : {Columns{{2}}, Columns{{2}, {0, 9}}}) {
+      auto all = Columns{{0}, {1}};
+      all.insert(all.end(), more.begin(), more.end());
+      const auto expected = statistics.fit(all, group), fit = nested.with(more);
+      ASSERT_TRUE(expected.usable && fit.usable);
+      EXPECT_LT((fit.estimate - expected.estimate).norm(), 1e-9);
+      EXPECT_LT((fit.replicas - expected.replicas).norm(), 1e-8);
+      EXPECT_LT((fit.covariance - expected.covariance).norm(), 1e-8 * expected.covariance.norm());
+      EXPECT_LT((fit.model_variance - expected.model_variance).norm(), 1e-9);
+      EXPECT_LT((fit.heldout_loss - expected.heldout_loss).norm(), 1e-7);
+      EXPECT_NEAR(fit.loss, expected.loss, 1e-8);
+    }
+  }
+}
+
+TEST(NestedFits, SayHowMuchOfAColumnIsItsOwn) {
+  auto r = regression(test::seed(), 0.3, 0.0);
+  const Eigen::VectorXd own = r.X.col(2);
+  r.X.col(2) = r.X.col(1) + 0.01 * own;
+  const auto alike = r.statistics();
+  const auto fit = NestedFits(alike, {{0}, {1}}).with({{2}});
+  ASSERT_TRUE(fit.usable);
+  EXPECT_NEAR(fit.independent, 1e-4, 5e-5);  // of its square
+  r.X.col(2) = r.X.col(1);
+  const auto equal = r.statistics();
+  EXPECT_FALSE(NestedFits(equal, {{0}, {1}}).with({{2}}).usable);
+}
+
 TEST(EquivalentZ, AgreesWithChiSquareTables) {
   EXPECT_DOUBLE_EQ(equivalent_z(9.0, 1), 3.0);
   EXPECT_NEAR(equivalent_z(5.991, 2), 1.645, 0.02);   // 95 % one-sided

@@ -30,9 +30,9 @@ struct DiagnosisOptions {
   std::optional<std::vector<CauseName>> fixed_causes;
   /// Where the fit of the offsets starts, rad by joint (encoder = true + offset); others at zero.
   std::map<std::string, double> start_offsets;
-  /// Called before every linearisation of the baseline, counted from 0, and with a large number
-  /// before those of the refit: a source may narrow its search.
-  std::function<void(int)> before_iteration;
+  /// Rms that noise alone leaves, px, and above which no name is trusted; the defaults are for
+  /// sources whose noise is not known.
+  double noise_rms_px = 1e9, trusted_rms_px = 1e9;
   std::function<void(double)> progress;  ///< called with the share done
 };
 

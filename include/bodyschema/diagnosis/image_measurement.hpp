@@ -29,8 +29,11 @@ class ImageMeasurement final : public MeasurementSource {
   void add(const Observation& observation);
   /// The encoder log at full rate, in order of time.
   void set_stream(std::vector<JointSample> stream) { stream_ = std::move(stream); }
-  /// How far along the normal the observed outline is looked for, px.
-  void set_search(double search_px) { search_px_ = search_px; }
+  bool set_search(double search_px, std::size_t every = 1) override {
+    search_px_ = search_px;
+    every_ = every;
+    return true;
+  }
 
   const JointRoles& roles() const override { return roles_; }
   std::span<const ViewInput> views() const override { return views_; }
@@ -55,6 +58,7 @@ class ImageMeasurement final : public MeasurementSource {
   std::vector<JointSample> stream_;
   std::vector<std::unique_ptr<Worker>> workers_;
   double search_px_ = 6.0;
+  std::size_t every_ = 1;
 };
 
 }  // namespace bodyschema

@@ -51,6 +51,11 @@ struct CompressedView {
   Eigen::VectorXd vector;
   double square = 0.0;  ///< r'Wr
   double weight = 0.0;  ///< trace of W: sqrt(square / weight) is the residual's rms in px
+  /// Huber's cost of the whole predicted outline, px^2, and how many points it has. Unlike `square`
+  /// it also counts points whose counterpart is far or missing, so that predictions can be compared
+  /// however far apart they are.
+  double misfit = 0.0;
+  double outline = 0.0;
 };
 
 /// One outline point with its residual.
@@ -108,6 +113,14 @@ class MeasurementSource {
   [[nodiscard]] virtual std::span<const JointSample> stream() const = 0;
   /// Torques of an exposure; `offsets` as InstantBuilder::build.
   virtual void instant(std::size_t view, const Eigen::VectorXd& offsets, Instant& out) = 0;
+  /// How far from the prediction the observed outline is looked for, px, and at every so-manieth
+  /// instant only; the others then count as unseen. False where the source knows which point
+  /// belongs to which: then all of it is always compressed.
+  virtual bool set_search(double search_px, std::size_t every = 1) {
+    static_cast<void>(search_px);
+    static_cast<void>(every);
+    return false;
+  }
   /// Compresses every view's residuals about a prediction with these corrections (one per view).
   virtual void compress(std::span<const Corrections> corrections,
                         std::vector<CompressedView>& out) = 0;

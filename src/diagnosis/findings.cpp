@@ -1,0 +1,327 @@
+#include "findings.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "bodyschema/effects/catalogue.hpp"
+
+namespace bodyschema::diagnosis {
+namespace {
+
+constexpr double kDeg = kPi / 180.0;
+
+CauseName cause_of(const Effect& effect) {
+  return {effect.name(), effect.target().joint, effect.target().source};
+}
+
+/// Two-sided 95 % point of Student's t.
+double student95(double dof) {
+  const double n = std::max(1.0, dof);
+  return 1.96 + 2.37 / n + 2.8 / (n * n) + (n < 3.0 ? 5.0 / (n * n * n) : 0.0);
+}
+
+/// Median over the parameters of how much wider a fit's errors are than white noise would make them.
+double inflation(const BlockFit& fit) {
+  if (!fit.usable) return 1.0;
+  std::vector<double> dispersion;
+  for (Eigen::Index i = 0; i < fit.estimate.size(); ++i) {
+    dispersion.push_back(fit.covariance(i, i) / fit.model_variance[i]);
+  }
+  const auto middle = dispersion.begin() + static_cast<std::ptrdiff_t>(dispersion.size() / 2);
+  std::nth_element(dispersion.begin(), middle, dispersion.end());
+  return *middle;
+}
+
+class Findings {
+ public:
+  Findings(MeasurementSource& source, const SelectionOptions& rules, const CoordinateLayout& layout,
+           const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before)
+      : source_(source), rules_(rules), layout_(layout), plan_(plan), found_(found), baseline_(baseline),
+        before_(before), inflation_(inflation(found.after.fit)), jacobians_(source.views().size()) {}
+
+  DiagnosisReport report(const std::vector<NotTestable>& excluded) {
+    DiagnosisReport report;
+    add_facts(report);
+    report.not_testable = excluded;
+    add_uninformed(report);
+    add_causes(report);
+    add_limits(report);
+    add_bars(report);
+    add_offsets(report);
+    report.before = heldout(before_, report, true);
+    report.after = heldout(found_.after, report, false);
+    report.joint_corrections_before = joint_corrections(before_.at);
+    report.joint_corrections_after = joint_corrections(found_.after.at);
+    report.baseline_model = baseline_;
+    report.extended_model = found_.extended;
+    add_warnings(report);
+    return report;
+  }
+
+ private:
+  [[nodiscard]] std::array<double, 2> interval(Eigen::Index column, double value, double typical) const {
+    const auto& fit = found_.after.fit;
+    if (!fit.usable) {
+      const double inf = std::numeric_limits<double>::infinity();
+      return {-inf, inf};
+    }
+    const double floor = 0.7 * inflation_ * fit.model_variance[column];
+    const double sd = std::sqrt(std::max(fit.covariance(column, column), floor)) * typical;
+    const double half = student95(static_cast<double>(plan_.block_count()) - 1.0) * sd;
+    return {value - half, value + half};
+  }
+
+  void add_facts(DiagnosisReport& report) const {
+    report.z_threshold = rules_.z_enter;
+    report.gain_threshold = rules_.gain_floor;
+    report.duration_s = seconds(source_.views().back().joints.utime -
+                                source_.views().front().joints.utime);
+    report.block_s = plan_.length_s;
+    report.noise_correlation_s = plan_.correlation_s;
+    report.views = source_.views().size();
+    report.blocks = plan_.block_count();
+    const auto& roles = source_.roles();
+    for (const auto joint : roles.arm) {
+      report.arm_joints.push_back(roles.names[static_cast<std::size_t>(joint)]);
+    }
+    report.rest_gain = found_.selection.rest_gain;
+    report.rest_t = found_.selection.rest_t;
+  }
+
+  void add_uninformed(DiagnosisReport& report) const {
+    for (const auto c : found_.selection.not_testable) {
+      const auto& candidate = found_.set.candidates[c];
+      if (candidate.generic() || candidate.slip) continue;
+      report.not_testable.push_back(
+          {name_of(candidate), "in this log it looks exactly like the joint offsets or what is fitted already"});
+    }
+  }
+
+  void add_causes(DiagnosisReport& report) const {
+    const auto& candidates = found_.set.candidates;
+    for (const auto& selected : found_.selection.causes) {
+      const auto& candidate = candidates[selected.candidate];
+      DiagnosedCause cause;
+      cause.cause = name_of(candidate);
+      cause.variable = candidate.variable;
+      cause.z = selected.score.z;
+      cause.heldout_gain = selected.score.gain;
+      cause.same.push_back(cause.cause);
+      for (const auto c : selected.same) cause.same.push_back(name_of(candidates[c]));
+      if (selected.wanders) cause.same.push_back({"unexplained", cause.cause.joint, ""});
+      if (cause.same.size() > 1) cause.advice = splitting_motion(cause.same);
+      for (std::size_t c = 0; c < found_.after.parameters.size(); ++c) {
+        const auto& ref = found_.after.parameters[c];
+        if (cause_of(found_.extended[ref.effect]) != cause.cause) continue;
+        const auto& p = found_.extended[ref.effect].parameters()[ref.parameter];
+        const auto ci = interval(static_cast<Eigen::Index>(c), p.value, p.typical);
+        cause.parameters.push_back({p.name, p.unit, p.in_unit(),
+                                    {ci[0] / p.si_per_unit, ci[1] / p.si_per_unit}});
+      }
+      const bool listed = std::any_of(report.causes.begin(), report.causes.end(), [&](const auto& c) {
+        return c.cause == cause.cause && c.variable == cause.variable;
+      });
+      if (!listed) report.causes.push_back(std::move(cause));
+    }
+  }
+
+  void add_limits(DiagnosisReport& report) const {
+    for (const auto& limit : found_.selection.limits) {
+      const auto& candidate = found_.set.candidates[limit.candidate];
+      if (candidate.generic() || candidate.slip) continue;
+      const auto effect = make_effect(candidate.name, candidate.target, source_.roles());
+      std::size_t i = 0;
+      std::size_t next = 0;
+      for (const auto& p : std::as_const(*effect).parameters()) {
+        if (!p.fitted) continue;
+        const auto& kept = candidate.parameters;
+        if (std::find(kept.begin(), kept.end(), next++) == kept.end()) continue;
+        report.exclusion_limits.push_back({name_of(candidate), p.name, p.unit,
+                                           limit.limit[i++] * p.typical / p.si_per_unit});
+      }
+    }
+  }
+
+  void add_bars(DiagnosisReport& report) const {
+    for (std::size_t c = 0; c < found_.set.candidates.size(); ++c) {
+      const auto& first = found_.selection.first_scores[c];
+      const auto& last = found_.selection.last_scores[c];
+      const auto label = found_.set.candidates[c].description();
+      auto bar = std::find_if(report.bars.begin(), report.bars.end(),
+                              [&](const auto& b) { return b.label == label; });
+      if (bar == report.bars.end()) {
+        const auto& candidate = found_.set.candidates[c];
+        report.bars.push_back({label, candidate.generic(), candidate.nuisance, first.testable, 0.0, 0.0,
+                               0.0, 0.0});
+        bar = report.bars.end() - 1;
+      }
+      // Slips at other times and other shapes of a generic variable share a bar: the best counts.
+      bar->z_before = std::max(bar->z_before, first.z);
+      bar->gain_before = std::max(bar->gain_before, first.gain);
+      bar->z_after = std::max(bar->z_after, last.z);
+      bar->gain_after = std::max(bar->gain_after, last.gain);
+    }
+  }
+
+  void add_offsets(DiagnosisReport& report) const {
+    const auto& roles = source_.roles();
+    for (const auto joint : roles.arm) {
+      const auto& name = roles.names[static_cast<std::size_t>(joint)];
+      report.offsets_deg_before[name] = degrees(baseline_.offsets()[joint]);
+      report.offsets_deg_after[name] = degrees(found_.extended.offsets()[joint]);
+    }
+    for (std::size_t c = 0; c < found_.after.parameters.size(); ++c) {
+      const auto& ref = found_.after.parameters[c];
+      const auto& effect = found_.extended[ref.effect];
+      if (effect.name() != "joint_offset") continue;
+      const auto& p = effect.parameters()[ref.parameter];
+      const auto ci = interval(static_cast<Eigen::Index>(c), p.value, p.typical);
+      report.offsets_ci95_deg[effect.target().joint] = {degrees(ci[0]), degrees(ci[1])};
+    }
+  }
+
+  void add_warnings(DiagnosisReport& report) const {
+    if (plan_.correlation_s <= 0.0) {
+      report.warnings.push_back("no rest of 3 s or more in the log: the noise's correlation time is "
+                                "not measured, blocks are " + std::to_string(std::lround(plan_.length_s)) + " s");
+    }
+    if (found_.selection.crowded) {
+      std::string list;
+      for (const auto& cause : found_.selection.set_aside) {
+        list += (list.empty() ? "" : ", ") + found_.set.candidates[cause.candidate].description();
+      }
+      report.warnings.push_back("several small errors share what is left" +
+                                (list.empty() ? "" : "; none stands out among " + list));
+    }
+    if (report.duration_s < 30.0) {
+      report.warnings.push_back("the log is shorter than 30 s: small causes stay hidden");
+    }
+  }
+
+  [[nodiscard]] Eigen::MatrixXd joint_corrections(const Linearisation& at) const {
+    const auto& arm = source_.roles().arm;
+    Eigen::MatrixXd result(static_cast<Eigen::Index>(at.corrections.size()),
+                           static_cast<Eigen::Index>(arm.size()));
+    for (Eigen::Index v = 0; v < result.rows(); ++v) {
+      for (Eigen::Index j = 0; j < result.cols(); ++j) {
+        result(v, j) =
+            at.corrections[static_cast<std::size_t>(v)].dq[arm[static_cast<std::size_t>(j)]];
+      }
+    }
+    return result;
+  }
+
+  /// Held-out residuals, and the motion of the hand that they ask for.
+  HeldoutError heldout(const ModelFit& fit, DiagnosisReport& report, bool before) {
+    HeldoutError error;
+    const auto& roles = source_.roles();
+    const auto& plan = plan_;
+    const auto views = source_.views();
+    const auto arm = static_cast<Eigen::Index>(roles.arm.size());
+    double square = 0.0, weight = 0.0, mm2 = 0.0, deg2 = 0.0;
+    std::size_t hands = 0;
+    if (before) report.samples.resize(views.size());
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(arm, arm);
+    Eigen::VectorXd b = Eigen::VectorXd::Zero(arm);
+    Eigen::VectorXd x(layout_.size());
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      const auto& view = fit.at.views[v];
+      auto& sample = report.samples[v];
+      if (before) {
+        sample.time_s = seconds(views[v].joints.utime - views.front().joints.utime);
+        sample.camera = views[v].camera;
+        for (const auto joint : roles.arm) {
+          sample.angle_deg.push_back(degrees(fit.at.instants[v].q[joint]));
+          sample.velocity_deg_s.push_back(degrees(fit.at.instants[v].qdot[joint]));
+          sample.torque_nm.push_back(fit.at.instants[v].gravity_torque.size() > 0
+                                         ? fit.at.instants[v].gravity_torque[joint] : 0.0);
+        }
+      }
+      auto& apparent = before ? sample.apparent_deg_before : sample.apparent_deg_after;
+      apparent.assign(static_cast<std::size_t>(arm), 0.0);
+      if (view.weight <= 0.0) continue;
+      x.setZero();
+      if (fit.fit.usable) {
+        const auto replica = fit.fit.replicas.col(static_cast<Eigen::Index>(plan.block_of_view[v]));
+        for (std::size_t c = 0; c < fit.columns.size(); ++c) {
+          for (const auto& e : fit.columns[c].views[v]) {
+            x[static_cast<Eigen::Index>(e.coordinate)] +=
+                static_cast<double>(e.value) * replica[static_cast<Eigen::Index>(c)];
+          }
+        }
+      }
+      const Eigen::VectorXd rest = view.vector - view.information * x;
+      const double loss = view.square - x.dot(view.vector) - x.dot(rest);
+      square += plan.weight_of_view[v] * loss;
+      weight += plan.weight_of_view[v] * view.weight;
+      (before ? sample.rms_px_before : sample.rms_px_after) =
+          std::sqrt(std::max(0.0, loss / view.weight));
+      (before ? sample.mean_px_before : sample.mean_px_after) = rest[layout_.size() - 1] / view.weight;
+      for (Eigen::Index j = 0; j < arm; ++j) {
+        const double information = view.information(j, j);
+        if (information > 0.0) {
+          apparent[static_cast<std::size_t>(j)] = degrees(rest[j] / information);
+        }
+      }
+      // Both eyes of one instant together: the correction of all arm joints, held by a weak prior.
+      const bool same = v > 0 && views[v].joints.utime - views[v - 1].joints.utime < 50'000 &&
+                        views[v].camera != views[v - 1].camera && views[v].camera > 0;
+      if (!same) {
+        A.setZero();
+        b.setZero();
+      }
+      A += view.information.topLeftCorner(arm, arm);
+      b += rest.head(arm);
+      const bool last_of_instant = v + 1 == views.size() || views[v + 1].camera == 0 || same;
+      if (!last_of_instant) continue;
+      Eigen::MatrixXd regular = A;
+      regular.diagonal().array() += 0.25 / (1.0 * kDeg * 1.0 * kDeg);  // (0.5 px)^2 against 1 deg
+      const Eigen::VectorXd dq = regular.ldlt().solve(b);
+      const auto& jacobian = jacobian_at(v, fit.at.corrections[v]);
+      const Eigen::VectorXd motion = jacobian.leftCols(arm) * dq;
+      mm2 += motion.head<3>().squaredNorm() * 1e6;
+      deg2 += motion.tail<3>().squaredNorm() / (kDeg * kDeg);
+      ++hands;
+    }
+    error.rms_px = weight > 0.0 ? std::sqrt(std::max(0.0, square / weight)) : 0.0;
+    if (hands > 0) {
+      error.hand_mm = std::sqrt(mm2 / static_cast<double>(hands));
+      error.hand_deg = std::sqrt(deg2 / static_cast<double>(hands));
+    }
+    return error;
+  }
+
+  const Eigen::MatrixXd& jacobian_at(std::size_t view, const Corrections& corrections) {
+    if (jacobians_[view].size() == 0) jacobians_[view] = source_.hand_jacobian(view, corrections);
+    return jacobians_[view];
+  }
+
+  MeasurementSource& source_;
+  const SelectionOptions& rules_;
+  const CoordinateLayout& layout_;
+  const BlockPlan& plan_;
+  const Found& found_;
+  const ErrorModel& baseline_;
+  const ModelFit& before_;
+  double inflation_;
+  std::vector<Eigen::MatrixXd> jacobians_;
+};
+
+}  // namespace
+
+CauseName name_of(const Candidate& candidate) {
+  return {candidate.name, candidate.target.joint, candidate.target.source};
+}
+
+DiagnosisReport findings(MeasurementSource& source, const SelectionOptions& rules,
+                         const CoordinateLayout& layout, const BlockPlan& plan, const Found& found,
+                         const ErrorModel& baseline, const ModelFit& before,
+                         const std::vector<NotTestable>& excluded) {
+  return Findings(source, rules, layout, plan, found, baseline, before).report(excluded);
+}
+
+}  // namespace bodyschema::diagnosis

@@ -1,0 +1,68 @@
+#include "verdict.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <string>
+
+namespace bodyschema::diagnosis {
+namespace {
+
+std::string text_of(const EstimatedParameter& p) {
+  return fmt::format(" {} {:.3g}{} [{:.3g}, {:.3g}]", p.parameter, p.estimate,
+                     p.unit == "1" ? "" : " " + p.unit, p.ci95[0], p.ci95[1]);
+}
+
+std::string text_of(const DiagnosedCause& cause) {
+  if (cause.cause.name == "unexplained") {
+    return fmt::format("something that follows the {} of {} and that no known cause explains",
+                       cause.variable, cause.cause.joint);
+  }
+  std::string text = cause.cause.text();
+  for (const auto& p : cause.parameters) text += text_of(p);
+  if (cause.same.size() < 2) return text;
+  text += " (or";
+  for (std::size_t i = 1; i < cause.same.size(); ++i) {
+    text += (i > 1 ? ", " : " ") + cause.same[i].text();
+  }
+  return text + ", which this log cannot tell from it)";
+}
+
+}  // namespace
+
+void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options, bool crowded) {
+  const auto is_unexplained = [](const DiagnosedCause& c) { return c.cause.name == "unexplained"; };
+  const auto& causes = report.causes;
+  std::string list;
+  for (const auto& cause : causes) list += (list.empty() ? "" : "; ") + text_of(cause);
+  const double left = report.after.rms_px;
+
+  if (left > options.trusted_rms_px) {
+    report.verdict = "unexplained";
+    report.sentence = fmt::format(
+        "No cause of the catalogue explains this log: the outlines are missed by {:.1f} px (rms) at best, where "
+        "good meshes and masks leave 0.3 px. The parts probably have another shape, or much is wrong at once.", left);
+    if (!list.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + list + ".";
+    return;
+  }
+  if (!causes.empty()) {
+    const bool unexplained = std::any_of(causes.begin(), causes.end(), is_unexplained);
+    const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });
+    report.verdict = unexplained ? "unexplained" : several ? "class" : "named";
+    report.sentence = "The log asks for: " + list + ".";
+    if (left > options.noise_rms_px) {
+      report.sentence += fmt::format(" With it {:.2f} px are left, more than noise: something else is wrong too.", left);
+    }
+    return;
+  }
+  report.verdict = "none";
+  if (crowded) {
+    report.sentence = "No single cause stands out; several small errors share what the joint offsets leave.";
+  } else if (left > options.noise_rms_px) {
+    report.sentence = fmt::format("Nothing but joint offsets was found, but {:.2f} px (rms) are left, more than noise.", left);
+  } else {
+    report.sentence = "The model explains the log to its noise: nothing but joint offsets was found.";
+  }
+}
+
+}  // namespace bodyschema::diagnosis

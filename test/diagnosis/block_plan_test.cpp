@@ -1,0 +1,77 @@
+#include "block_plan.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "diagnosis/trial_robot.hpp"
+
+namespace bodyschema::diagnosis {
+namespace {
+
+/// Rests in which seven quantities shake with slow noise of this time constant beside white noise.
+std::vector<StillStretch> rests(std::uint64_t seed, double time_s, double white_share) {
+  constexpr double kStep_s = 0.1;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  const double decay = time_s > 0.0 ? std::exp(-kStep_s / time_s) : 0.0;
+  std::vector<StillStretch> list;
+  for (int stretch = 0; stretch < 16; ++stretch) {
+    StillStretch rest{Eigen::MatrixXd(7, 150), kStep_s};
+    for (Eigen::Index row = 0; row < 7; ++row) {
+      double slow = normal(random);
+      for (Eigen::Index i = 0; i < 150; ++i) {
+        slow = decay * slow + std::sqrt(1.0 - decay * decay) * normal(random);
+        rest.samples(row, i) = std::sqrt(1.0 - white_share) * slow + std::sqrt(white_share) * normal(random);
+      }
+    }
+    list.push_back(std::move(rest));
+  }
+  return list;
+}
+
+TEST(NoiseCorrelation, IsTheIntegralOfTheAutocorrelation) {
+  for (const double time_s : {0.3, 1.0}) {
+    const double measured = noise_correlation_s(rests(1, time_s, 0.0));
+    EXPECT_GT(measured, 0.5 * time_s) << time_s;
+    EXPECT_LT(measured, 2.0 * time_s + 0.15) << time_s;
+  }
+}
+
+TEST(NoiseCorrelation, OfWhiteNoiseIsLessThanAPicture) {
+  EXPECT_LT(noise_correlation_s(rests(1, 0.0, 1.0)), 0.15);
+  EXPECT_EQ(noise_correlation_s({}), 0.0);
+}
+
+TEST(NoiseCorrelation, CountsTheSlowShareOnly) {
+  const double half = noise_correlation_s(rests(1, 1.0, 0.5));
+  const double whole = noise_correlation_s(rests(1, 1.0, 0.0));
+  EXPECT_LT(half, 0.8 * whole);
+}
+
+TEST(BlockPlan, ARestIsOneBlockThatWeighsAsOne) {
+  const auto log = make_synthetic_log(test::robot(), {}, 1);
+  std::vector<CompressedView> views;
+  log->compress(std::vector<Corrections>(log->views().size(), Corrections(static_cast<Eigen::Index>(log->roles().names.size()))),
+                views);
+  const auto plan = plan_blocks(*log, views, 2.0);
+  ASSERT_EQ(plan.block_of_view.size(), log->views().size());
+  EXPECT_GE(plan.length_s, 2.0);
+  EXPECT_GT(plan.correlation_s, 0.0);
+  EXPECT_GE(plan.block_count(), 10u);
+  EXPECT_NEAR(plan.still_share, 1.0 / 6.0, 0.08);  // the synthetic log rests a sixth of its time
+  std::vector<double> weight(plan.block_count(), 0.0);
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (v > 0) {
+      EXPECT_GE(plan.block_of_view[v], plan.block_of_view[v - 1]);
+    }
+    weight[plan.block_of_view[v]] += plan.weight_of_view[v];
+  }
+  // Without weights the rest's block would hold five times as much as another.
+  const double typical = static_cast<double>(views.size()) * plan.length_s / 60.0;
+  for (const double w : weight) EXPECT_LT(w, 2.2 * typical);
+}
+
+}  // namespace
+}  // namespace bodyschema::diagnosis

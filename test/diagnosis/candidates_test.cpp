@@ -1,0 +1,99 @@
+#include "candidates.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "block_plan.hpp"
+#include "diagnosis/edited_log.hpp"
+#include "diagnosis/trial_robot.hpp"
+#include "regression.hpp"
+
+namespace bodyschema::diagnosis {
+namespace {
+
+using testing::HasSubstr;
+
+Linearisation at_zero(MeasurementSource& log) { return linearise(log, ErrorModel(log.roles())); }
+
+const NotTestable* find(const std::vector<NotTestable>& list, const CauseName& cause) {
+  const auto at = std::find_if(list.begin(), list.end(), [&](const auto& n) { return n.cause == cause; });
+  return at == list.end() ? nullptr : &*at;
+}
+
+TEST(Candidates, AreTheCatalogueTheSlipsAndTheGenericFeatures) {
+  const auto log = make_synthetic_log(test::robot(), {}, 1);
+  const auto at = at_zero(*log);
+  const auto plan = plan_blocks(*log, at.views, 2.0);
+  const auto set = make_candidates(*log, at, plan, CoordinateLayout(log->roles()),
+                                   usual_nuisances(log->roles()), {{{"backlash", "r_elbow", ""}, "for a test"}});
+  EXPECT_EQ(set.offsets.size(), 7u);
+  std::size_t nuisances = 0, generic = 0, slips = 0, backlashes = 0;
+  for (const auto& c : set.candidates) {
+    nuisances += c.nuisance;
+    generic += c.generic();
+    slips += c.slip;
+    backlashes += c.name == "backlash";
+    EXPECT_FALSE(c.columns.empty()) << c.description();
+    EXPECT_FALSE(c.name == "backlash" && c.target.joint == "r_elbow");
+  }
+  EXPECT_EQ(nuisances, usual_nuisances(log->roles()).size());
+  EXPECT_EQ(backlashes, 6u);
+  EXPECT_GT(generic, 7u * 10u);
+  EXPECT_GT(slips, 7u * 60u);  // at least one a second and joint
+}
+
+TEST(Untestable, NamesWhatTheLogLacks) {
+  TrialOptions options;
+  options.frozen_joints = {"r_wrist_pitch"};
+  const auto log = make_synthetic_log(test::robot(), options, 1);
+  const auto list = untestable(*log, at_zero(*log));
+  for (const char* name : {"encoder_gain", "eccentricity", "axis_tilt", "backlash"}) {
+    const auto* item = find(list, {name, "r_wrist_pitch", ""});
+    ASSERT_NE(item, nullptr) << name;
+    EXPECT_THAT(item->reason, HasSubstr("r_wrist_pitch moved 0."));
+    EXPECT_EQ(find(list, {name, "r_elbow", ""}), nullptr) << name;
+  }
+}
+
+TEST(Untestable, OneCameraTestsNothingBetweenTwo) {
+  const auto log = make_synthetic_log(test::robot(), {}, 1);
+  std::vector<std::size_t> left;
+  for (std::size_t v = 0; v < log->views().size(); ++v) {
+    if (log->views()[v].camera == 0) left.push_back(v);
+  }
+  test::EditedLog one(*log, left);
+  const auto list = untestable(one, at_zero(one));
+  for (const char* name : {"camera_skew", "vergence", "baseline"}) {
+    EXPECT_NE(find(list, {name, "", ""}), nullptr) << name;
+  }
+  EXPECT_EQ(find(list, {"latency", "", ""}), nullptr);
+}
+
+TEST(Untestable, RareEncodersKnowNoDirection) {
+  const auto log = make_synthetic_log(test::robot(), {}, 1);
+  auto rare = test::EditedLog::whole(*log);
+  auto& stream = rare.stream_for_editing();
+  std::vector<JointSample> few;
+  for (std::size_t i = 0; i < stream.size(); i += 5) few.push_back(stream[i]);
+  stream = few;
+  const auto list = untestable(rare, at_zero(rare));
+  const auto* item = find(list, {"backlash", "r_elbow", ""});
+  ASSERT_NE(item, nullptr);
+  EXPECT_THAT(item->reason, HasSubstr("every 50 ms"));
+}
+
+TEST(SplittingMotion, IsSaidForEveryAliasOfTheHandbook) {
+  EXPECT_THAT(splitting_motion({{"encoder_gain", "r_elbow", ""}, {"eccentricity", "r_elbow", ""}}),
+              HasSubstr("Sweep r_elbow through more than 90 deg"));
+  EXPECT_THAT(splitting_motion({{"payload", "", ""}, {"compliance", "r_elbow", ""}}), HasSubstr("without the load"));
+  EXPECT_THAT(splitting_motion({{"slip", "r_elbow", ""}, {"drift", "r_elbow", ""}}), HasSubstr("first postures"));
+  EXPECT_THAT(splitting_motion({{"vergence", "", ""}, {"baseline", "", ""}}), HasSubstr("checkerboard"));
+  EXPECT_THAT(splitting_motion({{"base_shift", "", ""}, {"head_offset", "neck_pitch", ""}}),
+              HasSubstr("Move the head by 20 to 30 deg"));
+  EXPECT_FALSE(splitting_motion({{"drift", "r_elbow", ""}, {"latency", "", ""}}).empty());
+}
+
+}  // namespace
+}  // namespace bodyschema::diagnosis

@@ -1,0 +1,107 @@
+#include "bodyschema/diagnosis/diagnosis_page.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <random>
+#include <sstream>
+
+#include "diagnosis/trial_robot.hpp"
+
+namespace bodyschema {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+/// A report in which the elbow's correction follows its angle before the extension and nothing after.
+DiagnosisReport report() {
+  DiagnosisReport r;
+  r.verdict = "named";
+  r.sentence = "The log asks for: encoder_gain of r_elbow.";
+  DiagnosedCause cause;
+  cause.cause = {"encoder_gain", "r_elbow", ""};
+  cause.parameters = {{"gain", "%", 4.0, {3.5, 4.5}}};
+  cause.same = {cause.cause, {"eccentricity", "r_elbow", ""}};
+  cause.advice = "Sweep r_elbow through more than 90 deg.";
+  cause.z = 12.0;
+  cause.heldout_gain = 0.31;
+  r.causes = {cause};
+  r.arm_joints = {"r_shoulder_roll", "r_elbow"};
+  r.bars = {{"encoder_gain of r_elbow", false, false, true, 12.0, 0.31, 0.5, 0.0},
+            {"latency", false, false, true, 1.0, 0.001, 0.7, 0.0},
+            {"payload", false, false, false, 0.0, 0.0, 0.0, 0.0}};
+  r.z_threshold = 4.5;
+  r.gain_threshold = 0.006;
+  r.before = {0.9, 2.0, 0.8};
+  r.after = {0.3, 0.2, 0.1};
+  r.offsets_deg_before = {{"r_shoulder_roll", 1.0}, {"r_elbow", 2.0}};
+  r.offsets_deg_after = {{"r_shoulder_roll", 1.5}, {"r_elbow", 2.5}};
+  r.not_testable = {{{"payload", "", ""}, "the robot's URDF has no masses"}};
+  r.exclusion_limits = {{{"latency", "", ""}, "delay", "ms", 4.2}};
+  std::mt19937_64 random(test::seed());
+  std::normal_distribution<double> normal(0.0, 0.05);
+  for (int i = 0; i < 300; ++i) {
+    ResidualSample s;
+    s.time_s = 0.2 * i;
+    s.rms_px_before = 0.9;
+    s.rms_px_after = 0.3;
+    s.angle_deg = {10.0, 60.0 + 30.0 * std::sin(0.1 * i)};
+    s.velocity_deg_s = {0.0, 15.0 * std::cos(0.1 * i)};
+    s.torque_nm = {0.0, 0.0};
+    s.apparent_deg_before = {normal(random), 0.04 * (s.angle_deg[1] - 60.0) + normal(random)};
+    s.apparent_deg_after = {normal(random), normal(random)};
+    r.samples.push_back(std::move(s));
+  }
+  return r;
+}
+
+std::string page_of(const DiagnosisReport& r) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "diagnosis_page_test.html";
+  diagnosis_page(r, "babble.log", {}).write(file);
+  std::ifstream in(file);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+TEST(DiagnosisPage, BeginsWithTheVerdictAndShowsEveryPart) {
+  const auto page = page_of(report());
+  const auto verdict = page.find("The log asks for: encoder_gain of r_elbow.");
+  const auto gain = page.find("What the extension gains"), chart = page.find("All candidates");
+  ASSERT_NE(verdict, std::string::npos);
+  EXPECT_LT(verdict, gain);
+  EXPECT_LT(gain, chart);
+  for (const char* part : {"3.5 to 4.5", "31.0 %", "Sweep r_elbow", "eccentricity of r_elbow", "0.900 px", "0.300 px",
+                           "threshold 0.6 %", "What this log cannot test", "no masses", "latency", "4.2 ms",
+                           "rising against falling"}) {
+    EXPECT_THAT(page, HasSubstr(part));
+  }
+}
+
+TEST(DiagnosisPage, ShowsTheJointThatFollowsItsVariable) {
+  const auto page = page_of(report());
+  EXPECT_THAT(page, HasSubstr("r_elbow against its angle"));
+  EXPECT_THAT(page, Not(HasSubstr("against its gravity torque")));  // nobody knows the torques
+}
+
+TEST(DiagnosisPage, OfNothingFoundSaysNothingOfCauses) {
+  auto r = report();
+  r.causes.clear();
+  r.sentence = "The model explains the log to its noise.";
+  const auto page = page_of(r);
+  EXPECT_THAT(page, HasSubstr("How well the model predicts"));
+  EXPECT_THAT(page, Not(HasSubstr("What was found")));
+}
+
+TEST(DiagnosisPage, NeedsNoSamples) {
+  auto r = report();
+  r.samples.clear();
+  r.bars.clear();
+  EXPECT_THAT(page_of(r), HasSubstr("The log asks for"));
+}
+
+}  // namespace
+}  // namespace bodyschema

@@ -1,0 +1,82 @@
+#include "model_fit.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "diagnosis/trial_robot.hpp"
+
+namespace bodyschema::diagnosis {
+namespace {
+
+constexpr double kDeg = 3.14159265358979323846 / 180.0;
+
+ErrorModel offsets_of(const MeasurementSource& log, double each_deg) {
+  ErrorModel model(log.roles());
+  for (const auto& target : effect_targets("joint_offset", log.roles())) {
+    model.add("joint_offset", target).parameters()[0].value = each_deg * kDeg;
+  }
+  return model;
+}
+
+TEST(ModelFitter, EndsAtTheSamePlaceWhereverItBegins) {
+  const auto log = make_synthetic_log(test::robot(), {}, test::log_seed());
+  const CoordinateLayout layout(log->roles());
+  ModelFitter fitter(*log, layout, 2.0);
+  auto near = offsets_of(*log, 0.0), far = offsets_of(*log, 12.0);
+  const auto a = fitter.fit(near, {}, {8, {}}), b = fitter.fit(far, {}, {12, {}});
+  EXPECT_NEAR(misfit(a.at, outline_points(a.at)), misfit(b.at, outline_points(a.at)), 1e-3);
+  EXPECT_LT((near.offsets() - far.offsets()).cwiseAbs().maxCoeff(), 0.02 * kDeg);
+}
+
+/// A log whose regression points the wrong way, as it does where every counterpart belongs to
+/// another part of the outline.
+class Misleading final : public MeasurementSource {
+ public:
+  explicit Misleading(MeasurementSource& log) : log_(log) {}
+  const JointRoles& roles() const override { return log_.roles(); }
+  std::span<const ViewInput> views() const override { return log_.views(); }
+  std::span<const JointSample> stream() const override { return log_.stream(); }
+  void instant(std::size_t view, const Eigen::VectorXd& offsets, Instant& out) override {
+    log_.instant(view, offsets, out);
+  }
+  void compress(std::span<const Corrections> corrections, std::vector<CompressedView>& out) override {
+    log_.compress(corrections, out);
+    for (auto& view : out) view.vector *= -3.0;
+  }
+  Eigen::MatrixXd hand_jacobian(std::size_t view, const Corrections& c) override {
+    return log_.hand_jacobian(view, c);
+  }
+
+ private:
+  MeasurementSource& log_;
+};
+
+TEST(ModelFitter, TakesNoStepThatMakesTheOutlinesWorse) {
+  const auto log = make_synthetic_log(test::robot(), {}, test::log_seed());
+  Misleading misleading(*log);
+  const CoordinateLayout layout(log->roles());
+  ModelFitter fitter(misleading, layout, 2.0);
+  auto model = offsets_of(*log, 1.0);
+  const auto begin = fitter.about(model, {});
+  const auto end = fitter.fit(model, {}, {6, {}});
+  const double points = outline_points(begin.at);
+  EXPECT_LE(misfit(end.at, points), 1.01 * misfit(begin.at, points));
+}
+
+TEST(Misfit, CountsPointsThatLeftThePictures) {
+  Linearisation all, few;
+  all.views.push_back({{}, {}, 0.0, 0.0, 200.0, 100.0});
+  few.views.push_back({{}, {}, 0.0, 0.0, 20.0, 10.0});
+  EXPECT_DOUBLE_EQ(misfit(all, 100.0), 2.0);
+  EXPECT_GT(misfit(few, 100.0), 10.0);  // no better for showing a tenth of the outline
+  EXPECT_DOUBLE_EQ(misfit(few, 10.0), 2.0);
+}
+
+TEST(Misfit, StandsForADistance) {
+  EXPECT_DOUBLE_EQ(typical_distance_px(0.25), 0.5);   // quadratic within a pixel
+  EXPECT_DOUBLE_EQ(typical_distance_px(9.0), 5.0);    // 2 |r| - 1 beyond
+}
+
+}  // namespace
+}  // namespace bodyschema::diagnosis

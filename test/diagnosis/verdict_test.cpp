@@ -1,0 +1,93 @@
+#include "verdict.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace bodyschema::diagnosis {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+DiagnosisReport report_of(double left_px, std::vector<DiagnosedCause> causes) {
+  DiagnosisReport report;
+  report.after.rms_px = left_px;
+  report.causes = std::move(causes);
+  return report;
+}
+
+DiagnosedCause gain_of_elbow() {
+  DiagnosedCause cause;
+  cause.cause = {"encoder_gain", "r_elbow", ""};
+  cause.parameters = {{"gain", "%", 4.0, {3.5, 4.5}}};
+  cause.same = {cause.cause};
+  return cause;
+}
+
+DiagnosisOptions picture_options() {
+  DiagnosisOptions options;
+  options.noise_rms_px = 0.5;
+  options.trusted_rms_px = 0.8;
+  return options;
+}
+
+TEST(Verdict, NamesACauseWithItsInterval) {
+  auto report = report_of(0.3, {gain_of_elbow()});
+  word_verdict(report, picture_options(), false);
+  EXPECT_EQ(report.verdict, "named");
+  EXPECT_EQ(report.sentence, "The log asks for: encoder_gain of r_elbow gain 4 % [3.5, 4.5].");
+}
+
+TEST(Verdict, SaysAClassWhereSeveralFit) {
+  auto cause = gain_of_elbow();
+  cause.same.push_back({"eccentricity", "r_elbow", ""});
+  auto report = report_of(0.3, {cause});
+  word_verdict(report, picture_options(), false);
+  EXPECT_EQ(report.verdict, "class");
+  EXPECT_THAT(report.sentence, HasSubstr("(or eccentricity of r_elbow, which this log cannot tell from it)"));
+}
+
+TEST(Verdict, TrustsNoNameWhereTheFitStillMissesTheOutlines) {
+  auto report = report_of(1.3, {gain_of_elbow()});
+  word_verdict(report, picture_options(), false);
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, HasSubstr("1.3 px"));
+  EXPECT_THAT(report.sentence, HasSubstr("encoder_gain of r_elbow"));
+}
+
+TEST(Verdict, SaysNoiseOnlyWhereNoiseIsAllThatIsLeft) {
+  auto good = report_of(0.3, {});
+  word_verdict(good, picture_options(), false);
+  EXPECT_EQ(good.verdict, "none");
+  EXPECT_THAT(good.sentence, HasSubstr("to its noise"));
+
+  auto more = report_of(0.65, {});
+  word_verdict(more, picture_options(), false);
+  EXPECT_EQ(more.verdict, "none");
+  EXPECT_THAT(more.sentence, Not(HasSubstr("to its noise")));
+  EXPECT_THAT(more.sentence, HasSubstr("0.65 px"));
+
+  auto crowd = report_of(0.3, {});
+  word_verdict(crowd, picture_options(), true);
+  EXPECT_EQ(crowd.verdict, "none");
+  EXPECT_THAT(crowd.sentence, HasSubstr("several small errors"));
+
+  auto named = report_of(0.65, {gain_of_elbow()});
+  word_verdict(named, picture_options(), false);
+  EXPECT_EQ(named.verdict, "named");
+  EXPECT_THAT(named.sentence, HasSubstr("something else is wrong too"));
+}
+
+TEST(Verdict, SaysWhatAnUnknownStructureFollows) {
+  DiagnosedCause cause;
+  cause.cause = {"unexplained", "r_elbow", ""};
+  cause.variable = "velocity";
+  cause.same = {cause.cause};
+  auto report = report_of(0.3, {cause});
+  word_verdict(report, picture_options(), false);
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, HasSubstr("follows the velocity of r_elbow"));
+}
+
+}  // namespace
+}  // namespace bodyschema::diagnosis
