@@ -45,6 +45,8 @@ BusOptions BusOptions::from(const Configuration& bus) {
   options.limits.max_joints = static_cast<int>(bus.integer_or("max_joints", options.limits.max_joints, 1, 32'767));
   options.limits.max_width_px = static_cast<int>(bus.integer_or("max_width_px", options.limits.max_width_px, 1, 32'768));
   options.limits.max_height_px = static_cast<int>(bus.integer_or("max_height_px", options.limits.max_height_px, 1, 32'768));
+  const double silence_s = bus.number_or("one_source_silence_s", 2.0, 0.1, 3600.0);
+  if (bus.boolean_or("one_source", false)) options.one_source_silence_s = silence_s;
   options.queue_frames = static_cast<int>(bus.integer_or("queue_frames", options.queue_frames, 1, 10'000));
   return options;
 }

@@ -6,6 +6,7 @@
 #include <lcm/lcm-cpp.hpp>
 
 #include "bodyschema/core/error.hpp"
+#include "guarded_receiver.hpp"
 
 namespace bodyschema {
 
@@ -38,13 +39,18 @@ std::string resolve_lcm_url(const std::optional<std::string>& command_line) {
   return from_environment != nullptr && *from_environment != '\0' ? from_environment : kDefaultLcmUrl;
 }
 
-LcmLink::LcmLink(std::string url) : url_(std::move(url)), lcm_(std::make_unique<lcm::LCM>(url_)) {
+LcmLink::LcmLink(std::string url, std::optional<double> one_source_silence_s)
+    : url_(std::move(url)), lcm_(std::make_unique<lcm::LCM>(url_)) {
   if (!lcm_->good()) throw DeviceError("LCM cannot use '" + url_ + "'" + network_advice(url_));
+  if (one_source_silence_s) {
+    guarded_ = std::make_unique<GuardedReceiver>(url_, static_cast<std::int64_t>(1e6 * *one_source_silence_s));
+  }
 }
 
 LcmLink::~LcmLink() = default;
 
 void LcmLink::subscribe(const std::string& channel, int queue_messages, Handler handler) {
+  if (guarded_) return guarded_->subscribe(channel, queue_messages, std::move(handler));
   auto subscriber = std::make_unique<Subscriber>(Subscriber{std::move(handler)});
   // LCM takes a pattern; ours are names of letters, digits, '_' and '-', which stand for themselves.
   lcm::Subscription* subscription = lcm_->subscribe(channel, &Subscriber::receive, subscriber.get());
@@ -55,7 +61,10 @@ void LcmLink::subscribe(const std::string& channel, int queue_messages, Handler 
   subscribers_.push_back(std::move(subscriber));
 }
 
+RefusedSources LcmLink::refused_sources() const { return guarded_ ? guarded_->refused() : RefusedSources{}; }
+
 bool LcmLink::handle(int timeout_ms) {
+  if (guarded_) return guarded_->handle(timeout_ms);
   const int result = lcm_->handleTimeout(timeout_ms);
   if (result < 0) throw DeviceError("LCM stopped receiving on '" + url_ + "'");
   return result > 0;

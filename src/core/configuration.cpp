@@ -40,18 +40,26 @@ struct Leaf : YAML::Node {
 struct Entry {
   bool mapping = false;
   bool known = false;  ///< some reader asked for it
-  std::vector<std::pair<std::string, Entry>> children;
+  struct Child;
+  std::vector<Child> children;
   Leaf leaf;
   fs::path file;
   int line = 0;
 
-  Entry* find(const std::string& key) {
-    for (auto& [name, child] : children) {
-      if (name == key) return &child;
-    }
-    return nullptr;
-  }
+  Entry* find(const std::string& key);
 };
+
+struct Entry::Child {
+  std::string name;
+  Entry entry;
+};
+
+Entry* Entry::find(const std::string& key) {
+  for (auto& [name, child] : children) {
+    if (name == key) return &child;
+  }
+  return nullptr;
+}
 
 namespace {
 
@@ -106,7 +114,7 @@ void merge_into(Entry& base, Entry&& top) {
     if (Entry* existing = base.find(name)) {
       merge_into(*existing, std::move(child));
     } else {
-      base.children.emplace_back(name, std::move(child));
+      base.children.push_back({name, std::move(child)});
     }
   }
 }
@@ -165,8 +173,8 @@ class Reader {
     merged.file = file;
     own = convert(root, file, 0);
     for (auto it = own.children.begin(); it != own.children.end(); ++it) {
-      if (it->first != "include") continue;
-      Entry include = std::move(it->second);
+      if (it->name != "include") continue;
+      Entry include = std::move(it->entry);
       own.children.erase(it);
       std::vector<std::string> names;
       if (!include.mapping && include.leaf.IsScalar()) {
@@ -215,7 +223,7 @@ class Reader {
       }
       Entry child = convert(pair.second, file, depth + 1);
       child.line = pair.first.Mark().line + 1;
-      entry.children.emplace_back(key, std::move(child));
+      entry.children.push_back({key, std::move(child)});
     }
     return entry;
   }
@@ -334,8 +342,8 @@ struct Configuration::Document {
     while (std::getline(stream, part, '.')) {
       Entry* child = entry->find(part);
       if (child == nullptr) {
-        entry->children.emplace_back(part, Entry{});
-        child = &entry->children.back().second;
+        entry->children.push_back({part, Entry{}});
+        child = &entry->children.back().entry;
       }
       if (!child->mapping) {
         if (child->leaf.IsDefined() && !child->leaf.IsNull()) return;
@@ -352,7 +360,7 @@ struct Configuration::Document {
     Entry child;
     child.known = true;
     child.leaf = Leaf(value);
-    entry->children.emplace_back(key, std::move(child));
+    entry->children.push_back({key, std::move(child)});
   }
 };
 
@@ -385,7 +393,7 @@ Configuration Configuration::load(const fs::path& file, const std::vector<std::s
       Entry parent;
       parent.mapping = true;
       parent.file = top.file;
-      parent.children.emplace_back(*it, std::move(top));
+      parent.children.push_back({*it, std::move(top)});
       top = std::move(parent);
     }
     merge_into(document->root, std::move(top));

@@ -103,6 +103,19 @@ void Pipeline::straighten(CameraObservation& seen, std::size_t camera) {
   if (eyes_[camera].undistorter) seen.image = eyes_[camera].undistorter->apply(seen.image);
 }
 
+void Pipeline::take_background_from(Pipeline& other) {
+  if (!(vision_ == other.vision_) || rig_.cameras.size() != other.rig_.cameras.size()) return;
+  for (std::size_t c = 0; c < eyes_.size(); ++c) {
+    const CameraModel& now = rig_.cameras[c];
+    const CameraModel& before = other.rig_.cameras[c];
+    if (now.name != before.name || now.link != before.link || !(now.intrinsics == before.intrinsics) ||
+        now.distortion != before.distortion) {
+      return;
+    }
+  }
+  for (std::size_t c = 0; c < eyes_.size(); ++c) eyes_[c].segmenter = std::move(other.eyes_[c].segmenter);
+}
+
 void Pipeline::learn_from(const Observation& observation) {
   for (std::size_t c = 0; c < eyes_.size(); ++c) {
     if (!observation.cameras[c]) continue;

@@ -150,6 +150,10 @@ std::optional<std::string> camera_warning(const HealthFacts& f) {
 }
 
 std::optional<std::string> warning(const HealthFacts& f) {
+  if (f.refused.messages > 0) {
+    return fmt::format("{} messages of a second source on {}, {}, refused in the last second", f.refused.messages,
+                       f.refused.channel, f.refused.sender);
+  }
   if (f.since_last.synchroniser.clock_steps > 0) {
     return std::string("the clock of the time stamps stepped back; started anew");
   }
@@ -168,6 +172,7 @@ std::optional<std::string> warning(const HealthFacts& f) {
   }
   if (const auto text = refused(f)) return text;
   if (const auto text = dropped(f)) return text;
+  if (!f.engine_change.empty()) return f.engine_change;
   if (!f.reload_failure.empty()) return "reload refused, going on as before: " + f.reload_failure;
   if (!f.recording_failure.empty()) return "recording has ended: " + f.recording_failure;
   if (f.recording_lost > 0) {

@@ -48,7 +48,9 @@ void Receiver::finish() {
 
 Receiver::Facts Receiver::facts() const {
   const std::lock_guard lock(mutex_);
-  return facts_;
+  Facts facts = facts_;
+  facts.refused = link_.refused_sources();
+  return facts;
 }
 
 void Receiver::work() {

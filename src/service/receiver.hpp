@@ -36,6 +36,7 @@ class Receiver {
     std::int64_t joints_arrived_us = -1;
     std::vector<std::string> missing_joints;
     std::string blocking_joint;
+    RefusedSources refused;
     std::string failure;  ///< why receiving ended by itself; empty: it did not
   };
   [[nodiscard]] Facts facts() const;

@@ -88,8 +88,11 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
   facts.since_last = counts_since(bus, last_bus_);
   facts.estimated_since_last = progress.estimated - last_estimated_;
   facts.shed_since_last = progress.shed - last_shed_;
+  facts.refused = received.refused;
+  facts.refused.messages -= std::min(facts.refused.messages, last_refused_);
   facts.estimate = progress.estimate;
   facts.reload_failure = progress.reload_failure;
+  facts.engine_change = progress.engine_change;
   Recorder::State recording;
   if (recorder != nullptr) recording = recorder->state();
   facts.recording_failure = recording.failure;
@@ -121,7 +124,13 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
     m.counter_name.push_back(name);
     m.counter_value.push_back(static_cast<std::int64_t>(value));
   };
+  // pictures.arrived is the sum of used, refused, all dropped.* and the few that wait.
+  count("messages", bus.messages);
+  count("pictures.arrived", s.images + bus.images_malformed);
+  count("pictures.used", s.images_used);
+  count("pictures.refused", bus.images_malformed);
   for (const auto& [name, value] : bus.counters()) count(name, value);
+  count("refused.second_source", received.refused.messages);
   count("shed.queue", progress.shed);
   count("mono", s.mono_observations);
   count("publishing_failed", progress.publishing_failures);
@@ -157,6 +166,7 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
 
   last_report_us_ = now;
   last_bus_ = bus;
+  last_refused_ = received.refused.messages;
   last_estimated_ = progress.estimated;
   last_shed_ = progress.shed;
   return m;

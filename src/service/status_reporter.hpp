@@ -28,6 +28,7 @@ struct Progress {
   RecentDurations latency_last_second{256};
   StageDurations stages{300};
   std::string reload_failure;
+  std::string engine_change;  ///< as in HealthFacts
   std::uint64_t publishing_failures = 0;
 };
 
@@ -66,6 +67,7 @@ class StatusReporter {
   BusStatistics last_bus_;
   std::uint64_t last_estimated_ = 0;
   std::uint64_t last_shed_ = 0;
+  std::uint64_t last_refused_ = 0;
 };
 
 }  // namespace bodyschema

@@ -154,6 +154,7 @@ class AtlasScorer final : public SilhouetteScorer {
     const std::size_t parts = model_.parts().size();
     assert(counts.size() % cameras_.size() == 0 && X_CB.size() == counts.size() * parts);
     const gl::Context::Current current(*context_);
+    if (!current.ok()) lost();
     if (masks_changed_) upload_masks();
     for (std::size_t i = 0; i < counts.size(); ++i) {
       const std::size_t camera = i % cameras_.size();
@@ -175,12 +176,14 @@ class AtlasScorer final : public SilhouetteScorer {
         counts[tiles_[t].image].predicted = tile_counts_[t].predicted;
       }
     }
+    check_alive();
   }
 
   BinaryMask render(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera) override {
     const auto& k = cameras_.at(camera).intrinsics;
     BinaryMask mask(k.width, k.height);
     const gl::Context::Current current(*context_);
+    if (!current.ok()) lost();
     if (masks_changed_) upload_masks();
     tiles_.clear();
     placements_.clear();
@@ -190,6 +193,7 @@ class AtlasScorer final : public SilhouetteScorer {
     gl_->rendered.write<std::uint32_t>(words);
     draw_tiles(true);
     gl_->rendered.read<std::uint32_t>(words);
+    check_alive();
     // Tiles are cut to whole words: restrict to the picture.
     BinaryMask inside(k.width, k.height);
     inside.fill(true);
@@ -608,11 +612,17 @@ class AtlasScorer final : public SilhouetteScorer {
       draw_tiles(false);
     }
     options_.pass = pass;
+    check_alive();
+  }
+
+  // After a reset of the driver calls fail and counts mean nothing.
+  void check_alive() const {
     if (const GLenum error = gl_->gl.GetError(); error != GL_NO_ERROR) {
       throw gl::ContextError(context_->description() + " fails to draw silhouettes, OpenGL error " +
                              std::to_string(error));
     }
   }
+  [[noreturn]] void lost() const { throw gl::ContextError(context_->description() + " cannot be made current"); }
 
   contour::Model model_;
   std::vector<contour::Camera> cameras_;

@@ -4,6 +4,7 @@
 #include "bodyschema/gl/context.hpp"
 #include "bodyschema/silhouette/silhouette_scorer.hpp"
 #include "contour_scorer.hpp"
+#include "fallback_scorer.hpp"
 
 namespace bodyschema {
 
@@ -14,13 +15,17 @@ std::unique_ptr<SilhouetteScorer> make_silhouette_scorer(const SilhouetteModel& 
   const auto because = [&](std::string why) {
     if (reason != nullptr) *reason = std::move(why);
   };
+  const auto atlas = [&](std::unique_ptr<gl::Context> context) {
+    return with_contour_to_fall_back_on(make_atlas_scorer(model, cameras, std::move(context)), model, cameras,
+                                        options.threads);
+  };
   if (options.engine == "contour") {
     because("the configuration asks for contour");
     return make_contour_scorer(model, cameras, options.threads);
   }
   if (options.engine == "atlas") {
     because("the configuration asks for atlas");
-    return make_atlas_scorer(model, cameras, gl::Context::create(options.gl_platform));
+    return atlas(gl::Context::create(options.gl_platform));
   }
   if (options.engine != "auto") {
     throw std::invalid_argument("silhouette engine '" + options.engine +
@@ -30,7 +35,7 @@ std::unique_ptr<SilhouetteScorer> make_silhouette_scorer(const SilhouetteModel& 
     auto context = gl::Context::create(options.gl_platform);
     if (!context->is_software()) {
       because("auto: " + context->description() + " is a GPU");
-      return make_atlas_scorer(model, cameras, std::move(context));
+      return atlas(std::move(context));
     }
     because("auto: " + context->description() + " draws in software");
   } catch (const gl::ContextError& error) {

@@ -174,6 +174,11 @@ std::vector<offsets_status_t> Listener::statuses() const {
   return statuses_;
 }
 
+std::vector<joint_offsets_t> Listener::take_offsets() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(offsets_, {});
+}
+
 std::optional<offsets_status_t> Listener::wait_status(
     const std::function<bool(const offsets_status_t&)>& wanted, Seconds limit) {
   std::unique_lock lock(mutex_);
@@ -248,6 +253,11 @@ Robot::Robot(const std::string& lcm_url, const fs::path& log, double speed) : li
 }
 
 Robot::~Robot() = default;
+
+void Robot::stop() {
+  thread_.request_stop();
+  if (thread_.joinable()) thread_.join();
+}
 
 void Robot::set_faults(Faults faults) {
   const std::lock_guard lock(mutex_);

@@ -3,6 +3,7 @@
 #include <sys/types.h>
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
@@ -79,6 +80,8 @@ class Listener {
 
   [[nodiscard]] std::vector<joint_offsets_t> offsets() const;
   [[nodiscard]] std::vector<offsets_status_t> statuses() const;
+  /// The estimates since the last call, for tests too long to keep them all.
+  [[nodiscard]] std::vector<joint_offsets_t> take_offsets();
   /// The first status, among those that arrive from now on, that `wanted` accepts.
   std::optional<offsets_status_t> wait_status(const std::function<bool(const offsets_status_t&)>& wanted,
                                               Seconds limit);
@@ -129,6 +132,10 @@ class Robot {
 
   /// Takes effect from the next message on; {} heals.
   void set_faults(Faults faults);
+  /// Nothing goes out any more.
+  void stop();
+  /// Messages that went out, those of faults included.
+  [[nodiscard]] std::int64_t sent() const { return link_.sent; }
 
  private:
   struct Message {
@@ -139,7 +146,15 @@ class Robot {
   void work(const std::stop_token& stop);
   void publish(const Message& message, bool forwards, Microseconds lap_begin);
 
-  LcmLink link_;
+  struct CountingLink : LcmLink {
+    using LcmLink::LcmLink;
+    void publish(const std::string& channel, Microseconds time_us, Bytes message) override {
+      ++sent;
+      LcmLink::publish(channel, time_us, message);
+    }
+    std::atomic<std::int64_t> sent{0};
+  };
+  CountingLink link_;
   double speed_;
   std::vector<Message> messages_;
   Microseconds first_us_ = 0, length_us_ = 0;

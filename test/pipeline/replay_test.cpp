@@ -98,11 +98,65 @@ TEST_F(ReplayTest, WritesEstimatesSummaryAndPictures) {
 }
 
 TEST_F(ReplayTest, TwoReplaysAreIdenticalWhateverTheThreads) {
-  replay(configuration(), options("a"));
-  replay(configuration({"silhouette.threads=3"}), options("b"));
-  EXPECT_EQ(content(folder_ / "a/estimates.jsonl"), content(folder_ / "b/estimates.jsonl"));
+  replay(configuration({"silhouette.threads=1"}), options("a"));
+  for (const char* threads : {"silhouette.threads=2", "silhouette.threads=3"}) {
+    replay(configuration({threads}), options("b"));
+    EXPECT_EQ(content(folder_ / "a/estimates.jsonl"), content(folder_ / "b/estimates.jsonl")) << threads;
+  }
   replay(configuration({"filter.seed=2", "estimator.mode=paper"}), options("c"));
   EXPECT_NE(content(folder_ / "a/estimates.jsonl"), content(folder_ / "c/estimates.jsonl"));
+}
+
+TEST_F(ReplayTest, ALogOfVersion010Replays) {
+  // Recorded by bodyschema-sim 0.1.0: --pictures jpeg --frames 8 --background-frames 5 --seed 11 with
+  // simulator.cameras.noise_levels=0.6. Message types must not change without a way to read this.
+  ReplayOptions o = options("old");
+  o.log = fs::path(BODYSCHEMA_SOURCE_DIR) / "test/pipeline/logs/version_0_1_0.lcmlog";
+  replay(configuration({"vision.learning_frames=5"}), o);
+  std::ifstream lines(o.out / "estimates.jsonl");
+  nlohmann::json last;
+  int count = 0;
+  for (std::string line; std::getline(lines, line); ++count) last = nlohmann::json::parse(line);
+  EXPECT_GE(count, 26) << "of 28 frames";
+  EXPECT_GT(last["likelihood"].get<double>(), 0.8);
+  EXPECT_NEAR(last["offset_deg"]["r_wrist_pitch"].get<double>(), -7.0, 2.0);
+}
+
+/// The mean of every estimate, deg by joint.
+std::vector<std::map<std::string, double>> means_of(const fs::path& estimates) {
+  std::vector<std::map<std::string, double>> means;
+  std::ifstream lines(estimates);
+  for (std::string line; std::getline(lines, line);) {
+    means.push_back(nlohmann::json::parse(line).at("offset_deg").get<std::map<std::string, double>>());
+  }
+  return means;
+}
+
+TEST_F(ReplayTest, BothEnginesGiveTheSameEstimatesWithinHalfADegree) {
+  // They count the same pixels but for some on the outline, and the particles drawn are the same.
+  constexpr double kTolerance_deg = 0.5;
+  for (const std::string mode : {"estimator.mode=best", "estimator.mode=paper"}) {
+    try {
+      replay(configuration({mode, "filter.particles=60", "silhouette.engine=atlas"}), options("atlas"));
+    } catch (const DeviceError& error) {
+      GTEST_SKIP() << error.what();
+    }
+    replay(configuration({mode, "filter.particles=60", "silhouette.engine=contour"}), options("contour"));
+    EXPECT_THAT(content(folder_ / "atlas/summary.json"), HasSubstr("\"engine\": \"atlas on"));
+    EXPECT_THAT(content(folder_ / "contour/summary.json"), HasSubstr("\"engine\": \"contour"));
+    const auto atlas = means_of(folder_ / "atlas/estimates.jsonl");
+    const auto contour = means_of(folder_ / "contour/estimates.jsonl");
+    ASSERT_EQ(atlas.size(), contour.size());
+    ASSERT_FALSE(atlas.empty());
+    double worst = 0.0;
+    for (std::size_t i = 0; i < atlas.size(); ++i) {
+      for (const auto& [joint, value] : atlas[i]) {
+        worst = std::max(worst, std::abs(value - contour[i].at(joint)));
+        EXPECT_NEAR(value, contour[i].at(joint), kTolerance_deg) << mode << ", " << joint << ", frame " << i;
+      }
+    }
+    std::printf("%s: largest difference between the engines %.2g deg\n", mode.c_str(), worst);
+  }
 }
 
 TEST_F(ReplayTest, ALogWithoutOurChannelsIsRefused) {

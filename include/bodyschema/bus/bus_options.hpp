@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "bodyschema/bus/messages.hpp"
@@ -22,6 +23,8 @@ struct BusOptions {
   std::string channel_prefix = "ICUB";
   SynchroniserOptions synchroniser;
   DecodeLimits limits;
+  /// Each channel is taken from one source only, until that is silent for this long; nothing: from all.
+  std::optional<double> one_source_silence_s;
   /// Observations that may wait for the estimator; beyond it the oldest is shed.
   int queue_frames = 8;
 

@@ -20,6 +20,15 @@ inline constexpr const char* kDefaultLcmUrl = "udpm://239.255.76.67:7667?ttl=0";
 /// `-l/--lcm-url` when given and not empty, else LCM_DEFAULT_URL, else kDefaultLcmUrl.
 [[nodiscard]] std::string resolve_lcm_url(const std::optional<std::string>& command_line);
 
+class GuardedReceiver;
+
+/// What came from others than a channel's own source, where only one is admitted.
+struct RefusedSources {
+  std::uint64_t messages = 0;
+  std::string channel;  ///< of the newest
+  std::string sender;   ///< of the newest: address and port
+};
+
 /// A connection to LCM: publishes, and hands every message of the subscribed channels to one
 /// function. publish() may be called from any thread; handle() from one.
 class LcmLink : public MessageSink {
@@ -28,7 +37,9 @@ class LcmLink : public MessageSink {
   using Handler = std::function<void(const std::string& channel, Bytes message, std::int64_t arrival_us)>;
 
   /// Throws DeviceError naming the URL and what to do when the network cannot be used.
-  explicit LcmLink(std::string url);
+  /// @param one_source_silence_s  when given, each channel is taken from one source only (a process,
+  ///   by address and port): the first one heard, until it is silent for longer than this
+  explicit LcmLink(std::string url, std::optional<double> one_source_silence_s = {});
   ~LcmLink() override;
   LcmLink(const LcmLink&) = delete;
   LcmLink& operator=(const LcmLink&) = delete;
@@ -44,12 +55,15 @@ class LcmLink : public MessageSink {
   void publish(const std::string& channel, Microseconds time_us, Bytes message) override;
 
   [[nodiscard]] const std::string& url() const { return url_; }
+  /// None where every source is admitted. Any thread.
+  [[nodiscard]] RefusedSources refused_sources() const;
 
  private:
   struct Subscriber;
   std::string url_;
   std::unique_ptr<lcm::LCM> lcm_;
   std::vector<std::unique_ptr<Subscriber>> subscribers_;
+  std::unique_ptr<GuardedReceiver> guarded_;  ///< receives instead of LCM, where it is there
 };
 
 }  // namespace bodyschema

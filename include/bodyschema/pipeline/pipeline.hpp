@@ -40,6 +40,11 @@ class Pipeline {
   /// Starts over; a learned background is kept.
   void reset() { estimator_.reset(); }
 
+  /// Takes over the background that the pipeline this one replaces has learned, where cameras and
+  /// vision settings are the same: a hand in view would be learned as background now. `other`
+  /// segments no more afterwards.
+  void take_background_from(Pipeline& other);
+
   /// Offline learning of the background, for methods that learn: every picture of a log, then
   /// `finish_learning`.
   void learn_from(const Observation& observation);

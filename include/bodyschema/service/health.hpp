@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "bodyschema/bus/lcm_link.hpp"
 #include "bodyschema/bus/observation_stream.hpp"
 #include "bodyschema/estimator/estimate.hpp"
 
@@ -47,7 +48,10 @@ struct HealthFacts {
   std::uint64_t estimated_since_last = 0;
   std::uint64_t shed_since_last = 0;
 
+  RefusedSources refused;        ///< the newest sender that was refused, and how many messages since
+                                 ///< the verdict before this one
   Estimate estimate;             ///< the last one; meaningless while estimate_age_ms is negative
+  std::string engine_change;     ///< how drawing is not what it was at the start; empty: it is
   std::string reload_failure;    ///< why the last reload was refused; empty: none
   std::string recording_failure; ///< empty: none
   std::uint64_t recording_lost = 0;  ///< messages

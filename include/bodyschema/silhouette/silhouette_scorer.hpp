@@ -40,7 +40,9 @@ struct SilhouetteCounts {
 /// Scores many predicted silhouettes against the observed ones: the project's hot loop.
 ///
 /// One scorer serves one model, one set of cameras and one thread at a time. Results do not depend
-/// on thread counts. `score` neither throws nor allocates once the batch size has been seen.
+/// on thread counts. `score` does not allocate once the batch size has been seen.
+/// Nothing throws but a GL engine by itself whose context is lost (gl::ContextError); those that
+/// make_silhouette_scorer gives then go on with the contour engine.
 class SilhouetteScorer {
  public:
   virtual ~SilhouetteScorer() = default;

@@ -62,6 +62,7 @@ struct VisionSetup {
 
   /// Reads and checks the section; throws ConfigurationError.
   static VisionSetup from(const Configuration& vision);
+  friend bool operator==(const VisionSetup&, const VisionSetup&) = default;
 };
 
 }  // namespace bodyschema

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "bodyschema/bus/lcm_link.hpp"
+#include "bodyschema/bus/udpm_assembler.hpp"
+
+namespace bodyschema {
+
+/// Receives LCM's UDP multicast packets on a socket of its own, because LCM's interface does not say
+/// who sent a message, and takes each channel's messages from one source only (ChannelOwners).
+/// A thread reads packets; handle() runs the handlers.
+class GuardedReceiver {
+ public:
+  /// @param lcm_url  udpm://
+  /// Throws DeviceError when the URL is another or the group cannot be joined.
+  GuardedReceiver(const std::string& lcm_url, std::int64_t silence_us);
+  ~GuardedReceiver();
+  GuardedReceiver(const GuardedReceiver&) = delete;
+  GuardedReceiver& operator=(const GuardedReceiver&) = delete;
+
+  void subscribe(const std::string& channel, int queue_messages, LcmLink::Handler handler);
+  /// As LcmLink::handle().
+  bool handle(int timeout_ms);
+  [[nodiscard]] RefusedSources refused() const;
+
+ private:
+  struct Arrived {
+    std::string channel;
+    std::vector<std::uint8_t> bytes;
+    std::int64_t wall_us = 0;
+  };
+  struct Subscription {
+    std::size_t capacity = 0;
+    std::size_t waiting = 0;
+    LcmLink::Handler handler;
+  };
+  void work();
+  void take(UdpmAssembler::Message message);
+
+  int socket_ = -1;
+  std::atomic<bool> stopping_{false};
+  mutable std::mutex mutex_;
+  std::condition_variable arrived_;
+  std::map<std::string, Subscription> subscriptions_;
+  std::deque<Arrived> queue_;
+  ChannelOwners owners_;
+  RefusedSources refused_;
+  std::thread thread_;
+};
+
+}  // namespace bodyschema
