@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "bodyschema/core/clock.hpp"
 #include "bodyschema/core/error.hpp"
 
 namespace bodyschema {
@@ -19,18 +20,6 @@ namespace {
 
 constexpr std::size_t kLargestPacket = 65'536;
 constexpr int kPoll_ms = 50;
-
-std::int64_t wall_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
-
-std::int64_t steady_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 /// Group and port of "udpm://group:port?...", as LCM reads it.
 sockaddr_in group_of(const std::string& url) {
@@ -114,7 +103,7 @@ void GuardedReceiver::take(UdpmAssembler::Message message) {
     const std::lock_guard lock(mutex_);
     const auto at = subscriptions_.find(message.channel);
     if (at == subscriptions_.end()) return;
-    if (!owners_.admit(message.channel, message.sender, steady_us())) {
+    if (!owners_.admit(message.channel, message.sender, monotonic_us())) {
       const bool news = refused_.channel != message.channel || refused_.sender != message.sender.text();
       ++refused_.messages;
       refused_.channel = message.channel;

@@ -21,7 +21,7 @@ using namespace diagnosis;
 class Diagnoser {
  public:
   Diagnoser(MeasurementSource& source, const DiagnosisOptions& options)
-      : source_(source), options_(options), nuisances_(options.nuisances), layout_(source.roles()),
+      : source_(source), options_(options), layout_(source.roles()),
         fitter_(source, layout_, options.block_s) {}
 
   DiagnosisReport run() {
@@ -43,16 +43,13 @@ class Diagnoser {
       fitter_.accumulate_on({}, before_);
       found = nearer ? search(nearer->first, nearer->second) : search(before_.at, baseline_);
     }
-    look_between_base_and_eyes(found);
     auto report = findings(source_, options_.selection, layout_, fitter_.plan(), found, baseline_, before_, excluded_);
-    name_still_head(report);
     word_verdict(report, options_, found.selection.crowded);
     progress(1.0);
     return report;
   }
 
  private:
-  static constexpr const char* kBaseShift = "base_shift";
   static constexpr double kWorthwhile = 0.8;
   static constexpr double kFar_px = 1.0;     ///< Huber's cost counts every pixel beyond it less
   static constexpr double kBetter = 0.8;
@@ -105,7 +102,7 @@ class Diagnoser {
   /// One pass over the catalogue, linear about `at`, the linearisation of `model`.
   Found search(const Linearisation& at, const ErrorModel& model) {
     const auto& plan = fitter_.plan();
-    Found found{make_candidates(source_, at, plan, layout_, nuisances_, excluded_), {}, baseline_, {}};
+    Found found{make_candidates(source_, at, plan, layout_, options_.nuisances, excluded_), {}, baseline_, {}};
     auto& set = found.set;
     set_tolerances(set);
     const auto bare = only_offsets(source_, layout_, at, model);
@@ -167,53 +164,6 @@ class Diagnoser {
            typical_distance_px(before) > kFar_px && after < kBetter * before;
   }
 
-  /// While the head stands still, a shifted base stands for any length between base and eyes, and
-  /// offsets and nuisances bend themselves to imitate it. It is only asked where causes that can be
-  /// told apart leave more than noise, and then before them: as part of the baseline.
-  void look_between_base_and_eyes(Found& found) {
-    const auto held_back = std::find_if(excluded_.begin(), excluded_.end(),
-                                        [](const auto& e) { return e.cause.name == kBaseShift; });
-    if (held_back == excluded_.end() || options_.fixed_causes || !options_.selection.search ||
-        found.after.at.rms_px() <= options_.noise_rms_px) {
-      return;
-    }
-    constexpr int kIterations = 16;
-    const double outline = outline_points(before_.at);
-    std::optional<std::pair<ErrorModel, ModelFit>> best;
-    for (const auto& start : {baseline_, offsets_alone_}) {
-      auto shifted = start;
-      shifted.add(kBaseShift, {});
-      auto fit = fitter_.fit(shifted, {}, {kIterations, {}});
-      if (!best || misfit(fit.at, outline) < misfit(best->second.at, outline)) {
-        best.emplace(std::move(shifted), std::move(fit));
-      }
-    }
-    if (best->second.at.rms_px() > kBetter * found.after.at.rms_px()) return;
-    excluded_.erase(held_back);
-    nuisances_.push_back({kBaseShift, "", ""});
-    still_head_ = true;
-    found = search(best->second.at, best->first);
-  }
-
-  /// The class of a base shift that was found before a still head: what moves the arm as a whole in
-  /// the pictures.
-  void name_still_head(DiagnosisReport& report) const {
-    if (!still_head_) return;
-    const auto& roles = source_.roles();
-    for (auto& cause : report.causes) {
-      if (cause.cause.name != kBaseShift) continue;
-      std::vector<CauseName> alike;
-      for (const std::size_t i : {std::size_t{0}, std::size_t{2}, std::size_t{3}}) {
-        if (i < roles.head.size()) alike.push_back({"head_offset", roles.names[static_cast<std::size_t>(roles.head[i])], ""});
-      }
-      alike.push_back({"principal_point", "", "common"});
-      for (auto& other : alike) {
-        if (std::find(cause.same.begin(), cause.same.end(), other) == cause.same.end()) cause.same.push_back(std::move(other));
-      }
-      cause.advice = splitting_motion(cause.same);
-    }
-  }
-
   void set_tolerances(CandidateSet& set) const {
     for (auto& candidate : set.candidates) {
       const auto at = options_.tolerances.find(candidate.name);
@@ -270,7 +220,7 @@ class Diagnoser {
     for (const auto& target : effect_targets("joint_offset", source_.roles())) {
       model.add("joint_offset", target);
     }
-    for (const auto& nuisance : nuisances_) {
+    for (const auto& nuisance : options_.nuisances) {
       model.add(nuisance.name, {nuisance.joint, nuisance.source});
     }
     return model;
@@ -291,14 +241,12 @@ class Diagnoser {
 
   MeasurementSource& source_;
   const DiagnosisOptions& options_;
-  std::vector<CauseName> nuisances_;
   CoordinateLayout layout_;
   ModelFitter fitter_;
   ErrorModel baseline_{JointRoles{}};
   ErrorModel offsets_alone_{JointRoles{}};  ///< the baseline with its nuisances at zero
   ModelFit before_;  ///< about the baseline
   std::vector<NotTestable> excluded_;
-  bool still_head_ = false;  ///< a base shift was found although the head never moved
 };
 
 }  // namespace

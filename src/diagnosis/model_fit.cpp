@@ -154,8 +154,8 @@ ModelFit ModelFitter::fit(ErrorModel& model, const std::vector<const SparseColum
     }
     accepted = regress(moved, std::move(at), extra);
     model = std::move(moved);
-    if (settings.progress) settings.progress(static_cast<double>(++i) / settings.iterations);
-    else ++i;
+    ++i;
+    if (settings.progress) settings.progress(static_cast<double>(i) / settings.iterations);
   }
   return accepted;
 }

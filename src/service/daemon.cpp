@@ -15,6 +15,7 @@
 #include <mutex>
 #include <thread>
 
+#include "bodyschema/core/clock.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/pipeline/estimate_line.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
@@ -36,12 +37,6 @@ constexpr milliseconds kPoll{50};
 constexpr milliseconds kStatusPeriod{1000};
 constexpr std::size_t kTimingsWindow = 100'000;
 constexpr int kEngineCheckFrames = 8;
-
-Microseconds wall_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 double ms_between(std::int64_t from_us, std::int64_t to_us) {
   return 1e-3 * static_cast<double>(to_us - from_us);

@@ -16,9 +16,9 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "bodyschema/core/clock.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
-#include "bodyschema/service/durations.hpp"
 #include "bodyschema/service/health.hpp"
 #include "page_assets.hpp"
 

@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "bodyschema/service/durations.hpp"
+#include "bodyschema/core/clock.hpp"
 
 namespace bodyschema {
 

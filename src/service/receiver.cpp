@@ -3,9 +3,8 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 
-#include "bodyschema/service/durations.hpp"
+#include "bodyschema/core/clock.hpp"
 
 namespace bodyschema {
 
@@ -15,12 +14,6 @@ constexpr int kPoll_ms = 50;
 // LCM keeps this many messages for us while we are busy; at 30 Hz two seconds of pictures.
 constexpr int kWaitingPictures = 64;
 constexpr int kWaitingJoints = 512;
-
-std::int64_t wall_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(
-             std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 }  // namespace
 

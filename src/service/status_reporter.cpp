@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <limits>
 
@@ -100,9 +99,7 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
   const Health health = assess(facts);
 
   offsets_status_t m;
-  m.utime = std::chrono::duration_cast<std::chrono::microseconds>(
-                std::chrono::system_clock::now().time_since_epoch())
-                .count();
+  m.utime = wall_us();
   m.uptime_us = now - start_us_;
   m.level = static_cast<std::int8_t>(health.level);
   m.sentence = health.sentence;

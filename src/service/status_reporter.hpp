@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "bodyschema/bus/messages.hpp"
+#include "bodyschema/core/clock.hpp"
 #include "bodyschema/estimator/estimate.hpp"
 #include "bodyschema/service/durations.hpp"
 #include "bodyschema/service/health.hpp"

@@ -41,10 +41,5 @@ TEST(StageDurations, TableNamesEveryStage) {
   EXPECT_THAT(table, testing::HasSubstr("12.50"));
 }
 
-TEST(MonotonicClock, NeverGoesBack) {
-  const auto before = monotonic_us();
-  EXPECT_LE(before, monotonic_us());
-}
-
 }  // namespace
 }  // namespace bodyschema

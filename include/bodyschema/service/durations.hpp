@@ -8,9 +8,6 @@
 
 namespace bodyschema {
 
-/// Microseconds on a clock that never steps; comparable within this process only.
-[[nodiscard]] std::int64_t monotonic_us();
-
 /// The most recent durations of one kind, up to a fixed number. One thread.
 class RecentDurations {
  public:
