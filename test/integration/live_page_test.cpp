@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -45,7 +47,7 @@ class LivePageInBrowser : public testing::Test {
                                         "--until", "Number(document.body.dataset.updates) > 3"};
     command.insert(command.end(), more.begin(), more.end());
     Process chromium(command, scratch_.folder());
-    EXPECT_EQ(chromium.wait(Seconds(180)), 0) << chromium.err();
+    EXPECT_EQ(chromium.wait(Seconds(240)), 0) << chromium.err();
     const auto json = nlohmann::json::parse(chromium.out(), nullptr, false);
     return json.is_object() ? json["tabs"] : nlohmann::json::array({""});
   }
@@ -69,6 +71,19 @@ class LivePageInBrowser : public testing::Test {
   const int port_ = 33'000 + getpid() % 10'000;
   Scratch scratch_;
 };
+
+/// A browser that dies is no word on the page: the helper notices at once and tries another.
+TEST(Browser, ThatGoesAwayIsStartedAnewAndThenGivenUp) {
+  if (std::system("command -v python3 >/dev/null 2>&1") != 0) GTEST_SKIP() << "python3 is not installed";
+  const Scratch scratch;
+  const auto chromium = scratch / "chromium";
+  std::ofstream(chromium) << "#!/bin/sh\necho 'no display today' >&2\nexec sleep 0.2\n";
+  std::filesystem::permissions(chromium, std::filesystem::perms::owner_all);
+  Process helper({"python3", BODYSCHEMA_SOURCE_DIR "/test/integration/browser.py", "http://localhost:1/"},
+                 scratch.folder(), {{"PATH", scratch.folder().string() + ":" + std::getenv("PATH")}});
+  ASSERT_EQ(helper.wait(Seconds(30)), 1) << helper.err();
+  EXPECT_THAT(helper.err(), HasSubstr("start 3: Target.createTarget: the browser went away\nno display today"));
+}
 
 TEST_F(LivePageInBrowser, LoadsUpdatesAndShowsADeadCameraAsDead) {
   Process service({"bodyschemad", "--config", reach_configuration(), "-l", url_, "--page", std::to_string(port_)},
