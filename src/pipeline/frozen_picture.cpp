@@ -21,17 +21,18 @@ std::uint64_t digest_of(const Image& image) {
 
 }  // namespace
 
-void FrozenPicture::look(const Image& image, const Eigen::VectorXd& q) {
+PictureChange FrozenPicture::look(const Image& image, const Eigen::VectorXd& q) {
   const std::uint64_t digest = digest_of(image);
-  repeated_ = !first_ && digest == digest_ && q.size() == q_.size();
-  if (repeated_) {
-    moved_rad_ = std::max(moved_rad_, (q - q_).cwiseAbs().maxCoeff());
-    return;
+  change_.repeated = !first_ && digest == digest_ && q.size() == q_.size();
+  if (change_.repeated) {
+    change_.moved_rad = std::max(change_.moved_rad, (q - q_).cwiseAbs().maxCoeff());
+    return change_;
   }
   first_ = false;
   digest_ = digest;
   q_ = q;
-  moved_rad_ = 0.0;
+  change_.moved_rad = 0.0;
+  return change_;
 }
 
 }  // namespace bodyschema

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <fstream>
 #include <iterator>
+#include <stdexcept>
 
 #include "bodyschema/bus/yarp_import.hpp"
 #include "bodyschema/core/error.hpp"
@@ -91,16 +92,13 @@ Pipeline::Pipeline(const Configuration& configuration)
                                camera.intrinsics.height),
                      camera.has_distortion() ? std::optional<Undistorter>(camera) : std::nullopt});
   }
+  changes_.resize(eyes_.size());
 }
 
 ObservationStream Pipeline::make_stream() const {
   ObservationStream stream(robot_, setup_, rig_, bus_);
   if (error_model_) stream.set_follower(std::make_unique<OnlineErrorModel>(robot_, setup_, *error_model_));
   return stream;
-}
-
-void Pipeline::straighten(CameraObservation& seen, std::size_t camera) {
-  if (eyes_[camera].undistorter) seen.image = eyes_[camera].undistorter->apply(seen.image);
 }
 
 void Pipeline::take_background_from(Pipeline& other) {
@@ -128,31 +126,73 @@ void Pipeline::finish_learning() {
   for (auto& eye : eyes_) eye.segmenter.finish_learning();
 }
 
-Estimate Pipeline::process(Observation& observation) {
+Estimate Pipeline::process(Observation& observation, const Observation* next) {
   segment(observation);
+  if (next == nullptr || vision_.method == SegmentationMethod::kStatistics) return estimate(observation);
+  ahead_ = std::async(std::launch::async, [this, next] { return look(*next); });
+  struct Wait {
+    const std::future<Looks>& ahead;
+    ~Wait() { ahead.wait(); }
+  } const wait{ahead_};
   return estimate(observation);
+}
+
+bool Pipeline::frozen(const PictureChange& change) {
+  return change.repeated && change.moved_rad > kFrozenMotion_rad;
+}
+
+/// All that can be done before the estimate of the observation before is known; asks nothing of the
+/// estimator but for `statistics`.
+Pipeline::Looks Pipeline::look(const Observation& observation) {
+  Looks looks{observation.utime, std::vector<std::optional<Look>>(eyes_.size())};
+  for (std::size_t c = 0; c < eyes_.size(); ++c) {
+    if (!observation.cameras[c]) continue;
+    const CameraObservation& seen = *observation.cameras[c];
+    Eye& eye = eyes_[c];
+    Look& look = looks.of[c].emplace();
+    look.change = eye.picture.look(seen.image, seen.joints.q);
+    if (frozen(look.change)) continue;
+    if (eye.undistorter) look.straightened = eye.undistorter->apply(seen.image);
+    std::optional<BinaryMask> predicted;
+    if (vision_.method == SegmentationMethod::kStatistics) {
+      predicted = estimator_.predicted_silhouette(observation, c, true);
+    }
+    eye.segmenter.segment(look.straightened ? *look.straightened : seen.image, look.mask, look.valid,
+                          look.coverage, predicted ? &*predicted : nullptr);
+    look.learning = !eye.segmenter.ready();
+  }
+  return looks;
+}
+
+Pipeline::Looks Pipeline::looks_at(const Observation& observation) {
+  if (!ahead_.valid()) return look(observation);
+  Looks looks = ahead_.get();
+  if (looks.utime != observation.utime) {
+    throw std::logic_error("Pipeline: another observation comes than was announced");
+  }
+  return looks;
 }
 
 bool Pipeline::segment(Observation& observation) {
   const auto start = std::chrono::steady_clock::now();
+  Looks looks = looks_at(observation);
   learning_ = false;
-  const bool predict = tracking_ || vision_.method == SegmentationMethod::kStatistics;
   for (std::size_t c = 0; c < eyes_.size(); ++c) {
-    if (!observation.cameras[c]) continue;
+    if (!looks.of[c]) continue;
+    Look& look = *looks.of[c];
     CameraObservation& seen = *observation.cameras[c];
-    FrozenPicture& picture = eyes_[c].picture;
-    picture.look(seen.image, seen.joints.q);
-    if (picture.repeated() && picture.moved_rad() > kFrozenMotion_rad) {
-      seen.mask = seen.valid = BinaryMask();
-      seen.coverage.clear();
-      continue;
+    changes_[c] = look.change;
+    if (look.straightened) seen.image = std::move(*look.straightened);
+    seen.mask = std::move(look.mask);
+    seen.valid = std::move(look.valid);
+    seen.coverage = std::move(look.coverage);
+    learning_ = learning_ || look.learning;
+    if (frozen(look.change)) continue;
+    std::optional<BinaryMask> predicted;
+    if (tracking_ && vision_.method == SegmentationMethod::kLearnedBackground) {
+      predicted = estimator_.predicted_silhouette(observation, c, true);
     }
-    straighten(seen, c);
-    BinaryMask predicted;
-    if (predict) predicted = estimator_.predicted_silhouette(observation, c, true);
-    eyes_[c].segmenter.segment(seen.image, seen.mask, seen.valid, seen.coverage,
-                               predict ? &predicted : nullptr);
-    learning_ = learning_ || !eyes_[c].segmenter.ready();
+    eyes_[c].segmenter.adapt(seen.image, seen.mask, predicted ? &*predicted : nullptr);
   }
   if (learning_) {
     for (auto& seen : observation.cameras) {

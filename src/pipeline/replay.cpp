@@ -99,13 +99,13 @@ class Replay {
 
   std::string run() {
     if (options_.learn_background_first) {
-      for_each("learning the background", [&](Observation& o) { pipeline_.learn_from(o); });
+      for_each("learning the background", [&](Observation& o, const Observation*) { pipeline_.learn_from(o); });
       pipeline_.finish_learning();
     }
     spdlog::info("silhouettes: {}", pipeline_.estimator().engine_description());
     if (pipeline_.error_model()) spdlog::info("extended model: {}", describe(*pipeline_.error_model()));
     std::size_t expected = count_frames();
-    for_each("replay", [&](Observation& o) { take(o, expected); });
+    for_each("replay", [&](Observation& o, const Observation* next) { take(o, next, expected); });
     if (frames_.empty()) {
       throw DataError(options_.log.string() + ": no synchronised pictures and encoders in this log; " +
                       complaint_);
@@ -133,6 +133,7 @@ class Replay {
   }
 
  private:
+  /// `action` gets each observation and the one after it; null: it was the last.
   template <class Action>
   void for_each(const std::string& label, Action action) {
     LogReader log(options_.log);
@@ -140,8 +141,12 @@ class Replay {
     ProgressBar bar(label, log.size());
     LogEvent event;
     std::set<std::string> channels;
+    std::optional<ArrivedObservation> held;  // until it is known what comes after it
     const auto drain = [&] {
-      while (auto arrived = stream.next()) action(arrived->observation);
+      while (auto arrived = stream.next()) {
+        if (held) action(held->observation, &arrived->observation);
+        held = std::move(arrived);
+      }
     };
     while (log.next(event)) {
       channels.insert(event.channel);
@@ -150,6 +155,7 @@ class Replay {
     }
     stream.finish();
     drain();
+    if (held) action(held->observation, nullptr);
     statistics_ = stream.statistics();
     complaint_ = fmt::format("{} messages on {} and {}", statistics_.messages,
                              stream.channels().joint_state, stream.channels().cameras);
@@ -168,8 +174,8 @@ class Replay {
     return pictures;
   }
 
-  void take(Observation& observation, std::size_t expected) {
-    const Estimate estimate = pipeline_.process(observation);
+  void take(Observation& observation, const Observation* next, std::size_t expected) {
+    const Estimate estimate = pipeline_.process(observation, next);
     Json json = estimate_json(estimate, pipeline_.rig());
     SeenFrame frame;
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {

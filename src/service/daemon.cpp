@@ -14,6 +14,7 @@
 #include <memory>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "bodyschema/core/clock.hpp"
 #include "bodyschema/core/error.hpp"
@@ -72,6 +73,15 @@ struct Session {
   LcmLink link;
   Receiver receiver;
   std::vector<std::int64_t> picture_since_us;  ///< of each camera, when its picture was a new one
+  /// Taken from the queue early, so that its masks are found while the frame before is estimated.
+  std::optional<ArrivedObservation> next;
+
+  [[nodiscard]] std::size_t waiting() const { return queue.size() + (next ? 1 : 0); }
+
+  std::optional<ArrivedObservation> take(milliseconds timeout) {
+    if (!next) return queue.pop(timeout);
+    return std::exchange(next, std::nullopt);
+  }
 };
 
 class Daemon {
@@ -140,7 +150,7 @@ class Daemon {
       // What still waits is lost with the session, but not without being counted.
       session_->receiver.finish();
       add_counts(earlier_bus_, session_->receiver.facts().bus);
-      earlier_shed_ += session_->queue.shed() + session_->queue.size();
+      earlier_shed_ += session_->queue.shed() + session_->waiting();
       pipeline->take_background_from(*session_->pipeline);
       session_.reset();
     }
@@ -182,7 +192,7 @@ class Daemon {
       notifier_.alive();
       if (signals.take_reload_request()) begin_reload();
       finish_reload();
-      if (auto arrived = session_->queue.pop(kPoll)) estimate(*arrived);
+      if (auto arrived = session_->take(kPoll)) estimate(*arrived);
     }
   }
 
@@ -196,7 +206,7 @@ class Daemon {
     if (newest < 0 || 1e-3 * ms_between(newest, monotonic_us()) < options_.stop_after_idle_s) return false;
     // The end of what was played: the last pictures may still wait for a partner or for us.
     session_->receiver.finish();
-    while (auto arrived = session_->queue.pop(milliseconds(0))) estimate(*arrived);
+    while (auto arrived = session_->take(milliseconds(0))) estimate(*arrived);
     return true;
   }
 
@@ -209,7 +219,8 @@ class Daemon {
     }
     Observation& observation = arrived.observation;
     Pipeline& pipeline = *session_->pipeline;
-    const Estimate estimate = pipeline.process(observation);
+    session_->next = session_->queue.pop(milliseconds(0));
+    const Estimate estimate = pipeline.process(observation, session_->next ? &session_->next->observation : nullptr);
     const std::int64_t published = publish(estimate, arrived.arrival_us);
     if (estimates_.is_open()) estimates_ << estimate_line(estimate, pipeline.rig()) << std::endl;
 
@@ -258,7 +269,7 @@ class Daemon {
   /// only this thread may ask the estimator.
   void show(Observation& observation, const Estimate& estimate) {
     page_->add(estimate);
-    if (!page_->wants_pictures(session_->queue.size() == 0)) return;
+    if (!page_->wants_pictures(session_->waiting() == 0)) return;
     std::vector<CameraPicture> pictures;
     Estimator& estimator = session_->pipeline->estimator();
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
@@ -291,11 +302,11 @@ class Daemon {
       progress_.camera_seen_us[c] = now;
       facts.mask_px = seen.mask.empty() ? 0 : seen.mask.count();
       facts.brightness = brightness_of(seen.image);
-      const FrozenPicture& picture = session_->pipeline->picture(c);
+      const PictureChange& picture = session_->pipeline->picture(c);
       std::int64_t& since_us = session_->picture_since_us[c];
-      if (!picture.repeated() || since_us < 0) since_us = now;
+      if (!picture.repeated || since_us < 0) since_us = now;
       facts.unchanged_ms = ms_between(since_us, now);
-      facts.moved_meanwhile_rad = picture.moved_rad();
+      facts.moved_meanwhile_rad = picture.moved_rad;
     }
   }
 

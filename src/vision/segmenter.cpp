@@ -89,6 +89,9 @@ struct Segmenter::Impl {
         hits((static_cast<std::size_t>(w) + 63) / 64 * 64, 0) {}
 
   void check(const Image& image);
+  [[nodiscard]] bool fits(const BinaryMask* predicted) const {
+    return predicted != nullptr && predicted->width() == width && predicted->height() == height;
+  }
   [[nodiscard]] const BackgroundModel& background() const;
   void detect(const Image& image, const BackgroundModel& model);
   void detect_hard(const Image& image, const BackgroundModel& model);
@@ -112,6 +115,7 @@ struct Segmenter::Impl {
   BackgroundModel local;  // statistics: of the last frame, next to the robot
   FrameSelection selection;
   bool learned_offline = false;
+  bool just_learned = false;  // the last frame was learned from whole and gave no mask
 
   CoverageEstimator coverage_estimator;
   ComponentFilter components;
@@ -335,16 +339,13 @@ void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
                         std::vector<std::uint8_t>& coverage, const BinaryMask* predicted) {
   auto& self = *impl_;
   self.check(image);
-  if (predicted != nullptr &&
-      (predicted->width() != self.width || predicted->height() != self.height)) {
-    predicted = nullptr;
-  }
+  self.just_learned = false;
+  if (!self.fits(predicted)) predicted = nullptr;
   const auto fit = [&](BinaryMask& m) {
     if (m.width() != self.width || m.height() != self.height) m = BinaryMask(self.width, self.height);
   };
   fit(mask);
   fit(valid);
-  const bool learning = self.setup.method == SegmentationMethod::kLearnedBackground;
   if (self.setup.method == SegmentationMethod::kStatistics) {
     valid.fill(predicted != nullptr);
     if (predicted == nullptr) {
@@ -362,6 +363,7 @@ void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
   }
   if (!ready()) {
     self.learned.update(image, nullptr, true);
+    self.just_learned = true;
     mask.fill(false);
     valid.fill(false);
     coverage.assign(image.data.size() / static_cast<std::size_t>(self.channels), 0);
@@ -400,13 +402,16 @@ void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
     self.components.fill_small_holes(self.sure, std::max(self.setup.max_hole_px, 4));
     self.refine(image, model, mask, valid, coverage);
   }
+}
 
-  if (learning) {
-    // Where the robot is, nothing is learned: as predicted, or else as seen.
-    self.robot = predicted != nullptr ? *predicted : mask;
-    self.morphology.dilate(self.robot, predicted != nullptr ? 6 : 3);
-    self.learned.update(image, &self.robot, false);
-  }
+void Segmenter::adapt(const Image& image, const BinaryMask& mask, const BinaryMask* predicted) {
+  auto& self = *impl_;
+  if (self.setup.method != SegmentationMethod::kLearnedBackground || self.just_learned) return;
+  // Where the robot is, nothing is learned: as predicted, or else as seen.
+  const bool foreseen = self.fits(predicted);
+  self.robot = foreseen ? *predicted : mask;
+  self.morphology.dilate(self.robot, foreseen ? 6 : 3);
+  self.learned.update(image, &self.robot, false);
 }
 
 }  // namespace bodyschema

@@ -13,20 +13,19 @@ TEST(FrozenPicture, TellsARepeatedPictureFromANewOneAndHowFarTheArmMoved) {
   image.data.assign(9, 7);
   Eigen::VectorXd q = Eigen::VectorXd::Zero(2);
   FrozenPicture frozen;
-  frozen.look(image, q);
-  EXPECT_FALSE(frozen.repeated());
+  EXPECT_FALSE(frozen.look(image, q).repeated);
   q(1) = 0.2;
-  frozen.look(image, q);
-  EXPECT_TRUE(frozen.repeated());
-  EXPECT_DOUBLE_EQ(frozen.moved_rad(), 0.2);
+  PictureChange change = frozen.look(image, q);
+  EXPECT_TRUE(change.repeated);
+  EXPECT_DOUBLE_EQ(change.moved_rad, 0.2);
   q(1) = 0.1;
-  frozen.look(image, q);
-  EXPECT_TRUE(frozen.repeated());
-  EXPECT_DOUBLE_EQ(frozen.moved_rad(), 0.2) << "the furthest counts";
+  change = frozen.look(image, q);
+  EXPECT_TRUE(change.repeated);
+  EXPECT_DOUBLE_EQ(change.moved_rad, 0.2) << "the furthest counts";
   image.data[8] = 8;
-  frozen.look(image, q);
-  EXPECT_FALSE(frozen.repeated());
-  EXPECT_DOUBLE_EQ(frozen.moved_rad(), 0.0);
+  change = frozen.look(image, q);
+  EXPECT_FALSE(change.repeated);
+  EXPECT_DOUBLE_EQ(change.moved_rad, 0.0);
 }
 
 }  // namespace

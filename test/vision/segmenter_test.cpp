@@ -239,12 +239,15 @@ TEST(Segmenter, LearnsLiveBeforeTheRobotComes) {
   // The robot enters and stays: it must not melt into the background.
   for (int i = 0; i < 8; ++i) {
     scene.shapes = test::hand(160 - 10 * i, 70);
-    segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
+    const Image picture = scene.picture(random);
+    segmenter.segment(picture, out.mask, out.valid, out.coverage);
+    segmenter.adapt(picture, out.mask);
     EXPECT_GT(iou(out.mask, scene.true_mask()), 0.97) << "frame " << i;
   }
   const auto resting = pictures(scene, 7, random);
   for (std::size_t i = 0; i < 700; ++i) {
     segmenter.segment(resting[i % resting.size()], out.mask, out.valid, out.coverage);
+    segmenter.adapt(resting[i % resting.size()], out.mask);
   }
   EXPECT_GT(iou(out.mask, scene.true_mask()), 0.97);
 }
@@ -264,10 +267,11 @@ TEST(Segmenter, WhatMovedInTheBackgroundIsLearnedAnewOutsideThePrediction) {
   with_object.shapes = {{30, 30, 30, 30, 10}};
   const auto frames = pictures(with_object, 7, random);
   const BinaryMask prediction(scene.width, scene.height);  // the robot is elsewhere
-  segmenter.segment(frames[0], out.mask, out.valid, out.coverage, &prediction);
+  segmenter.segment(frames[0], out.mask, out.valid, out.coverage);
   EXPECT_GT(out.mask.count(), 250u);
   for (std::size_t i = 0; i < 600; ++i) {
-    segmenter.segment(frames[i % frames.size()], out.mask, out.valid, out.coverage, &prediction);
+    segmenter.segment(frames[i % frames.size()], out.mask, out.valid, out.coverage);
+    segmenter.adapt(frames[i % frames.size()], out.mask, &prediction);
   }
   EXPECT_EQ(out.mask.count(), 0u);
 }

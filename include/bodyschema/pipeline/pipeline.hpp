@@ -1,5 +1,6 @@
 #pragma once
 
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,7 +32,11 @@ class Pipeline {
   [[nodiscard]] ObservationStream make_stream() const;
 
   /// Fills in the observation's masks and takes one step of the estimator: segment(), estimate().
-  Estimate process(Observation& observation);
+  /// @param next  the observation that will come next, where it has come already; null: unknown. Its
+  ///   masks are found by another thread while the estimator is at work, which changes no result. It
+  ///   is only read, and until this returns; std::logic_error when another one comes after all. No
+  ///   effect with `vision.method: statistics`, which goes by the estimate before.
+  Estimate process(Observation& observation, const Observation* next = nullptr);
   /// Straightens the pictures and fills in the masks. A camera that repeats its last picture while
   /// the arm moves gets none: it is frozen. False while the background is being learned.
   bool segment(Observation& observation);
@@ -61,8 +66,8 @@ class Pipeline {
   [[nodiscard]] const EstimatorOptions& options() const { return options_; }
   [[nodiscard]] Estimator& estimator() { return estimator_; }
   /// Whether a camera repeats its picture, as of the last observation that had one of it.
-  [[nodiscard]] const FrozenPicture& picture(std::size_t camera) const { return eyes_[camera].picture; }
-  /// Time spent on masks in the last `process`, ms.
+  [[nodiscard]] const PictureChange& picture(std::size_t camera) const { return changes_[camera]; }
+  /// Time that the last `process` or `segment` spent on masks before it could estimate, ms.
   [[nodiscard]] double segmentation_ms() const { return segmentation_ms_; }
   [[nodiscard]] const std::string& configuration_hash() const { return configuration_hash_; }
   /// A short hexadecimal digest of the URDF file, of the meshes in use and of the extended model.
@@ -74,7 +79,22 @@ class Pipeline {
     std::optional<Undistorter> undistorter;
     FrozenPicture picture{};
   };
-  void straighten(CameraObservation& seen, std::size_t camera);
+  /// What was found in one camera's picture.
+  struct Look {
+    PictureChange change;
+    std::optional<Image> straightened;  ///< absent: the picture was straight
+    BinaryMask mask, valid;
+    std::vector<std::uint8_t> coverage;
+    bool learning = false;
+  };
+  /// One per camera; absent where the camera saw nothing.
+  struct Looks {
+    Microseconds utime = 0;
+    std::vector<std::optional<Look>> of;
+  };
+  [[nodiscard]] static bool frozen(const PictureChange& change);
+  Looks look(const Observation& observation);
+  Looks looks_at(const Observation& observation);
 
   RobotSetup setup_;
   VisionSetup vision_;
@@ -83,13 +103,15 @@ class Pipeline {
   std::shared_ptr<const RobotModel> robot_;
   std::optional<ErrorModel> error_model_;
   StereoRig rig_;
-  std::vector<Eye> eyes_;
+  std::vector<Eye> eyes_;  ///< those of the other thread while it looks ahead
+  std::vector<PictureChange> changes_;
   Estimator estimator_;
   std::string configuration_hash_;
   std::string model_hash_;
   bool learning_ = false;
   bool tracking_ = false;  ///< the estimate is good enough to predict where the robot is
   double segmentation_ms_ = 0.0;
+  std::future<Looks> ahead_;  ///< at the next observation, where it was known
 };
 
 }  // namespace bodyschema

@@ -28,10 +28,12 @@ namespace bodyschema {
 /// Learning: `single_colour` and `background_picture` work from the first frame on;
 /// `learned_background` needs either `learn` (offline, all frames of a log) or, live, its first
 /// `learning_frames` frames (better without the robot in view; while learning nothing is valid)
-/// and keeps adapting where the robot is not. `statistics` needs a prediction with every picture.
+/// and keeps adapting where the robot is not: `adapt`. `statistics` needs a prediction with every
+/// picture.
 ///
 /// Throws DataError for an empty picture or one of another size or number of channels than before;
-/// otherwise `segment` neither throws nor allocates once warm. One segmenter per camera and thread.
+/// otherwise `segment` and `adapt` neither throw nor allocate once warm. One segmenter per camera and
+/// thread.
 class Segmenter {
  public:
   /// @param camera  name under which the background picture of this camera is configured
@@ -52,10 +54,16 @@ class Segmenter {
   /// Whether masks are to be had; false while a live background is still being learned.
   [[nodiscard]] bool ready() const;
 
-  /// @param predicted  where the robot is thought to be (`statistics`: needed; `learned_background`:
-  ///   protects a resting robot from being learned as background; otherwise unused); may be null
+  /// @param predicted  where the robot is thought to be: `statistics` needs it, others do not look
   void segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
                std::vector<std::uint8_t>& coverage, const BinaryMask* predicted = nullptr);
+
+  /// `learned_background`: follows slow changes of the background, once `segment` has found `mask` in
+  /// this picture and before the next one is segmented. No effect with other methods and while still
+  /// learning.
+  /// @param predicted  where the robot is thought to be, which protects a resting robot from being
+  ///   learned as background; null: where the mask is
+  void adapt(const Image& image, const BinaryMask& mask, const BinaryMask* predicted = nullptr);
 
   /// The background as now known; empty before anything is.
   [[nodiscard]] const BackgroundModel& background() const;
