@@ -102,6 +102,21 @@ bool Process::said(const std::string& words, Seconds limit) {
 
 // --- Scratch ---------------------------------------------------------------------------------------
 
+double ProcessorWait::waited_s() const {
+  double sum_ns = 0.0;
+  std::error_code gone;
+  for (const auto& task : std::filesystem::directory_iterator("/proc/" + std::to_string(pid_) + "/task", gone)) {
+    double ran_ns = 0.0, waited_ns = 0.0;
+    if (std::ifstream(task.path() / "schedstat") >> ran_ns >> waited_ns) sum_ns += waited_ns;
+  }
+  return 1e-9 * sum_ns;
+}
+
+double ProcessorWait::share() const {
+  const double passed_s = Seconds(std::chrono::steady_clock::now() - begin_).count();
+  return passed_s > 0.0 ? std::max(0.0, waited_s() - begin_s_) / passed_s : 0.0;
+}
+
 Scratch::Scratch() {
   std::string pattern = (fs::temp_directory_path() / "bodyschema-test-XXXXXX").string();
   if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no scratch folder can be made");

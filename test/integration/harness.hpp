@@ -51,6 +51,21 @@ class Process {
   std::optional<int> status_;
 };
 
+/// How long a process was ready to run but had no processor, by the kernel's own account
+/// (/proc/PID/task/*/schedstat): what tells a busy machine from a service that is at fault.
+class ProcessorWait {
+ public:
+  explicit ProcessorWait(pid_t pid) : pid_(pid), begin_s_(waited_s()) {}
+  /// Since construction, as a share of the time that passed; of all threads together. 0: not known.
+  [[nodiscard]] double share() const;
+
+ private:
+  [[nodiscard]] double waited_s() const;
+  pid_t pid_;
+  double begin_s_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
 /// A folder of the test's own, removed at its end unless the test failed.
 class Scratch {
  public:

@@ -1,9 +1,6 @@
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
 #include <signal.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,6 +11,7 @@
 #include <regex>
 
 #include "harness.hpp"
+#include "service/page_client.hpp"
 
 /// The live page as a viewer sees it: the daemon fed over LCM, a real browser without a screen; and
 /// what viewers cost the estimator.
@@ -168,27 +166,7 @@ class Viewer {
   [[nodiscard]] int pictures() const { return pictures_; }
 
  private:
-  [[nodiscard]] std::string get(const std::string& path) const {
-    const int descriptor = socket(AF_INET, SOCK_STREAM, 0);
-    const timeval limit{2, 0};
-    setsockopt(descriptor, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(port_));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    std::string answer;
-    if (connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
-      const std::string request = "GET " + path + " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
-      send(descriptor, request.data(), request.size(), MSG_NOSIGNAL);
-      std::vector<char> text(65536);
-      for (ssize_t n; (n = recv(descriptor, text.data(), text.size(), 0)) > 0;) {
-        answer.append(text.data(), static_cast<std::size_t>(n));
-      }
-    }
-    close(descriptor);
-    const auto end = answer.find("\r\n\r\n");
-    return end == std::string::npos ? "" : answer.substr(end + 4);
-  }
+  [[nodiscard]] std::string get(const std::string& path) const { return test::body(test::get(port_, path)); }
   void watch(const std::stop_token& stop) {
     std::uint64_t since = 0;
     std::map<std::size_t, std::uint64_t> shown;

@@ -2,50 +2,23 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "bodyschema/core/error.hpp"
+#include "page_client.hpp"
 
 namespace bodyschema {
 namespace {
 
 using testing::HasSubstr;
 using testing::Not;
+using test::body;
+using test::get;
+using test::talk;
 using testing::StartsWith;
-
-/// Sends bytes as they are and returns everything that comes back: a client that may misbehave.
-std::string talk(int port, const std::string& request) {
-  const int descriptor = socket(AF_INET, SOCK_STREAM, 0);
-  timeval limit{5, 0};
-  setsockopt(descriptor, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(static_cast<std::uint16_t>(port));
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  std::string answer;
-  if (connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
-    send(descriptor, request.data(), request.size(), MSG_NOSIGNAL);
-    char text[65536];
-    for (ssize_t n; (n = recv(descriptor, text, sizeof text, 0)) > 0;) answer.append(text, static_cast<std::size_t>(n));
-  }
-  close(descriptor);
-  return answer;
-}
-
-std::string get(int port, const std::string& path, const std::string& host = "localhost") {
-  return talk(port, "GET " + path + " HTTP/1.1\r\nHost: " + host + "\r\nConnection: close\r\n\r\n");
-}
-
-std::string body(const std::string& answer) {
-  const auto end = answer.find("\r\n\r\n");
-  return end == std::string::npos ? "" : answer.substr(end + 4);
-}
 
 class LivePageTest : public testing::Test {
  protected:
