@@ -58,17 +58,6 @@ class ScratchFile {
   fs::path path_;
 };
 
-Image overlay(Pipeline& pipeline, const Observation& observation, const std::string& caption) {
-  std::vector<OverlayView> views;
-  for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
-    if (!observation.cameras[c]) continue;
-    views.push_back({&observation.cameras[c]->image,
-                     pipeline.estimator().predicted_silhouette(observation, c, false),
-                     pipeline.estimator().predicted_silhouette(observation, c, true)});
-  }
-  return draw_overlay(views, caption);
-}
-
 void show(ExperimentContext& context, const std::string& title, const RecordingResult& result) {
   context.report.heading("recording: " + title);
   Chart chart;
@@ -131,7 +120,7 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
   if (seen.empty()) throw DataError(log.string() + ": no synchronised pictures in the recording");
 
   RecordingResult result;
-  result.overlay = overlay(pipeline, *last_view, label);
+  result.overlay = draw_overlay(overlay_views(pipeline, *last_view), label);
   result.offsets = std::move(offsets);
   result.joint_names = last.joint_names;
   std::vector<double> before_px, before_mm, before_deg, after_px, after_mm, after_deg, online_px;

@@ -28,7 +28,7 @@ FrameRecord record_of(const Estimate& estimate, const simulator::SimulatedFrame&
 }  // namespace
 
 TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>& contestants,
-                      std::uint64_t seed) {
+                      std::uint64_t seed, const std::function<void(double)>& progress) {
   Pipeline pipeline(setting.estimator);
   std::vector<Estimator> estimators;
   for (const auto& contestant : contestants) {
@@ -56,7 +56,9 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
   std::vector<JointSample> history;
   Eigen::VectorXd last_q;
   int motion_frame = 0;
+  int frames = 0;
   while (auto frame = simulator.next()) {
+    if (progress) progress(static_cast<double>(frames++) / simulator.frame_count());
     history.insert(history.end(), frame->encoders.begin(), frame->encoders.end());
     if (history.size() > 400) history.erase(history.begin(), history.end() - 200);
     Observation observation = simulator::to_observation(*frame, history);

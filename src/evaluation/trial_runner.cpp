@@ -79,7 +79,8 @@ std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std:
   for (int t = 0; t < trials; ++t) {
     settings.push_back(setting_of(context.options.seed + static_cast<std::uint64_t>(t)));
   }
-  ProgressBar bar(label, static_cast<std::uint64_t>(trials));
+  constexpr std::uint64_t kStepsOfATrial = 1000;
+  ProgressBar bar(label, static_cast<std::uint64_t>(trials) * kStepsOfATrial);
   std::atomic<int> next{0};
   std::mutex mutex;
   std::exception_ptr failure;
@@ -87,10 +88,15 @@ std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std:
     for (int t = next++; t < trials; t = next++) {
       try {
         const auto index = static_cast<std::size_t>(t);
-        records[index] =
-            run_trial(settings[index], contestants, context.options.seed + static_cast<std::uint64_t>(t));
-        const std::lock_guard lock(mutex);
-        bar.advance();
+        std::uint64_t done = 0;
+        const auto progress = [&](double share) {
+          const auto now = static_cast<std::uint64_t>(share * static_cast<double>(kStepsOfATrial));
+          bar.advance(now - done);
+          done = now;
+        };
+        records[index] = run_trial(settings[index], contestants,
+                                   context.options.seed + static_cast<std::uint64_t>(t), progress);
+        progress(1.0);
       } catch (...) {
         const std::lock_guard lock(mutex);
         if (!failure) failure = std::current_exception();

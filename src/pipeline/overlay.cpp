@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/pipeline/pipeline.hpp"
 
 namespace bodyschema {
 namespace {
@@ -39,6 +40,17 @@ void draw_outline(cv::Mat& picture, const BinaryMask& mask, int enlargement,
 }
 
 }  // namespace
+
+std::vector<OverlayView> overlay_views(Pipeline& pipeline, const Observation& observation) {
+  std::vector<OverlayView> views;
+  for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
+    if (!observation.cameras[c]) continue;
+    views.push_back({&observation.cameras[c]->image,
+                     pipeline.estimator().predicted_silhouette(observation, c, false),
+                     pipeline.estimator().predicted_silhouette(observation, c, true)});
+  }
+  return views;
+}
 
 Image draw_overlay(const std::vector<OverlayView>& views, const std::string& caption,
                    int enlargement, const OverlayNames& names) {

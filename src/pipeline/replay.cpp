@@ -75,13 +75,7 @@ struct SeenFrame {
 
 void write_overlay(Pipeline& pipeline, const Observation& observation,
                    const std::filesystem::path& file, const std::string& caption) {
-  std::vector<OverlayView> views;
-  for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
-    if (!observation.cameras[c]) continue;
-    views.push_back({&observation.cameras[c]->image,
-                     pipeline.estimator().predicted_silhouette(observation, c, false),
-                     pipeline.estimator().predicted_silhouette(observation, c, true)});
-  }
+  const auto views = overlay_views(pipeline, observation);
   if (!views.empty()) write_png(file, draw_overlay(views, caption));
 }
 

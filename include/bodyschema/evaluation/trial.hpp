@@ -65,7 +65,8 @@ struct TrialSetting {
 /// Simulates one run in memory, segments its pictures once (background learned from the noisy
 /// frames before the arm comes in), and lets every contestant estimate. Truth is only used for the
 /// errors. Contestant seeds derive from `seed`.
+/// @param progress  called at each frame with the share of the trial that is done; may be empty
 TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>& contestants,
-                      std::uint64_t seed);
+                      std::uint64_t seed, const std::function<void(double)>& progress = {});
 
 }  // namespace bodyschema

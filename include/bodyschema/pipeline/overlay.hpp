@@ -10,6 +10,9 @@
 
 namespace bodyschema {
 
+class Pipeline;
+struct Observation;
+
 /// One camera's picture with two predicted outlines: the encoders as they are (red) and with the
 /// estimated offsets taken off (green).
 struct OverlayView {
@@ -19,6 +22,10 @@ struct OverlayView {
   /// Left edge, top edge, width and height in px of the part that is shown; zero width: all.
   std::array<int, 4> part{};
 };
+
+/// Every camera that saw something, with the outlines that the pipeline's estimator predicts. Refers to
+/// the observation's pictures.
+std::vector<OverlayView> overlay_views(Pipeline& pipeline, const Observation& observation);
 
 /// What the outlines are, for the legend.
 struct OverlayNames {
