@@ -13,6 +13,7 @@
 #include "bodyschema/estimator/body_pose_model.hpp"
 #include "bodyschema/estimator/offset_fusion.hpp"
 #include "bodyschema/estimator/pull_judge.hpp"
+#include "bodyschema/estimator/stalled_encoders.hpp"
 #include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/filter/particle_filter.hpp"
 
@@ -79,9 +80,12 @@ struct Estimator::Impl {
         fusion(prior_sds(parameters),
                encoder_sds(parameters, setup.estimated_joints.size(), options.encoder_sd_rad)),
         first_look(fusion) {
+    for (const auto& name : setup.estimated_joints) joint_index.push_back(robot_model->joint_index(name));
     scorer = make_silhouette_scorer(silhouettes, intrinsics, options.silhouette, &engine_reason);
     joints = static_cast<Eigen::Index>(setup.estimated_joints.size());
     state = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
+    reading.resize(joints);
+    stalled = StalledEncoders(joints);
     frame_state = fusion.frame_state();
     const std::size_t batch = options.filter.particles;
     X_CB.resize(batch * rig.cameras.size() * body.part_count());
@@ -101,6 +105,7 @@ struct Estimator::Impl {
     estimate.joint_names = setup.estimated_joints;
 
     const bool in_view = prepare(observation);
+    explained = false;
     if (!in_view) {
       frame_state = fusion.frame_state();
       if (particles_only() || fusion.frames() < 0.5) frame_state.x = state;
@@ -318,6 +323,7 @@ struct Estimator::Impl {
     const Eigen::Index first = 0;
     score_slots(1);
     best_likelihood = 1.0 - distance(first);
+    explained = fits(best.evidence) && distance(first) < options.lock_distance;
     times.refinement_ms += elapsed_ms(start);
 
     start = Clock::now();
@@ -421,6 +427,7 @@ struct Estimator::Impl {
       estimate.nuisance = state.tail(state.size() - joints);
       estimate.nuisance_sd = covariance.diagonal().tail(state.size() - joints).cwiseMax(0.0).cwiseSqrt();
     }
+    look_for_stalls(observation, estimate);
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
       const CameraObservation* seen = nullptr;
       if (c < observation.cameras.size() && observation.cameras[c]) {
@@ -439,10 +446,29 @@ struct Estimator::Impl {
     }
     estimate.weakest = weakest_direction(estimate.covariance_rad2, setup.estimated_joints);
     if (!particles_only() && !contradicted && current == EstimatorState::kConverging &&
-        fusion.frames() > 4.5 && estimate.hand_sd_m < options.converged_hand_sd_m) {
+        fusion.frames() > kSettled_frames && estimate.stalled_joint.empty() && !stalled.doubtful() &&
+        estimate.hand_sd_m < options.converged_hand_sd_m) {
       current = EstimatorState::kConverged;
     }
     estimate.state = current;
+  }
+
+  /// An encoder that stands while its joint moves: what the estimate lags behind is added to its
+  /// uncertainty, and once it is certain, nothing is called converged.
+  void look_for_stalls(const Observation& observation, Estimate& estimate) {
+    const auto seen = std::find_if(observation.cameras.begin(), observation.cameras.end(),
+                                   [](const auto& camera) { return camera.has_value(); });
+    if (particles_only() || seen == observation.cameras.end()) return;
+    for (Eigen::Index k = 0; k < joints; ++k) reading(k) = (*seen)->joints.q(joint_index[static_cast<std::size_t>(k)]);
+    const bool settled = !contradicted && fusion.frames() > kSettled_frames;
+    stalled.look(reading, estimate.offset_rad, estimate.covariance_rad2.diagonal().cwiseMax(0.0).cwiseSqrt(), explained,
+                 settled);
+    const auto drift = stalled.drift_rad().array().square();
+    estimate.covariance_rad2.diagonal().array() += drift;
+    frame_state.covariance.diagonal().head(joints).array() += drift;
+    if (stalled.joint() < 0) return;
+    estimate.stalled_joint = setup.estimated_joints[static_cast<std::size_t>(stalled.joint())];
+    estimate.stalled_motion_rad = stalled.moved_rad();
   }
 
   /// The state of a robot that is as its encoders and model say.
@@ -475,6 +501,7 @@ struct Estimator::Impl {
     best_likelihood = effective_size = contour_rms_px = 0.0;
     surprised_frames = 0;
     pulls.forget();
+    stalled = StalledEncoders(joints);
     contradicted = false;
   }
 
@@ -483,6 +510,7 @@ struct Estimator::Impl {
   static constexpr double kLargestSlip_rad = 0.2094395;   ///< 12 deg; larger ones take more frames
   static constexpr double kUsualPull = 20.0;  ///< chi-square of a frame that agrees with the memory
   static constexpr double kYoungMemory_frames = 3.5;
+  static constexpr double kSettled_frames = 4.5;  ///< fewer may still hold a wrong minimum
   static constexpr double kClearlyBetter = 0.8;  ///< Hammoude distance against that of the memory
 
   EstimatorOptions options;
@@ -500,6 +528,8 @@ struct Estimator::Impl {
   std::string engine_reason;
 
   Eigen::Index joints = 0;
+  std::vector<Eigen::Index> joint_index;  ///< of the estimated joints in the RobotModel
+  Eigen::VectorXd reading;                ///< their encoders
   Eigen::VectorXd state;  ///< one value per parameter, fused over frames
   OffsetFusion::FrameState frame_state;  ///< the same with the last frame's own encoder error
   EstimatorState current = EstimatorState::kHandNotInView;
@@ -509,6 +539,8 @@ struct Estimator::Impl {
   int surprised_frames = 0;
   bool contradicted = false;
   PullJudge pulls;
+  StalledEncoders stalled{0};
+  bool explained = false;  ///< the last frame's pictures, by its estimate
   Eigen::MatrixXd cloud_covariance;
   StageTimes times;
 

@@ -168,6 +168,55 @@ TEST_F(EstimatorOnOwnRobot, ASlipOfFiveDegreesIsFoundAgain) {
   EXPECT_LT(position_error_m(estimate, after.true_hand(pose(39 / 40.0), 0)), 1e-3);
 }
 
+// The encoder of one joint keeps its reading while the arm moves on, slowly or fast. What calls itself
+// converged meanwhile must be right (1 deg, or five of its own sd), and the joint is named; when the
+// encoder lives again, so does the estimate.
+TEST_F(EstimatorOnOwnRobot, AStalledEncoderIsNamedAndNothingFalseIsCalledConverged) {
+  const int elbow = 3;
+  const Eigen::Index index = robot_->joint_index(setup_.estimated_joints[elbow]);
+  constexpr int kStalls = 30, kLives = 150, kEnd = 190;
+  for (const double deg_s : {2.0, 6.0, 30.0}) {
+    SCOPED_TRACE(std::to_string(deg_s) + " deg/s");
+    Estimator estimator(robot_, setup_, rig_, options_);
+    double stalled_reading = 0.0;
+    int named = 0, converged = 0;
+    Estimate estimate;
+    for (int frame = 0; frame < kEnd; ++frame) {
+      Eigen::VectorXd q = pose(0.5);
+      const double travel_deg = 8.0;
+      const double path = std::fmod(deg_s * frame / 30.0, 2.0 * travel_deg);
+      q(index) += radians((path < travel_deg ? path : 2.0 * travel_deg - path) - 0.5 * travel_deg);
+      q(robot_->joint_index("r_wrist_yaw")) += radians(4.0 * std::sin(0.1 * frame));
+      Observation seen = reach_->observe(q, frame * 33'333);
+      double& reading = seen.cameras[0]->joints.q(index);
+      Eigen::VectorXd truth = offset_rad_;
+      if (frame == kStalls) stalled_reading = reading;
+      if (frame >= kStalls && frame < kLives) {
+        truth(elbow) += stalled_reading - reading;
+        reading = seen.cameras[1]->joints.q(index) = stalled_reading;
+      }
+      estimate = estimator.step(seen);
+      if (frame < kLives && !estimate.stalled_joint.empty()) {
+        ++named;
+        EXPECT_EQ(estimate.stalled_joint, setup_.estimated_joints[elbow]) << frame;
+      }
+      if (frame > kLives) {
+        EXPECT_TRUE(estimate.stalled_joint.empty()) << frame;
+      }
+      if (estimate.state != EstimatorState::kConverged) continue;
+      ++converged;
+      for (Eigen::Index k = 0; k < truth.size(); ++k) {
+        const double sd = std::sqrt(estimate.covariance_rad2(k, k));
+        EXPECT_LT(std::abs(estimate.offset_rad(k) - truth(k)), std::max(5.0 * sd, radians(1.0))) << frame;
+      }
+    }
+    EXPECT_GT(named, 0);
+    EXPECT_GT(converged, 20);
+    EXPECT_EQ(estimate.state, EstimatorState::kConverged);
+    EXPECT_LT((estimate.offset_rad - offset_rad_).cwiseAbs().maxCoeff(), radians(1.5));
+  }
+}
+
 // One eye sees the arm before it slips, the other after: no offsets fit both, and what was made of
 // that frame must not hold on to the estimate when the next ones agree again.
 TEST_F(EstimatorOnOwnRobot, AFrameWithASlipBetweenItsTwoPicturesIsNotRemembered) {

@@ -159,7 +159,9 @@ class World : public testing::Test {
       if (message.state != "converged") continue;
       for (std::size_t k = 0; k < message.mean_rad.size(); ++k) {
         const auto it = truth.find(message.joint_name[k]);
-        const double error = std::abs(message.mean_rad[k] - (it == truth.end() ? 0.0 : it->second));
+        double offset = it == truth.end() ? 0.0 : it->second;
+        if (message.joint_name[k] == stalled_joint_) offset += stalled_by(message.utime);
+        const double error = std::abs(message.mean_rad[k] - offset);
         const double sd = std::sqrt(message.covariance_rad2[k][k]);
         worst_sd_ = std::max(worst_sd_, error / sd);
         ASSERT_LE(error, std::max(5.0 * sd, radians(1.0)))
@@ -167,6 +169,15 @@ class World : public testing::Test {
             << degrees(sd);
       }
     }
+  }
+
+  /// What the stalled joint's encoder reads beyond what it would read, at a stamp; zero before and after.
+  [[nodiscard]] double stalled_by(Microseconds utime) const {
+    const auto next = stall_->lower_bound(utime);
+    if (next == stall_->end() || next == stall_->begin()) return 0.0;
+    const auto before = std::prev(next);
+    const double along = static_cast<double>(utime - before->first) / static_cast<double>(next->first - before->first);
+    return before->second + along * (next->second - before->second);
   }
 
   /// Of the last status of a finished test.
@@ -189,6 +200,8 @@ class World : public testing::Test {
   const std::string url_ = private_lcm_url();
   Scratch scratch_;
   double worst_sd_ = 0.0;
+  std::string stalled_joint_;
+  std::shared_ptr<faults::Stall> stall_ = std::make_shared<faults::Stall>();
   std::vector<offsets_status_t> last_;  ///< all there were
 };
 
@@ -284,6 +297,15 @@ TEST_F(World, EncoderWraps) {
   // the two readings around the jump, and all stays well.
   suffer({.name = "encoder wraps by 360 deg", .faults = faults::encoder_wraps("r_elbow"),
           .words = "converged", .level = HealthLevel::kOk, .lasts_s = 5.0});
+}
+
+TEST_F(World, EncoderStalls) {
+  // Messages go on with stamps that advance; one joint's reading stays as it was. What an offset is then
+  // changes with the arm, and estimates are measured by that.
+  stalled_joint_ = "r_elbow";
+  suffer({.name = "encoder of r_elbow stalls", .faults = faults::encoder_stalls("r_elbow", stall_),
+          .words = "the encoder of r_elbow stands still", .level = HealthLevel::kError, .notice_s = 15.0,
+          .lasts_s = 20.0});
 }
 
 // --- the rest --------------------------------------------------------------------------------------

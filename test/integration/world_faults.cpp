@@ -172,10 +172,16 @@ Fault encoder_not_a_number() {
   });
 }
 
-Fault encoder_stalls(const std::string& joint) {
-  return on_joint(joint, [stalled = std::optional<float>()](float& q) mutable {
-    if (!stalled) stalled = q;
-    q = *stalled;
+Fault encoder_stalls(const std::string& joint, std::shared_ptr<Stall> stall) {
+  return on_joints([joint, stall, stalled = std::optional<float>()](joint_state_t& j, MessageSink&) mutable {
+    for (std::size_t k = 0; k < j.joint_name.size(); ++k) {
+      if (j.joint_name[k] != joint) continue;
+      if (!stalled) stalled = j.joint_position[k];
+      if (stall) (*stall)[j.utime] = *stalled - j.joint_position[k];
+      j.joint_position[k] = *stalled;
+      j.joint_velocity[k] = 0.0f;
+    }
+    return true;
   });
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <map>
+#include <memory>
 #include <vector>
 
 #include "harness.hpp"
@@ -35,8 +37,11 @@ Fault second_publisher(LcmLink& link);
 Fault encoders_stop();
 Fault encoders_late(Microseconds delay);
 Fault encoder_not_a_number();
-/// The joint keeps the value it has, whatever the arm does.
-Fault encoder_stalls(const std::string& joint);
+/// What a stalled encoder reads beyond what it would read, radians, by stamp.
+using Stall = std::map<Microseconds, double>;
+/// The joint keeps the value it has, whatever the arm does. Written to `stall`, if any, which may be
+/// read once the robot has stopped.
+Fault encoder_stalls(const std::string& joint, std::shared_ptr<Stall> stall = {});
 Fault encoder_wraps(const std::string& joint);
 /// By 60 deg, to and fro.
 Fault encoder_jumps(const std::string& joint);

@@ -153,6 +153,15 @@ TEST(Health, LightsOff) {
   expect(facts, HealthLevel::kError, "the left camera's picture is black");
 }
 
+TEST(Health, AnEncoderStalls) {
+  HealthFacts facts = well();
+  facts.estimate.state = EstimatorState::kDiverged;
+  facts.estimate.stalled_joint = "r_elbow";
+  facts.estimate.stalled_motion_rad = 0.21;
+  expect(facts, HealthLevel::kError,
+         "the encoder of r_elbow stands still while the pictures show the joint move, by 12 deg so far");
+}
+
 TEST(Health, Diverged) {
   HealthFacts facts = well();
   facts.estimate.state = EstimatorState::kDiverged;

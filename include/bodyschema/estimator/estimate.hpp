@@ -47,6 +47,9 @@ struct Estimate {
   double contour_rms_px = 0.0;              ///< outline residual, 0 when not computed
   WeakestDirection weakest;
   double hand_sd_m = 0.0;                   ///< one sigma of the hand base in the eye frame
+  std::string stalled_joint;                ///< its encoder stands although the pictures show it move;
+                                            ///< empty: none. The state is never kConverged then
+  double stalled_motion_rad = 0.0;          ///< how far it has been seen to move
   std::vector<Pose> X_CP;                   ///< hand base in each camera of the rig, corrected
   std::vector<Pose> X_CP_nominal;           ///< the same with encoders and model as they are
   StageTimes times;

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+namespace bodyschema {
+
+/// Notices an encoder that keeps one and the same reading while the pictures show its joint move: it
+/// stalls. To the estimate such a joint has an offset that changes again and again; the offset of a
+/// joint that is held still stays where it is, and a slip changes it once. One thread.
+class StalledEncoders {
+ public:
+  explicit StalledEncoders(Eigen::Index joints)
+      : tracks_(static_cast<std::size_t>(joints)), drift_rad_(Eigen::VectorXd::Zero(joints)) {}
+
+  /// Frames in order of time.
+  /// @param reading_rad  encoders of the estimated joints
+  /// @param offset_rad  their offsets as known with this frame, and one sigma
+  /// @param fits  whether those offsets explain the frame's pictures; otherwise it says nothing
+  /// @param settled  whether the offsets are a memory of several frames, not that of a new search
+  void look(const Eigen::VectorXd& reading_rad, const Eigen::VectorXd& offset_rad, const Eigen::VectorXd& sd_rad,
+            bool fits, bool settled);
+  /// How far each offset has run in the last second (at 30 Hz) under a reading that stands, radians; zero
+  /// for joints whose reading moves. A memory of frames lags behind a moving arm by about as much, which
+  /// its own covariance does not tell.
+  [[nodiscard]] const Eigen::VectorXd& drift_rad() const { return drift_rad_; }
+  /// Whether a joint has been seen to move under a reading that stands, in the last second: a slip of an
+  /// arm at rest, or the beginning of a stall.
+  [[nodiscard]] bool doubtful() const { return doubtful_; }
+  /// The joint that stalls, -1 if none; of several, the one seen to move most.
+  [[nodiscard]] Eigen::Index joint() const { return joint_; }
+  /// How far it has been seen to move under its reading, to and fro added up, radians.
+  [[nodiscard]] double moved_rad() const { return joint_ < 0 ? 0.0 : tracks_[static_cast<std::size_t>(joint_)].moved_rad; }
+
+ private:
+  static constexpr std::size_t kRecent = 30;  ///< frames
+  /// Since the reading last changed.
+  struct Track {
+    double reading_rad = 0.0;
+    bool known = false;       ///< whether there is an offset to compare with
+    double offset_rad = 0.0;  ///< at the last move
+    double sd_rad = 0.0;      ///< of that
+    int away = 0;             ///< frames in a row that saw it elsewhere
+    int moves = 0;
+    std::size_t frames_since = 0;  ///< the last move
+    double moved_rad = 0.0;
+    std::array<double, kRecent> recent_rad{};  ///< settled offsets, round and round
+    std::size_t recent = 0;                    ///< how many there were
+    [[nodiscard]] double drift_rad() const;
+  };
+  std::vector<Track> tracks_;
+  Eigen::VectorXd drift_rad_;
+  bool doubtful_ = false;
+  Eigen::Index joint_ = -1;
+};
+
+}  // namespace bodyschema
