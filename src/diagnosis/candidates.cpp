@@ -12,6 +12,7 @@ namespace bodyschema::diagnosis {
 namespace {
 
 constexpr double kDeg = kPi / 180.0;
+constexpr double kHeadStill = 5.0 * kDeg;
 
 std::string number(double value, int decimals) {
   std::ostringstream text;
@@ -19,11 +20,6 @@ std::string number(double value, int decimals) {
   text.precision(decimals);
   text << value;
   return text.str();
-}
-
-bool is_excluded(const std::vector<NotTestable>& excluded, const CauseName& cause) {
-  return std::any_of(excluded.begin(), excluded.end(),
-                     [&](const auto& e) { return e.cause == cause; });
 }
 
 /// Zero mean and unit deviation, times one degree: a feature as a joint correction in radians.
@@ -38,6 +34,20 @@ std::vector<double> normalised(std::vector<double> value) {
   const double deviation = std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, value.size())));
   for (double& x : value) x = deviation > 1e-12 ? x / deviation * kDeg : 0.0;
   return value;
+}
+
+/// Farthest that a joint of the head moved, rad.
+double head_range(const MeasurementSource& source) {
+  double range = 0.0;
+  for (const auto joint : source.roles().head) {
+    double low = 1e9, high = -1e9;
+    for (const auto& view : source.views()) {
+      low = std::min(low, view.joints.q[joint]);
+      high = std::max(high, view.joints.q[joint]);
+    }
+    range = std::max(range, high - low);
+  }
+  return range;
 }
 
 /// Generic features of one joint, added to the set as candidates named "unexplained".
@@ -87,6 +97,11 @@ class GenericFeatures {
 };
 
 }  // namespace
+
+bool is_excluded(const std::vector<NotTestable>& excluded, const CauseName& cause) {
+  return std::any_of(excluded.begin(), excluded.end(),
+                     [&](const auto& e) { return e.cause == cause; });
+}
 
 std::vector<const SparseColumn*> CandidateSet::pointers() const {
   std::vector<const SparseColumn*> list;
@@ -276,17 +291,8 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
       list.push_back({{"principal_point", "", source_name}, "the log has one camera"});
     }
   }
-  double head_range = 0.0;
-  for (const auto joint : roles.head) {
-    double low = 1e9, high = -1e9;
-    for (const auto& view : views) {
-      low = std::min(low, view.joints.q[joint]);
-      high = std::max(high, view.joints.q[joint]);
-    }
-    head_range = std::max(head_range, high - low);
-  }
-  if (head_range < kLeastRange) {
-    exclude_all("base_shift", "the head moved " + number(head_range / kDeg, 1) +
+  if (const double range = head_range(source); range < kHeadStill) {
+    exclude_all("base_shift", "the head moved " + number(range / kDeg, 1) +
                                   " deg: a shifted base looks like errors of neck and eyes");
   }
   const bool masses = !at.instants.empty() && at.instants.front().gravity_torque.size() > 0;
@@ -362,6 +368,17 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
   return list;
 }
 
+std::vector<CauseName> lookalikes(const MeasurementSource& source, const CauseName& cause) {
+  const auto& roles = source.roles();
+  std::vector<CauseName> list;
+  if (cause.name != "base_shift" || head_range(source) >= kHeadStill) return list;
+  for (const auto& target : effect_targets("head_offset", roles)) {
+    list.push_back({"head_offset", target.joint, target.source});
+  }
+  list.push_back({"principal_point", "", "common"});
+  return list;
+}
+
 std::string splitting_motion(const std::vector<CauseName>& same) {
   std::set<std::string> names;
   for (const auto& cause : same) names.insert(cause.name);
@@ -370,7 +387,8 @@ std::string splitting_motion(const std::vector<CauseName>& same) {
   const auto say = [&](const std::string& sentence) {
     advice += (advice.empty() ? "" : " ") + sentence;
   };
-  const auto& joint = same.front().joint;
+  const auto named = std::find_if(same.begin(), same.end(), [](const auto& cause) { return !cause.joint.empty(); });
+  const std::string joint = named == same.end() ? "" : named->joint;
   if (has("encoder_gain") && has("eccentricity")) {
     say("Sweep " + joint + " through more than 90 deg.");
   }

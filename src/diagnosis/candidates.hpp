@@ -36,6 +36,12 @@ void drop_aliased_columns(const BlockStatistics& statistics, CandidateSet& set);
 /// round, no masses, too slow, one camera, encoders too sparse.
 std::vector<NotTestable> untestable(const MeasurementSource& source, const Linearisation& at);
 
+bool is_excluded(const std::vector<NotTestable>& excluded, const CauseName& cause);
+
+/// What a cause looks like in every log of this kind, whatever its numbers say: while the head stands
+/// still, lengths between base and eyes, errors of neck and eye tilt and a common shift of the pictures.
+std::vector<CauseName> lookalikes(const MeasurementSource& source, const CauseName& cause);
+
 /// The motion that would tell the causes of a class apart.
 std::string splitting_motion(const std::vector<CauseName>& same);
 

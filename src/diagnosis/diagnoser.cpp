@@ -11,6 +11,7 @@
 #include "extension.hpp"
 #include "findings.hpp"
 #include "model_fit.hpp"
+#include "nearer_model.hpp"
 #include "verdict.hpp"
 
 namespace bodyschema {
@@ -43,6 +44,7 @@ class Diagnoser {
       fitter_.accumulate_on({}, before_);
       found = nearer ? search(nearer->first, nearer->second) : search(before_.at, baseline_);
     }
+    if (searches() && found.after.at.rms_px() > options_.trusted_rms_px) look_nearer(found);
     auto report = findings(source_, options_.selection, layout_, fitter_.plan(), found, baseline_, before_, excluded_);
     word_verdict(report, options_, found.selection.crowded);
     progress(1.0);
@@ -62,6 +64,7 @@ class Diagnoser {
     if (2 * seen(before_.at) < before_.at.views.size()) {
       // Parts of another shape: their outlines lie further off, however well they are placed.
       constexpr double kOtherShape_px = 10.0;
+      other_shape_ = true;
       fitter_.set_finest(kOtherShape_px);
       baseline_ = offsets_alone_;
       before_ = fitter_.fit(baseline_, {}, {options_.baseline_iterations, {}});
@@ -72,6 +75,55 @@ class Diagnoser {
     fitter_.accumulate_on({}, before_);
     excluded_ = options_.excluded;
     for (auto& item : untestable(source_, before_.at)) excluded_.push_back(std::move(item));
+  }
+
+  /// Much is wrong at once: causes that were tried for real, if they leave less.
+  void look_nearer(Found& found) {
+    if (other_shape_ || !fitter_.look_closely()) return;
+    // While the head stands still a shifted base stands for whatever lies between base and eyes.
+    const auto excluded = excluded_;
+    std::erase_if(excluded_, [](const auto& item) { return item.cause.name == "base_shift"; });
+    auto again = found_nearer();
+    const double outline = outline_points(before_.at);
+    if (again && misfit(again->after.at, outline) < misfit(found.after.at, outline)) {
+      found = std::move(*again);
+    } else {
+      excluded_ = excluded;
+    }
+  }
+
+  std::optional<Found> found_nearer() {
+    std::vector<CauseName> causes;
+    for (const auto& name : effect_names()) {
+      if (name == "joint_offset" || name == "slip" || name == "drift") continue;  // need a time
+      for (const auto& target : effect_targets(name, source_.roles())) {
+        const CauseName cause{name, target.joint, target.source};
+        if (!is_excluded(excluded_, cause)) causes.push_back(cause);
+      }
+    }
+    const auto model = nearer_model(source_, layout_, fitter_, offsets_, causes);
+    fitter_.look_closely();
+    if (!model) return std::nullopt;
+    // What lies between base and eyes is the shift's now; else the head's nuisances share it at will.
+    auto nuisances = options_.nuisances;
+    const auto found_causes = causes_of(*model);
+    if (contains(found_causes, {"base_shift", "", ""})) {
+      std::erase_if(nuisances, [](const auto& nuisance) { return nuisance.name == "head_offset"; });
+    }
+    return search(fitter_.about(*model, {}).at, *model, nuisances, found_causes);
+  }
+
+  static bool contains(const std::vector<CauseName>& causes, const CauseName& cause) {
+    return std::find(causes.begin(), causes.end(), cause) != causes.end();
+  }
+
+  static std::vector<CauseName> causes_of(const ErrorModel& model) {
+    std::vector<CauseName> causes;
+    for (std::size_t e = 0; e < model.size(); ++e) {
+      if (model[e].name() == "joint_offset") continue;
+      causes.push_back({model[e].name(), model[e].target().joint, model[e].target().source});
+    }
+    return causes;
   }
 
   /// Offsets alone before all else: nuisances let loose on outlines tens of pixels away run off.
@@ -92,6 +144,7 @@ class Diagnoser {
       auto other = from(false);
       if (other.first < best.first) best = std::move(other);
     }
+    offsets_ = best.second;
     for (std::size_t e = 0; e < best.second.size(); ++e) {
       const auto& offset = std::as_const(best.second)[e];
       baseline_.find("joint_offset", offset.target())->parameters()[0].value = offset.parameters()[0].value;
@@ -101,8 +154,13 @@ class Diagnoser {
 
   /// One pass over the catalogue, linear about `at`, the linearisation of `model`.
   Found search(const Linearisation& at, const ErrorModel& model) {
+    return search(at, model, options_.nuisances, options_.fixed_causes);
+  }
+  /// @param causes  exactly these instead of a search
+  Found search(const Linearisation& at, const ErrorModel& model, const std::vector<CauseName>& nuisances,
+               const std::optional<std::vector<CauseName>>& causes) {
     const auto& plan = fitter_.plan();
-    Found found{make_candidates(source_, at, plan, layout_, options_.nuisances, excluded_), {}, baseline_, {}};
+    Found found{make_candidates(source_, at, plan, layout_, nuisances, excluded_), {}, baseline_, {}};
     auto& set = found.set;
     set_tolerances(set);
     const auto bare = only_offsets(source_, layout_, at, model);
@@ -110,11 +168,14 @@ class Diagnoser {
     progress(0.6);
     drop_aliased_columns(statistics, set);
     auto rules = options_.selection;
-    if (options_.fixed_causes) rules = fix(set, *options_.fixed_causes, std::move(rules));
+    if (causes) {
+      rules.search = false;
+      rules.fixed = candidates_of(set, *causes);
+    }
     found.selection = select_causes(statistics, set.offsets, set.candidates, rules);
     progress(0.65);
 
-    auto extension = extend(with_offsets_of(model), found.selection,
+    auto extension = extend(baseline_with(nuisances, model), found.selection,
                             {source_, layout_, plan, at, bare, set, statistics});
     found.extended = std::move(extension.model);
     begin_where_better(found.extended);
@@ -126,9 +187,12 @@ class Diagnoser {
     return found;
   }
 
-  /// The baseline's effects with the offsets of `model`.
-  [[nodiscard]] ErrorModel with_offsets_of(ErrorModel model) const {
+  /// The baseline's effects of these nuisances and the offsets of `model`.
+  [[nodiscard]] ErrorModel baseline_with(const std::vector<CauseName>& nuisances, ErrorModel model) const {
     auto result = baseline_;
+    for (const auto& nuisance : options_.nuisances) {
+      if (!contains(nuisances, nuisance)) result.remove(nuisance.name, {nuisance.joint, nuisance.source});
+    }
     for (const auto& target : effect_targets("joint_offset", source_.roles())) {
       auto* offset = model.find("joint_offset", target);
       if (offset == nullptr) continue;
@@ -160,8 +224,11 @@ class Diagnoser {
   [[nodiscard]] bool far_off(const Found& found) const {
     const double outline = outline_points(before_.at);
     const double before = misfit(before_.at, outline), after = misfit(found.after.at, outline);
-    return options_.selection.search && !options_.fixed_causes && !found.selection.causes.empty() &&
-           typical_distance_px(before) > kFar_px && after < kBetter * before;
+    return searches() && !found.selection.causes.empty() && far(before_.at) && after < kBetter * before;
+  }
+  [[nodiscard]] bool searches() const { return options_.selection.search && !options_.fixed_causes; }
+  [[nodiscard]] static bool far(const Linearisation& at) {
+    return typical_distance_px(misfit(at, outline_points(at))) > kFar_px;
   }
 
   void set_tolerances(CandidateSet& set) const {
@@ -226,17 +293,14 @@ class Diagnoser {
     return model;
   }
 
-  /// The given causes and no search.
-  static SelectionOptions fix(const CandidateSet& set, const std::vector<CauseName>& causes,
-                              SelectionOptions rules) {
-    rules.search = false;
+  static std::vector<std::size_t> candidates_of(const CandidateSet& set, const std::vector<CauseName>& causes) {
+    std::vector<std::size_t> ids;
     for (const auto& cause : causes) {
       for (std::size_t c = 0; c < set.candidates.size(); ++c) {
-        if (set.candidates[c].slip || name_of(set.candidates[c]) != cause) continue;
-        rules.fixed.push_back(c);
+        if (!set.candidates[c].slip && name_of(set.candidates[c]) == cause) ids.push_back(c);
       }
     }
-    return rules;
+    return ids;
   }
 
   MeasurementSource& source_;
@@ -244,7 +308,9 @@ class Diagnoser {
   CoordinateLayout layout_;
   ModelFitter fitter_;
   ErrorModel baseline_{JointRoles{}};
+  ErrorModel offsets_{JointRoles{}};        ///< offsets and nothing else
   ErrorModel offsets_alone_{JointRoles{}};  ///< the baseline with its nuisances at zero
+  bool other_shape_ = false;  ///< outlines lie far off however well the parts are placed
   ModelFit before_;  ///< about the baseline
   std::vector<NotTestable> excluded_;
 };

@@ -112,6 +112,9 @@ class Findings {
       cause.heldout_gain = selected.score.gain;
       cause.same.push_back(cause.cause);
       for (const auto c : selected.same) cause.same.push_back(name_of(candidates[c]));
+      for (const auto& other : lookalikes(source_, cause.cause)) {
+        if (std::find(cause.same.begin(), cause.same.end(), other) == cause.same.end()) cause.same.push_back(other);
+      }
       if (selected.wanders) cause.same.push_back({"unexplained", cause.cause.joint, ""});
       if (cause.same.size() > 1) cause.advice = splitting_motion(cause.same);
       for (std::size_t c = 0; c < found_.after.parameters.size(); ++c) {

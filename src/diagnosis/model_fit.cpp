@@ -138,8 +138,9 @@ ModelFit ModelFitter::about(const ErrorModel& model, const std::vector<const Spa
 ModelFit ModelFitter::fit(ErrorModel& model, const std::vector<const SparseColumn*>& extra,
                           const Settings& settings) {
   constexpr double kSmall = 2e-3;  // of a parameter's typical size
-  approach(model, extra);
-  auto accepted = about(model, extra);
+  if (settings.from_afar) approach(model, extra);
+  source_.set_search(finest_px_, settings.every);
+  auto accepted = regress(model, extra);
   const double outline = outline_points(accepted.at);
   Pace pace{misfit(accepted.at, outline)};
   for (int i = 0; i < settings.iterations;) {

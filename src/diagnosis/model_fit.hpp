@@ -40,8 +40,10 @@ class ModelFitter {
       : source_(source), layout_(layout), block_s_(block_s) {}
 
   struct Settings {
-    int iterations = 8;  ///< at most, on all pictures
+    int iterations = 8;  ///< at most
     std::function<void(double)> progress{};
+    std::size_t every = 1;  ///< so-manieth instant only, where the source can leave some out
+    bool from_afar = true;  ///< approaches first
   };
   /// Fits the model's parameters, which end at the optimum. Parameters that the log cannot see stay
   /// where they are.
@@ -61,6 +63,8 @@ class ModelFitter {
 
   /// The narrowest search, px.
   void set_finest(double search_px) { finest_px_ = search_px; }
+  /// All pictures with the search at its narrowest. False where the source needs no search.
+  bool look_closely() { return source_.set_search(finest_px_); }
   /// Blocks by the noise that a fit leaves.
   void set_plan(BlockPlan plan) { plan_ = std::move(plan); }
   [[nodiscard]] const BlockPlan& plan() const { return *plan_; }

@@ -152,6 +152,8 @@ void FaultyRobot::build(const TrialFault& fault, std::size_t camera, Corrections
       a.tilt_1_rad += v * kDeg;
       a.tilt_2_rad += fault.second * kDeg;
     }
+  } else if (name == "base_shift") {
+    body.base_shift_m += 1e-3 * Eigen::Vector3d(v, fault.second, 0.0);
   } else if (name == "baseline") {
     if (camera == 1) body.camera.shift_x_m += 1e-3 * v;
   } else if (name == "focal_length") {

@@ -84,6 +84,22 @@ TEST(Untestable, RareEncodersKnowNoDirection) {
   EXPECT_THAT(item->reason, HasSubstr("every 50 ms"));
 }
 
+TEST(Lookalikes, OfAShiftedBaseAreNeckAndEyesWhileTheHeadStandsStill) {
+  const auto log = make_synthetic_log(test::robot(), {}, 1);
+  auto still = test::EditedLog::whole(*log), moving = test::EditedLog::whole(*log);
+  const auto neck = log->roles().head.front();
+  for (std::size_t v = 0; v < log->views().size(); ++v) {
+    still.views_for_editing()[v].joints.q[neck] = 0.1;
+    moving.views_for_editing()[v].joints.q[neck] = v % 2 == 0 ? 0.1 : 0.3;
+  }
+  const auto list = lookalikes(still, {"base_shift", "", ""});
+  for (const char* joint : {"neck_pitch", "neck_roll", "neck_yaw", "eyes_tilt"}) {
+    EXPECT_NE(std::find(list.begin(), list.end(), CauseName{"head_offset", joint, ""}), list.end()) << joint;
+  }
+  EXPECT_TRUE(lookalikes(still, {"latency", "", ""}).empty());
+  EXPECT_TRUE(lookalikes(moving, {"base_shift", "", ""}).empty());
+}
+
 TEST(SplittingMotion, IsSaidForEveryAliasOfTheHandbook) {
   EXPECT_THAT(splitting_motion({{"encoder_gain", "r_elbow", ""}, {"eccentricity", "r_elbow", ""}}),
               HasSubstr("Sweep r_elbow through more than 90 deg"));

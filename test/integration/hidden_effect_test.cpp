@@ -12,6 +12,8 @@
 #include <random>
 #include <thread>
 
+#include "bodyschema/bus/log.hpp"
+#include "bodyschema/bus/messages.hpp"
 #include "integration/harness.hpp"
 
 /// The simulator hides an effect in a log; `bodyschema diagnose`, another process, gets log and
@@ -53,30 +55,47 @@ std::string configuration(const char* name) {
   return std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/" + name;
 }
 
-/// Simulates with these arguments, diagnoses, and reads the truth last.
-Answer ask(const Scratch& scratch, const std::string& name, std::vector<std::string> arguments) {
-  Answer answer;
-  const auto log = scratch / (name + ".log"), truth = scratch / (name + ".truth.json");
-  const auto out = scratch / (name + ".report");
-  std::vector<std::string> simulate = {"bodyschema-sim", "--config", configuration("simulator.yaml"),
-                                       "--set", "simulator.cameras.rate_hz=10", "--offsets", "random",
-                                       "--log", log.string(), "--truth", truth.string()};
-  simulate.insert(simulate.end(), arguments.begin(), arguments.end());
+/// Where a log and its truth lie.
+struct Written {
+  std::filesystem::path log, truth;
+  std::string error;
+};
+
+Written simulate(const Scratch& scratch, const std::string& name, const std::vector<std::string>& arguments) {
+  Written written{scratch / (name + ".log"), scratch / (name + ".truth.json"), ""};
+  std::vector<std::string> command = {"bodyschema-sim", "--config", configuration("simulator.yaml"),
+                                      "--set", "simulator.cameras.rate_hz=10", "--offsets", "random",
+                                      "--log", written.log.string(), "--truth", written.truth.string()};
+  command.insert(command.end(), arguments.begin(), arguments.end());
   std::filesystem::create_directories(scratch / name);
-  {
-    Process simulator(simulate, scratch / name);
-    if (simulator.wait(Seconds(400)) != 0) {
-      answer.error = simulator.err();
-      return answer;
-    }
-  }
-  Process diagnose({"bodyschema", "diagnose", log.string(), "--config", configuration("estimator.yaml"),
-                    "--threads", "1", "--out", out.string()},
-                   scratch / name);
+  Process simulator(command, scratch / name);
+  if (simulator.wait(Seconds(400)) != 0) written.error = simulator.err();
+  return written;
+}
+
+/// What the tool says about a log; the truth is read last.
+Answer diagnose(const Scratch& scratch, const std::string& name, const Written& written,
+                const std::vector<std::string>& arguments = {}) {
+  Answer answer;
+  answer.error = written.error;
+  if (!answer.error.empty()) return answer;
+  const auto out = scratch / (name + ".report");
+  std::vector<std::string> command = {"bodyschema", "diagnose", written.log.string(), "--config",
+                                      configuration("estimator.yaml"), "--threads", "1", "--out", out.string()};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  std::filesystem::create_directories(scratch / name);
+  Process diagnose(command, scratch / name);
   if (diagnose.wait(Seconds(400)) != 0) answer.error = diagnose.err();
-  std::filesystem::remove(log);
   answer.report = read(out / "report.json");
-  answer.truth = read(truth);
+  answer.truth = read(written.truth);
+  return answer;
+}
+
+/// Simulates with these arguments and diagnoses; the log is deleted.
+Answer ask(const Scratch& scratch, const std::string& name, const std::vector<std::string>& arguments) {
+  const auto written = simulate(scratch, name, arguments);
+  auto answer = diagnose(scratch, name, written);
+  std::filesystem::remove(written.log);
   return answer;
 }
 
@@ -246,6 +265,111 @@ TEST(HiddenEffect, AFrozenJointLeavesTheRestTestableAndOneWayMotionShowsNoBackla
   ASSERT_TRUE(one_way.error.empty()) << one_way.error;
   EXPECT_EQ(cause_of(one_way.report, one_way.truth["faults"][0]), nullptr) << sentence_of(one_way);
   EXPECT_TRUE(not_testable(one_way.report, "backlash", "r_elbow"));
+}
+
+/// Every event of a log in order of its time stamp, to be edited.
+std::vector<LogEvent> events_of(const std::filesystem::path& log) {
+  LogReader reader(log);
+  std::vector<LogEvent> events;
+  for (LogEvent event; reader.next(event);) events.push_back(event);
+  return events;
+}
+
+void write_events(const std::filesystem::path& log, const std::vector<LogEvent>& events) {
+  LogWriter writer(log);
+  for (const auto& event : events) writer.publish(event.channel, event.time_us, event.data);
+}
+
+template <class Message>
+Message decoded(const LogEvent& event) {
+  Message message;
+  if (message.decode(event.data.data(), 0, static_cast<int>(event.data.size())) < 0) {
+    throw std::runtime_error("cannot be decoded");
+  }
+  return message;
+}
+
+/// Every pair of pictures once more, a millisecond later.
+std::vector<LogEvent> doubled(const std::vector<LogEvent>& events) {
+  std::vector<LogEvent> twice;
+  for (const auto& event : events) {
+    twice.push_back(event);
+    if (event.channel != "ICUB_CAMERAS") continue;
+    auto pictures = decoded<bot_core::images_t>(event);
+    constexpr Microseconds kLater = 1000;
+    pictures.utime += kLater;
+    for (auto& picture : pictures.images) picture.utime += kLater;
+    twice.push_back(event);
+    twice.back().data = encode(pictures);
+  }
+  return twice;
+}
+
+/// Before every picture the encoders take a detour that sets any play to a random side: what comes
+/// from the direction of motion no longer follows it.
+std::vector<LogEvent> with_random_directions(std::vector<LogEvent> events, std::uint64_t seed) {
+  constexpr Microseconds kBegin = 90'000, kEnd = 45'000;
+  constexpr float kDetour_rad = 0.05f;
+  std::vector<Microseconds> pictures;
+  for (const auto& event : events) {
+    if (event.channel == "ICUB_CAMERAS") pictures.push_back(decoded<bot_core::images_t>(event).utime);
+  }
+  std::sort(pictures.begin(), pictures.end());
+  std::mt19937_64 random(seed);
+  std::vector<std::uint64_t> sides;
+  for (std::size_t i = 0; i < pictures.size(); ++i) sides.push_back(random());
+  for (auto& event : events) {
+    if (event.channel != "ICUB_JOINT_STATE") continue;
+    auto joints = decoded<bot_core::joint_state_t>(event);
+    const auto next = std::lower_bound(pictures.begin(), pictures.end(), joints.utime);
+    if (next == pictures.end() || *next - joints.utime < kEnd || *next - joints.utime > kBegin) continue;
+    const auto side = sides[static_cast<std::size_t>(next - pictures.begin())];
+    for (std::size_t j = 0; j < joints.joint_name.size(); ++j) {
+      const auto& name = joints.joint_name[j];
+      if (name.find("shoulder") == std::string::npos && name.find("elbow") == std::string::npos &&
+          name.find("wrist") == std::string::npos) {
+        continue;
+      }
+      joints.joint_position[j] += (side >> j & 1) != 0 ? kDetour_rad : -kDetour_rad;
+    }
+    event.data = encode(joints);
+  }
+  return events;
+}
+
+TEST(HiddenEffect, DuplicatedFramesSharpenNothingAndShuffledDirectionsShowNoBacklash) {
+  const Scratch scratch;
+  const std::string at = std::to_string(seed() % 1'000'000'000);
+  const auto written = simulate(scratch, "plain", {"--babble", "40", "--seed", at, "--set", "simulator.cameras.rate_hz=5",
+                                                   "--fault", "backlash:joint=r_elbow,value=1.5"});
+  ASSERT_EQ(written.error, "");
+  const auto events = events_of(written.log);
+  auto twice = written, shuffled = written;
+  twice.log = scratch / "twice.log";
+  shuffled.log = scratch / "shuffled.log";
+  write_events(twice.log, doubled(events));
+  write_events(shuffled.log, with_random_directions(events, seed()));
+  const std::vector<std::string> every = {"--picture-rate", "100"};
+  std::vector<Answer> answers(3);
+  {
+    std::jthread other([&] { answers[1] = diagnose(scratch, "twice", twice, every); });
+    answers[0] = diagnose(scratch, "plain", written, every);
+    answers[2] = diagnose(scratch, "shuffled", shuffled, every);
+  }
+  for (const auto& answer : answers) ASSERT_EQ(answer.error, "");
+  const auto& fault = answers[0].truth["faults"][0];
+  const Json* one = cause_of(answers[0].report, fault);
+  const Json* two = cause_of(answers[1].report, fault);
+  ASSERT_NE(one, nullptr) << sentence_of(answers[0]);
+  ASSERT_NE(two, nullptr) << sentence_of(answers[1]);
+  EXPECT_EQ(answers[1].report["causes"].size(), answers[0].report["causes"].size()) << sentence_of(answers[1]);
+  const auto width = [](const Json& cause) {
+    const auto& ci = cause["parameters"][0]["ci95"];
+    return ci[1].get<double>() - ci[0].get<double>();
+  };
+  EXPECT_NEAR(width(*two), width(*one), 0.15 * width(*one));  // twice the frames would make it 0.71
+  EXPECT_LT((*two)["z"].get<double>(), 1.2 * (*one)["z"].get<double>());
+  EXPECT_EQ(cause_of(answers[2].report, fault), nullptr) << sentence_of(answers[2]);
 }
 
 TEST(BinomialBound, IsThatOfTables) {

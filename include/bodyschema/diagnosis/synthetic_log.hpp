@@ -26,8 +26,8 @@ struct TrialFault {
   CauseName cause;      ///< of the catalogue, or outside it: wobble, velocity_lag,
                         ///< acceleration_lag, local_kink, random_walk
   double value = 0.0;
-  double second = 0.0;  ///< cosine of eccentricity, second tilt, cy of a principal point; time
-                        ///< share of a slip, period of a wobble in s
+  double second = 0.0;  ///< cosine of eccentricity, second tilt, cy of a principal point, y of
+                        ///< a base shift; time share of a slip, period of a wobble in s
   double detectable = 0.0;
 };
 

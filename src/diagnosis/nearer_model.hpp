@@ -1,0 +1,21 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "bodyschema/diagnosis/diagnosis_report.hpp"
+#include "model_fit.hpp"
+
+namespace bodyschema::diagnosis {
+
+/// Where a linear search stays far from the outlines: causes tried for real, each with the offsets
+/// fitted anew, the one that brings the outlines nearest kept, and so on while it is worth it. What is
+/// linear misleads about errors this large. Besides single causes all lengths together are tried (a
+/// shifted base and every link), for a model of another robot is wrong in several at once.
+/// Returns the offsets and what was found; nothing where no cause brings the outlines clearly nearer.
+/// @param offsets  fitted to the outlines as well as they can be
+/// @param causes   those that the log can test
+std::optional<ErrorModel> nearer_model(MeasurementSource& source, const CoordinateLayout& layout, ModelFitter& fitter,
+                                       const ErrorModel& offsets, const std::vector<CauseName>& causes);
+
+}  // namespace bodyschema::diagnosis
