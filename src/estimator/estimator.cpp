@@ -254,6 +254,43 @@ struct Estimator::Impl {
     alignment.linearise(observation, candidate.x, search_px.back(), candidate.evidence);
   }
 
+  /// From where the memory puts the arm to where this frame and the memory together see it.
+  Candidate follow(const Observation& observation, const OffsetFusion& memory) {
+    static constexpr double kNear_px[] = {8.0, 4.0};
+    Candidate candidate;
+    candidate.x = memory.mean();
+    refine(observation, memory, kNear_px, candidate);
+    return candidate;
+  }
+
+  /// What the frame could still win against the memory that `candidate` followed, chi-square.
+  [[nodiscard]] double pull_of(const Candidate& candidate) const {
+    const double variance = options.residual_sd_px * options.residual_sd_px;
+    const Eigen::VectorXd alone =
+        first_look.solve_with(candidate.evidence, candidate.x, variance) - candidate.x;
+    return (candidate.evidence.cost - predicted_cost(candidate.evidence, alone)) / variance;
+  }
+
+  /// The memory is about to be dropped for a frame that contradicts it. If it is the frame that is
+  /// wrong, the next ones will agree with the memory again.
+  void shelve(const PullJudge& usual) {
+    if (fusion.frames() >= kYoungMemory_frames) shelf = {fusion, usual, kShelf_frames};
+  }
+
+  /// Takes the memory back from the shelf once a frame agrees with it.
+  void reconsider(const Observation& observation) {
+    if (!shelf) return;
+    const Candidate candidate = follow(observation, shelf->fusion);
+    if (shelf->pulls.judge(pull_of(candidate)) == PullJudge::Verdict::kAgrees && fits(candidate.evidence)) {
+      fusion = shelf->fusion;
+      pulls = shelf->pulls;
+      surprised_frames = 0;
+      shelf.reset();
+    } else if (--shelf->frames_left == 0) {
+      shelf.reset();
+    }
+  }
+
   void best_step(const Observation& observation) {
     auto start = Clock::now();
     filter.update(weights);
@@ -265,14 +302,12 @@ struct Estimator::Impl {
     Candidate best;
     std::optional<Candidate> found;
     bool accepted = false;
-    double gain = 0.0;  // what this frame could still win against the memory, chi-square
+    double gain = 0.0;
+    reconsider(observation);
+    const PullJudge usual = pulls;
     if (fusion.frames() > 0.5) {
-      best.x = fusion.mean();
-      static constexpr double kNear_px[] = {8.0, 4.0};
-      refine(observation, fusion, kNear_px, best);
-      const Eigen::VectorXd alone =
-          first_look.solve_with(best.evidence, best.x, variance) - best.x;
-      gain = (best.evidence.cost - predicted_cost(best.evidence, alone)) / variance;
+      best = follow(observation, fusion);
+      gain = pull_of(best);
       accepted = pulls.judge(gain) != PullJudge::Verdict::kContradicts && fits(best.evidence);
       if (accepted && fusion.frames() < kYoungMemory_frames) {
         // A memory of so few frames may hold a wrong minimum, or a frame whose two pictures saw the
@@ -303,6 +338,7 @@ struct Estimator::Impl {
       if (fusion.frames() > 0.5) {
         ++surprised_frames;
         if (good || surprised_frames > 5) {
+          shelve(usual);
           fusion.forget_all();
           surprised_frames = good ? 0 : surprised_frames;
           if (!good) filter.reset(state.head(joints));
@@ -502,6 +538,7 @@ struct Estimator::Impl {
     surprised_frames = 0;
     pulls.forget();
     stalled = StalledEncoders(joints);
+    shelf.reset();
     contradicted = false;
   }
 
@@ -511,6 +548,7 @@ struct Estimator::Impl {
   static constexpr double kUsualPull = 20.0;  ///< chi-square of a frame that agrees with the memory
   static constexpr double kYoungMemory_frames = 3.5;
   static constexpr double kSettled_frames = 4.5;  ///< fewer may still hold a wrong minimum
+  static constexpr int kShelf_frames = 30;
   static constexpr double kClearlyBetter = 0.8;  ///< Hammoude distance against that of the memory
 
   EstimatorOptions options;
@@ -523,6 +561,12 @@ struct Estimator::Impl {
   ContourAlignment alignment;
   ParticleFilter filter;
   OffsetFusion fusion;
+  struct Shelf {
+    OffsetFusion fusion;
+    PullJudge pulls;  ///< what was usual for it
+    int frames_left;
+  };
+  std::optional<Shelf> shelf;  ///< the memory that the last contradiction cost
   const OffsetFusion first_look;  ///< the prior alone
   std::unique_ptr<SilhouetteScorer> scorer;
   std::string engine_reason;

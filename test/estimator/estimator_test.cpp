@@ -214,6 +214,25 @@ TEST_F(EstimatorOnOwnRobot, AStalledEncoderIsNamedAndNothingFalseIsCalledConverg
     EXPECT_GT(converged, 20);
     EXPECT_EQ(estimate.state, EstimatorState::kConverged);
     EXPECT_LT((estimate.offset_rad - offset_rad_).cwiseAbs().maxCoeff(), radians(1.5));
+// A single frame that is wrong, as when encoders jump to and fro: what was learned before counts again
+// as soon as the pictures agree with it.
+TEST_F(EstimatorOnOwnRobot, OneFrameWithAWrongEncoderCostsNoKnowledge) {
+  constexpr double kFrames = 60.0;
+  constexpr int kWrong = 45;
+  const std::pair<const char*, double> jumps_deg[] = {
+      {"r_elbow", 3.0}, {"r_wrist_pitch", -6.0}, {"r_shoulder_roll", 12.0}};
+  for (const auto& [joint, jump_deg] : jumps_deg) {
+    SCOPED_TRACE(joint);
+    Estimator estimator(robot_, setup_, rig_, options_);
+    const Estimate before = follow(estimator, *reach_, 0, kWrong, kFrames);
+    ASSERT_EQ(before.state, EstimatorState::kConverged);
+    Observation wrong = seen(*reach_, kWrong, kFrames);
+    for (auto& camera : wrong.cameras) camera->joints.q[robot_->joint_index(joint)] += radians(jump_deg);
+    EXPECT_NE(estimator.step(wrong).state, EstimatorState::kConverged);
+    const Estimate after = follow(estimator, *reach_, kWrong + 1, kWrong + 3, kFrames);
+    EXPECT_EQ(after.state, EstimatorState::kConverged);
+    EXPECT_LT((after.offset_rad - before.offset_rad).cwiseAbs().maxCoeff(), radians(0.1));
+    EXPECT_LT(after.covariance_rad2.trace(), 1.05 * before.covariance_rad2.trace());
   }
 }
 
