@@ -214,6 +214,9 @@ TEST_F(EstimatorOnOwnRobot, AStalledEncoderIsNamedAndNothingFalseIsCalledConverg
     EXPECT_GT(converged, 20);
     EXPECT_EQ(estimate.state, EstimatorState::kConverged);
     EXPECT_LT((estimate.offset_rad - offset_rad_).cwiseAbs().maxCoeff(), radians(1.5));
+  }
+}
+
 // A single frame that is wrong, as when encoders jump to and fro: what was learned before counts again
 // as soon as the pictures agree with it.
 TEST_F(EstimatorOnOwnRobot, OneFrameWithAWrongEncoderCostsNoKnowledge) {
