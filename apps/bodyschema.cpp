@@ -3,12 +3,14 @@
 
 #include "bodyschema/core/error.hpp"
 #include "commands/commands.hpp"
+#include "common_options.hpp"
 
 /// The offline program: one subcommand per workflow, each in apps/commands/. Exit status: 0 done,
 /// 2 wrong command line or configuration, 3 data that cannot be used (a log too short), 1 any other
 /// failure.
 int main(int argc, char** argv) {
   CLI::App app{"Body Schema: markerless calibration of a humanoid's arm from its own eyes"};
+  app.formatter(bodyschema::apps::help_formatter());  // before the commands, which take it over
   app.require_subcommand(1);
   app.footer(
       "Example:\n"

@@ -55,7 +55,6 @@ struct Arguments {
   std::string pictures = "rgb";
   std::optional<std::string> lcm_url;
   double rate = 1.0;
-  bool progress = false;
 };
 
 void print_faults() {
@@ -197,8 +196,8 @@ void run(const Arguments& a) {
   if (!a.truth.empty()) truth.emplace(a.truth, simulator, setup, publishing.utime_shift);
   sim::FramePublisher publisher(simulator.joint_names(), publishing);
 
-  std::optional<ProgressBar> bar;
-  if (!live || a.progress) bar.emplace(live ? "playing" : "simulating", static_cast<std::uint64_t>(simulator.frame_count()));
+  std::optional<ProgressBar> bar(std::in_place, live ? "playing" : "simulating",
+                                 static_cast<std::uint64_t>(simulator.frame_count()));
   int frames = 0;
   while (!g_stop) {
     const auto frame = simulator.next();
@@ -206,7 +205,7 @@ void run(const Arguments& a) {
     const bool sent = publisher.publish(*frame, *sink, [&](Microseconds due) { return !clock || (*clock)(due); });
     if (!sent) break;
     if (truth) truth->add(*frame);
-    if (bar) bar->advance();
+    bar->advance();
     ++frames;
   }
   bar.reset();
@@ -224,13 +223,15 @@ void run(const Arguments& a) {
 int main(int argc, char** argv) {
   using namespace bodyschema::apps;
   Arguments a;
-  CLI::App app{"Plays an iCub with wrong encoders: joint states and stereo pictures over LCM, or into a log"};
+  CLI::App app{"Plays a robot with wrong encoders: joint states and stereo pictures over LCM, or into a log"};
+  app.formatter(help_formatter());
   app.set_version_flag("--version", BODYSCHEMA_VERSION);
   app.footer(
       "Examples:\n"
       "  bodyschema-sim --config config/icub_right/simulator.yaml --reach --log reach.log --truth truth.json\n"
       "  bodyschema-sim --config config/icub_right/simulator.yaml --babble 60 --offsets random --seed 4 \\\n"
-      "                 --fault backlash:joint=r_elbow,value=0.8 --log babble.log --truth truth.json");
+      "                 --fault backlash:joint=r_elbow,value=0.8 --log babble.log --truth truth.json\n"
+      "Exit status: 0 done, 2 wrong command line or configuration, 1 any other failure.");
   auto* config = app.add_option("-c,--config", a.config, "Configuration file, e.g. config/icub_right/simulator.yaml");
   app.add_option("--set", a.overrides, "Override one key: --set simulator.cameras.rate_hz=10 (repeatable)");
   app.add_flag("--print-config", a.print_config, "Print the configuration in force and stop");
@@ -274,7 +275,6 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.001, 100.0))->group("Output")->excludes(log);
   app.add_option("--pictures", a.pictures, "rgb (default), gray or jpeg")
       ->check(CLI::IsMember({"rgb", "gray", "jpeg"}))->group("Output");
-  app.add_flag("--progress", a.progress, "Show progress over the network too")->group("Output");
   try {
     app.parse(argc, argv);
     if (!a.list_faults && config->count() == 0) throw CLI::RequiredError("--config");

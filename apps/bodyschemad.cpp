@@ -8,6 +8,7 @@
 #include "bodyschema/service/daemon.hpp"
 #include "bodyschema/service/start_up_checks.hpp"
 #include "common_options.hpp"
+#include "print_configuration.hpp"
 
 namespace {
 
@@ -35,19 +36,13 @@ void check_configuration(const apps::CommonOptions& common, const std::string& l
   for (const auto& complaint : check_network(lcm_url)) std::printf("network: %s\n", complaint.c_str());
 }
 
-void print_configuration(const apps::CommonOptions& common) {
-  const Configuration configuration = common.load();
-  const Pipeline pipeline(configuration);  // asks for every key, so that defaults are shown
-  configuration.reject_unknown_keys();
-  std::fputs(configuration.print().c_str(), stdout);
-}
-
 }  // namespace
 
 /// The service: encoders and pictures in over LCM, joint offsets out.
 int main(int argc, char** argv) {
   CLI::App app{"Body Schema's service: estimates the joint offsets of an arm from encoders and stereo\n"
                "pictures that come in over LCM, and publishes them with each pair of pictures"};
+  app.formatter(apps::help_formatter());
   app.set_version_flag("--version", BODYSCHEMA_VERSION);
   app.footer(
       "Examples:\n"
@@ -89,7 +84,7 @@ int main(int argc, char** argv) {
     if (check_config) {
       check_configuration(common, options.lcm_url);
     } else if (common.print_config) {
-      print_configuration(common);
+      apps::print_configuration(common.load());
     } else {
       run_daemon([&common] { return common.load(); }, options);
     }

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <exception>
 
+#include "bodyschema/core/error.hpp"
 #include "bodyschema/core/installation.hpp"
 #include "bodyschema/core/logging.hpp"
 
@@ -40,10 +41,30 @@ Configuration CommonOptions::load() const {
   return Configuration::load(find_data_file(config), all);
 }
 
+namespace {
+
+class HelpFormatter : public CLI::Formatter {
+ public:
+  std::string make_option_opts(const CLI::Option* option) const override {
+    std::string text = CLI::Formatter::make_option_opts(option);
+    for (const std::string twice : {"INT:", "FLOAT:", "TEXT:"}) {
+      if (const auto at = text.find(twice); at != std::string::npos) text.erase(at, twice.size());
+    }
+    return text;
+  }
+};
+
+}  // namespace
+
+std::shared_ptr<CLI::Formatter> help_formatter() { return std::make_shared<HelpFormatter>(); }
+
 int run_and_report(const char* program, const std::function<void()>& action) {
   try {
     action();
     return 0;
+  } catch (const ConfigurationError& e) {
+    std::fprintf(stderr, "%s: error: %s\n", program, e.what());
+    return 2;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "%s: error: %s\n", program, e.what());
     return 1;

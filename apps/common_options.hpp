@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -25,8 +26,11 @@ struct CommonOptions {
   [[nodiscard]] Configuration load() const;
 };
 
+/// How --help is laid out in every program: as CLI11 does, without saying a value's type twice.
+std::shared_ptr<CLI::Formatter> help_formatter();
+
 /// Runs `action`, turning every exception into one line on standard error. The value is the
-/// program's exit status: 0, or 1 after an error.
+/// program's exit status: 0, 2 after a wrong command line or configuration, 1 after any other error.
 int run_and_report(const char* program, const std::function<void()>& action);
 
 }  // namespace bodyschema::apps

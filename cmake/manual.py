@@ -37,7 +37,8 @@ class Help:
             elif item:
                 self.sections[title].append([item.group(1), item.group(2) or ""])
             elif self.sections[title]:
-                self.sections[title][-1][1] += " " + line.strip()
+                entry = self.sections[title][-1]
+                entry[1] = f"{entry[1]} {line.strip()}".strip()
             else:
                 self.sections[title].append([line.strip(), ""])
         self.description = self.description.strip()
@@ -50,12 +51,19 @@ class Help:
         return [term.split()[0] for term, _ in self.sections.get("Subcommands", [])]
 
     def options(self):
-        words = []
+        """Option -> what its value is (`TEXT`, `TEXT:{auto,atlas}`), empty for a flag."""
+        found = {}
         for items in self.sections.values():
             for term, _ in items:
-                if term.startswith("-"):
-                    words += re.findall(r"--?[a-zA-Z][\w-]*", term.split(" ")[0])
-        return words
+                names, _, rest = term.partition(" ")
+                value = rest.partition("Excludes:")[0].strip()
+                for name in re.findall(r"--?[a-zA-Z][\w-]*", names) if term.startswith("-") else []:
+                    found[name] = value
+        return found
+
+    def words_offered(self):
+        """Subcommands, and experiments where the page lists them."""
+        return [*self.subcommands(), *[term.partition(":")[0] for term, _ in self.sections.get("Experiments", [])]]
 
 
 def roff(text):
@@ -64,7 +72,7 @@ def roff(text):
                      for line in text.splitlines())
 
 
-def man_page(page, version):
+def man_page(page, version, names):
     shown = " ".join([pathlib.Path(page.words[0]).name, *page.words[1:]])
     usage = page.usage.split(" ", 1)[1] if " " in page.usage else ""
     summary = " ".join(page.description.split()) or shown
@@ -74,37 +82,51 @@ def man_page(page, version):
              ".SH DESCRIPTION", roff(page.description)]
     for title, items in page.sections.items():
         lines.append(f".SH {title.upper()}")
+        notes = False
         for term, description in items:
             if not title.startswith("Example"):
                 lines += [".TP", f".B {roff(term)}", roff(description)]
             elif term.startswith(" "):
                 lines += [".nf", roff(term), ".fi"]
             else:
+                lines += [] if notes else [".SH NOTES"]
+                notes = True
                 lines += [roff(term)]
         if title == "Subcommands":
             related = ", ".join(f"{page.name}\\-{roff(c)}(1)" for c in page.subcommands())
             lines += [".PP", f"Each has its own page: {related}."]
+    others = ", ".join(f"{roff(name)}(1)" for name in names if name != page.name)
+    lines += [".SH SEE ALSO", *([others + ","] if others else []), "the pages in",
+              roff("/usr/share/doc/bodyschema/")]
     return "\n".join(lines) + "\n"
 
 
 def completion(program, pages):
-    """Options of the subcommand being typed; file names everywhere else."""
+    """Commands, options after a dash, the choices of an option's value; file names everywhere else."""
     function = "_" + re.sub(r"\W", "_", program)
-    cases = []
+    cases, values = [], {}
     for page in pages:
-        key = f"'{' '.join(page.words[1:])}'"
-        words = " ".join(sorted(set(page.options())) + page.subcommands())
-        cases.append(f"    {key}) words='{words}' ;;")
+        key, options = " ".join(page.words[1:]), page.options()
+        cases.append(f"    '{key}') words='{' '.join(page.words_offered())}' options='{' '.join(sorted(options))}' ;;")
+        for option, value in sorted(options.items()):
+            if value:
+                choices = re.search(r"\{(.*)\}", value)
+                choices = choices.group(1).replace(",", " ") if choices else ""
+                values.setdefault(choices, []).append(f"'{key} {option}'")
+    after = [f"    {'|'.join(places)}) words='{choices}' options='' ;;" for choices, places in values.items()]
     subcommands = "|".join(f"'{' '.join(p.words[1:])}'" for p in pages if len(p.words) > 1) or "--none--"
     return "\n".join([
         f"# bash completion of {program}; generated from its --help",
         f"{function}() {{",
-        "  local words='' sub='' word",
+        "  local words='' options='' sub='' word typed=${COMP_WORDS[COMP_CWORD]}",
         '  for word in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do',
         f"    case \"${{sub:+$sub }}$word\" in {subcommands}) sub=\"${{sub:+$sub }}$word\" ;; esac",
         "  done",
         "  case $sub in", *cases, "  esac",
-        '  mapfile -t COMPREPLY < <(compgen -W "$words" -- "${COMP_WORDS[COMP_CWORD]}")',
+        "  # After an option that takes a value: its choices, else file names.",
+        '  case "$sub ${COMP_WORDS[COMP_CWORD-1]}" in', *after, "  esac",
+        "  [[ $typed == -* ]] && words=$options",
+        '  mapfile -t COMPREPLY < <(compgen -W "$words" -- "$typed")',
         "}",
         f"complete -o default -F {function} {program}", ""])
 
@@ -113,15 +135,17 @@ def main():
     out, version, programs = pathlib.Path(sys.argv[1]), sys.argv[2], sys.argv[3:]
     (out / "man1").mkdir(parents=True, exist_ok=True)
     (out / "completions").mkdir(parents=True, exist_ok=True)
+    pages_of = {}
     for program in programs:
         pages, todo = [], [[program]]
         while todo:
             page = Help(todo.pop(0))
             pages.append(page)
             todo += [[*page.words, command] for command in page.subcommands()]
+        pages_of[pathlib.Path(program).name] = pages
+    for name, pages in pages_of.items():
         for page in pages:
-            (out / "man1" / f"{page.name}.1").write_text(man_page(page, version), encoding="utf-8")
-        name = pathlib.Path(program).name
+            (out / "man1" / f"{page.name}.1").write_text(man_page(page, version, pages_of), encoding="utf-8")
         (out / "completions" / name).write_text(completion(name, pages), encoding="utf-8")
 
 

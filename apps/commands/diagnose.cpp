@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "../common_options.hpp"
+#include "../print_configuration.hpp"
 #include "commands.hpp"
 
 namespace bodyschema::apps {
@@ -24,16 +25,24 @@ void add_diagnose(CLI::App& app) {
   command->add_option("log", a->log, "LCM log")->required();
   command->add_option("-o,--out", a->out, "Folder for report.html, report.json and extended_model.yaml")->required();
   command->add_option("--picture-rate", a->rate_hz, "Pictures used per second and camera")
+      ->capture_default_str()
       ->check(CLI::Range(0.5, 120.0));
-  command->add_option("--threads", a->threads, "Worker threads")->check(CLI::Range(1, 256));
+  command->add_option("--threads", a->threads, "Worker threads")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 256));
   a->common.add_to(*command);
   command->callback([a] {
+    const Configuration configuration = a->common.load();
+    if (a->common.print_config) {
+      print_configuration(configuration);
+      return;
+    }
     LogDiagnosisOptions options;
     options.log = a->log;
     options.out = a->out;
     options.picture_rate_hz = a->rate_hz;
     options.threads = a->threads;
-    const auto report = diagnose_log(a->common.load(), options);
+    const auto report = diagnose_log(configuration, options);
     std::printf("%s\n", report.sentence.c_str());
     for (const auto& warning : report.warnings) std::printf("note: %s\n", warning.c_str());
     std::printf("held out: %.3f -> %.3f px, hand %.2f -> %.2f mm, %.2f -> %.2f deg\n",

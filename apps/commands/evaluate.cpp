@@ -26,9 +26,11 @@ void add_evaluate(CLI::App& app) {
   command->footer(footer);
   command->add_option("experiment", a->options.experiment, "Which experiment")->required();
   command->add_option("--trials", a->options.trials, "Seeded trials of each experiment")
+      ->capture_default_str()
       ->check(CLI::Range(1, 100000));
-  command->add_option("--seed", a->options.seed, "Seed of the first trial");
+  command->add_option("--seed", a->options.seed, "Seed of the first trial")->capture_default_str();
   command->add_option("--threads", a->options.threads, "Trials side by side; 0: one per core")
+      ->capture_default_str()
       ->check(CLI::Range(0, 1024));
   command->add_option("-o,--out", a->out, "Folder for summary.json and report.html")->required();
   a->common.add_to(*command);

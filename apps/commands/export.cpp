@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "../common_options.hpp"
+#include "../print_configuration.hpp"
 #include "bodyschema/pipeline/export_correction.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
 #include "commands.hpp"
@@ -25,6 +26,10 @@ void add_export(CLI::App& app) {
   a->common.add_extended_model_to(*command);
   command->callback([a] {
     const Configuration configuration = a->common.load();
+    if (a->common.print_config) {
+      print_configuration(configuration);
+      return;
+    }
     const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
     const StereoRig rig = StereoRig::from(configuration.section("cameras"));
     std::fputs(export_correction(a->summary, setup, rig, a->out).c_str(), stdout);

@@ -38,7 +38,7 @@ void add_new_robot(CLI::App& app) {
       ->check(CLI::Range(1.0, 1e5));
   command->add_option("--prefix", a->options.channel_prefix,
                       "Messages come on PREFIX_JOINT_STATE and PREFIX_CAMERAS (default ROBOT)");
-  command->add_option("-o,--out", a->options.out, "Folder for robot.yaml and estimator.yaml")
+  command->add_option("-o,--out", a->options.out, "Folder for robot.yaml, estimator.yaml and simulator.yaml")
       ->required();
   command->callback([a] {
     set_up_logging("warn");

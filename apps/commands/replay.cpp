@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "../common_options.hpp"
-#include "bodyschema/pipeline/pipeline.hpp"
+#include "../print_configuration.hpp"
 #include "commands.hpp"
 
 namespace bodyschema::apps {
@@ -28,6 +28,7 @@ void add_replay(CLI::App& app) {
       ->required();
   command->add_option("--truth", a->truth, "Ground truth (JSON): adds errors to the results");
   command->add_option("--overlays", a->overlays, "Overlay pictures spread over the log")
+      ->capture_default_str()
       ->check(CLI::Range(0, 100000));
   command->add_flag("--masks", a->masks, "Write the observed masks too");
   command->add_flag("--learn-background-first", a->learn_first,
@@ -37,9 +38,7 @@ void add_replay(CLI::App& app) {
   command->callback([a] {
     const Configuration configuration = a->common.load();
     if (a->common.print_config) {
-      const Pipeline pipeline(configuration);  // asks for every key, so that defaults are shown
-      configuration.reject_unknown_keys();
-      std::fputs(configuration.print().c_str(), stdout);
+      print_configuration(configuration);
       return;
     }
     ReplayOptions options;

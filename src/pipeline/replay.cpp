@@ -88,7 +88,10 @@ class Replay {
     std::filesystem::create_directories(options.out, error);
     estimates_.open(options.out / "estimates.jsonl");
     if (!estimates_) throw FileError(options.out.string() + ": cannot write estimates.jsonl there");
-    if (options.truth) truth_ = Truth::load(*options.truth);
+    if (!options.truth) return;
+    std::vector<std::string> cameras;
+    for (const auto& camera : pipeline_.rig().cameras) cameras.push_back(camera.name);
+    truth_ = Truth::load(*options.truth, cameras);
   }
 
   std::string run() {

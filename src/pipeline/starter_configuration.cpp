@@ -239,6 +239,23 @@ std::string estimator_yaml(const StarterOptions& options) {
       yaml(options.channel_prefix));
 }
 
+/// The distances of the motion are left out: the simulator finds them.
+std::string simulator_yaml(const StarterOptions& options) {
+  return fmt::format(
+      "# A stand-in for the robot, played by bodyschema-sim; every key is explained in\n"
+      "# config/icub_right/simulator.yaml.\n"
+      "include: [config/bus.yaml, robot.yaml]\n"
+      "bus:\n"
+      "  channel_prefix: {}\n"
+      "simulator:\n"
+      "  cameras:\n"
+      "    rate_hz: 30\n"
+      "  motion:\n"
+      "    posture_deg: {{}}                 # of head and fingers; left out: robot.fixed_joints_deg, else 0\n"
+      "    hand_radius_m: 0.1              # m; kept inside the pictures around the hand\n",
+      yaml(options.channel_prefix));
+}
+
 void write_new(const fs::path& file, const std::string& text) {
   std::error_code ignored;
   if (fs::exists(file, ignored))
@@ -270,6 +287,7 @@ std::string write_starter_configuration(const StarterOptions& options) {
   fs::create_directories(options.out, error);
   write_new(options.out / "robot.yaml", robot_yaml(options, parts, tree.mesh_roots(), focal_px));
   write_new(options.out / "estimator.yaml", estimator_yaml(options));
+  write_new(options.out / "simulator.yaml", simulator_yaml(options));
 
   std::string told = fmt::format("arm: {}\n", fmt::join(parts.arm, ", "));
   if (!parts.head.empty()) told += fmt::format("head: {}\n", fmt::join(parts.head, ", "));
@@ -281,8 +299,7 @@ std::string write_starter_configuration(const StarterOptions& options) {
     told += fmt::format("focal length: a guess, {:.0f} px; fill in your cameras' in robot.yaml\n",
                         focal_px);
   }
-  told += fmt::format("wrote {} and {}\n", (options.out / "robot.yaml").string(),
-                      (options.out / "estimator.yaml").string());
+  told += fmt::format("wrote robot.yaml, estimator.yaml and simulator.yaml in {}\n", options.out.string());
   try {
     const Pipeline pipeline(Configuration::load(options.out / "estimator.yaml"));
     told += "robot and meshes load\n";

@@ -30,9 +30,15 @@ std::vector<Eigen::Vector3d> points_from(const Json& list) {
   return points;
 }
 
+std::vector<Pose> hand_in(const std::vector<std::string>& cameras, const Json& instant) {
+  std::vector<Pose> poses;
+  for (const auto& camera : cameras) poses.push_back(pose_from(instant.at("hand_in_" + camera + "_camera")));
+  return poses;
+}
+
 }  // namespace
 
-Truth Truth::load(const std::filesystem::path& file) {
+Truth Truth::load(const std::filesystem::path& file, const std::vector<std::string>& cameras) {
   std::ifstream stream(file);
   if (!stream) throw FileError(file.string() + ": no such truth file");
   Truth truth;
@@ -48,8 +54,7 @@ Truth Truth::load(const std::filesystem::path& file) {
         TruthInstant instant;
         instant.begin = microseconds(pose.at("time_s").at(0).get<double>());
         instant.end = microseconds(pose.at("time_s").at(1).get<double>());
-        instant.X_CP = {pose_from(pose.at("hand_in_left_camera")),
-                        pose_from(pose.at("hand_in_right_camera"))};
+        instant.X_CP = hand_in(cameras, pose);
         instant.fingertips_P = common_tips;
         truth.instants_.push_back(std::move(instant));
       }
@@ -57,8 +62,7 @@ Truth Truth::load(const std::filesystem::path& file) {
       for (const auto& frame : json.at("frames")) {
         TruthInstant instant;
         instant.begin = instant.end = frame.at("utime").get<Microseconds>();
-        instant.X_CP = {pose_from(frame.at("hand_in_left_camera")),
-                        pose_from(frame.at("hand_in_right_camera"))};
+        instant.X_CP = hand_in(cameras, frame);
         instant.fingertips_P = frame.contains("fingertips_in_hand_m")
                                    ? points_from(frame.at("fingertips_in_hand_m"))
                                    : common_tips;

@@ -37,7 +37,7 @@ std::unique_ptr<SilhouetteScorer> make_silhouette_scorer(const SilhouetteModel& 
       because("auto: " + context->description() + " is a GPU");
       return atlas(std::move(context));
     }
-    because("auto: " + context->description() + " draws in software");
+    because("auto: no GPU, " + context->description() + " draws in software");
   } catch (const gl::ContextError& error) {
     because(std::string("auto: ") + error.what());
   }

@@ -3,7 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
+#include <utility>
 
 #include "bodyschema/core/error.hpp"
 
@@ -60,6 +62,34 @@ MotionPlanner::MotionPlanner(std::shared_ptr<const RobotModel> model, const Robo
     }
     if (all) head_.push_back(joint);
   }
+  if (settings_.distance_min_m > 0.0 && settings_.distance_max_m > 0.0) return;
+  const auto seen = seen_distances();
+  if (!seen) {
+    throw DataError("hardly any posture of the arm shows its hand '" + setup.hand_link +
+                    "' to the cameras; check cameras: links with OpenCV's axes (x right, y down, z into the "
+                    "picture), focal lengths and sizes; and simulator.motion.posture_deg: where the head looks");
+  }
+  double& nearest_m = settings_.distance_min_m;
+  double& farthest_m = settings_.distance_max_m;
+  if (nearest_m <= 0.0) nearest_m = farthest_m > 0.0 ? std::min(seen->min_m, 0.9 * farthest_m) : seen->min_m;
+  if (farthest_m <= 0.0) farthest_m = std::max(seen->max_m, 1.1 * nearest_m);
+}
+
+std::optional<MotionPlanner::Range> MotionPlanner::seen_distances() {
+  constexpr int kPostures = 20000;
+  constexpr std::size_t kEnough = 300;
+  constexpr std::size_t kTooFew = 20;
+  // The same answer for every seed of the motion, and the same motion whether it is asked or not.
+  const Random motion = std::exchange(random_, Random(1, "where the hand is seen"));
+  std::vector<double> distances;
+  for (int i = 0; i < kPostures && distances.size() < kEnough; ++i) {
+    const View v = view(random_arm(base_, 1.0));
+    if (v.whole_hand) distances.push_back(v.distance_m);
+  }
+  random_ = motion;
+  if (distances.size() < kTooFew) return std::nullopt;
+  std::sort(distances.begin(), distances.end());
+  return Range{distances[distances.size() / 20], distances[distances.size() / 2]};
 }
 
 void MotionPlanner::compute(const Eigen::VectorXd& q) { kinematics_->compute(q, X_W_); }
@@ -228,8 +258,17 @@ Trajectory MotionPlanner::reach(double duration_s) {
       return trajectory;
     }
   }
-  throw DataError("no reach found with the hand in view of both cameras at " + std::to_string(settings_.distance_min_m) +
-                  " to " + std::to_string(settings_.distance_max_m) + " m; check simulator.motion");
+  const auto metres = [](double min_m, double max_m) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%.2f to %.2f m", min_m, max_m);
+    return std::string(text);
+  };
+  const auto seen = seen_distances();
+  throw DataError("no reach found with the hand in view of all cameras at simulator.motion.distance_min_m to "
+                  "distance_max_m, " + metres(settings_.distance_min_m, settings_.distance_max_m) + "; " +
+                  (seen ? "this robot's hand is best seen at " + metres(seen->min_m, seen->max_m)
+                        : std::string("hardly any posture shows this robot's hand")) +
+                  "; where the head looks is simulator.motion.posture_deg");
 }
 
 Eigen::VectorXd MotionPlanner::visible_posture() {
@@ -239,7 +278,7 @@ Eigen::VectorXd MotionPlanner::visible_posture() {
     const View v = view(q);
     if (good(v) && v.forearm) return q;
   }
-  throw DataError("no posture found with the hand in view of both cameras; check simulator.motion");
+  throw DataError("no posture found with the hand in view of all cameras; check simulator.motion");
 }
 
 Eigen::VectorXd MotionPlanner::next_posture(const Eigen::VectorXd& from) {

@@ -55,6 +55,9 @@ TEST_F(StarterConfiguration, FindsTheArmBetweenRootAndHand) {
   EXPECT_EQ(pipeline.rig().cameras[1].intrinsics,
             (PinholeIntrinsics{320, 240, 420.0, 420.0, 159.5, 119.5}));
   EXPECT_EQ(pipeline.bus().channels().cameras, "ROBOT_CAMERAS");
+  // Played by bodyschema-sim on the same channels; docs/calibrate_my_robot.md does so.
+  const Configuration stand_in = Configuration::load(o.out / "simulator.yaml");
+  EXPECT_EQ(BusOptions::from(stand_in.section("bus")).channels().cameras, "ROBOT_CAMERAS");
 }
 
 /// As in a ROS workspace: package://NAME/ stands for a folder above the URDF.

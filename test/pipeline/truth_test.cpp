@@ -18,9 +18,9 @@ class TruthFile : public ::testing::Test {
  protected:
   TruthFile() : path_(std::filesystem::temp_directory_path() / ("truth_" + std::to_string(getpid()) + ".json")) {}
   ~TruthFile() override { std::filesystem::remove(path_); }
-  Truth load(const std::string& text) {
+  Truth load(const std::string& text, const std::vector<std::string>& cameras = {"left", "right"}) {
     std::ofstream(path_) << text;
-    return Truth::load(path_);
+    return Truth::load(path_, cameras);
   }
   std::string error_of(const std::string& text) {
     try {
@@ -45,6 +45,16 @@ TEST_F(TruthFile, ReadsTheSimulatorsFrames) {
   EXPECT_EQ(truth.at(2'000'000), nullptr) << "a second away there is no truth";
   ASSERT_EQ(truth.offsets().size(), 1u);
   EXPECT_DOUBLE_EQ(truth.offsets()[0].second, radians(-2.0));
+}
+
+TEST_F(TruthFile, ReadsARobotWithOneCamera) {
+  const std::string text =
+      std::string(R"({"frames": [{"utime": 1000000, "hand_in_right_camera": )") + kPose + "}]}";
+  const Truth truth = load(text, {"right"});
+  ASSERT_NE(truth.at(1'000'000), nullptr);
+  ASSERT_EQ(truth.at(1'000'000)->X_CP.size(), 1u);
+  EXPECT_DOUBLE_EQ(truth.at(1'000'000)->X_CP[0].translation().z(), 0.3);
+  EXPECT_THAT(error_of(text), HasSubstr("hand_in_left_camera")) << "of a robot with two";
 }
 
 TEST_F(TruthFile, ErrorsNameTheFile) {

@@ -413,7 +413,45 @@ TEST(Simulator, SaysWhenNoReachIsPossible) {
   auto stage = icub_right();
   stage.settings.motion.distance_min_m = 1.2;
   stage.settings.motion.distance_max_m = 1.3;
-  EXPECT_THROW((void)stage.simulator(joints_only()), DataError);
+  try {
+    (void)stage.simulator(joints_only());
+    FAIL() << "a reach at 1.2 m with an arm of half that length";
+  } catch (const DataError& e) {
+    EXPECT_NE(std::string(e.what()).find("1.20 to 1.30 m; this robot's hand is best seen at 0."), std::string::npos)
+        << e.what();
+  }
+}
+
+/// A robot of one's own, with nothing said about where its hand may go.
+TEST(Simulator, FindsWhereTheCamerasSeeTheHandWhenNotTold) {
+  const auto configuration = Configuration::load(std::string(BODYSCHEMA_SOURCE_DIR) + "/config/arm7/robot.yaml");
+  Stage stage;
+  stage.setup = RobotSetup::from(configuration.section("robot"));
+  stage.rig = StereoRig::from(configuration.section("cameras"));
+  stage.model = stage.setup.load();
+  const auto distances = [&](std::uint64_t seed) {
+    const MotionPlanner planner(stage.model, stage.setup, stage.rig, stage.settings.motion, seed);
+    return std::pair(planner.settings().distance_min_m, planner.settings().distance_max_m);
+  };
+  const auto [nearest_m, farthest_m] = distances(1);
+  EXPECT_GT(nearest_m, 0.3);  // the cameras stand 1.5 m from the shoulder
+  EXPECT_LT(farthest_m, 1.6);
+  EXPECT_GT(farthest_m - nearest_m, 0.2);
+  EXPECT_EQ(distances(2), distances(1));
+  for (const std::uint64_t seed : {1, 2, 3}) EXPECT_EQ(run(stage.simulator(joints_only(seed))).size(), 30u);
+
+  stage.settings.motion.distance_max_m = 1.2;  // one of them given
+  EXPECT_EQ(distances(1), std::pair(nearest_m, 1.2));
+
+  for (auto& camera : stage.rig.cameras) camera.link = "camera_left";  // x along the line of sight
+  stage.settings.motion = {};
+  try {
+    (void)distances(1);
+    FAIL() << "cameras that look past the robot";
+  } catch (const DataError& e) {
+    EXPECT_NE(std::string(e.what()).find("hardly any posture of the arm shows its hand 'hand'"), std::string::npos)
+        << e.what();
+  }
 }
 
 }  // namespace

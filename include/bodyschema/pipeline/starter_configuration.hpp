@@ -17,8 +17,8 @@ struct StarterOptions {
   std::filesystem::path out;  ///< folder, created
 };
 
-/// Writes robot.yaml and estimator.yaml for a robot that has none, from its URDF: the joints
-/// between root and hand that do not move the cameras too are the arm, the links they carry are
+/// Writes robot.yaml, estimator.yaml and simulator.yaml for a robot that has none, from its URDF: the
+/// joints between root and hand that do not move the cameras too are the arm, the links they carry are
 /// what the cameras see, joints between root and a camera are the head. Says what was found and
 /// what is left to fill in, for people. Replaces no file. Throws FileError naming the URDF and what
 /// is wrong, ConfigurationError naming a link that is not there and the nearest one.

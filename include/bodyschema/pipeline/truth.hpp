@@ -14,7 +14,7 @@ namespace bodyschema {
 struct TruthInstant {
   Microseconds begin = 0;  ///< first and last exposure time it holds for
   Microseconds end = 0;
-  std::vector<Pose> X_CP;                      ///< hand base in the true left and right camera
+  std::vector<Pose> X_CP;                      ///< hand base in each true camera
   std::vector<Eigen::Vector3d> fingertips_P;   ///< metres, hand frame; may be empty
 };
 
@@ -22,8 +22,10 @@ struct TruthInstant {
 /// the recording's truth.json.
 class Truth {
  public:
+  /// @param cameras  names of the robot's cameras, in its order
   /// Throws FileError naming file and key.
-  static Truth load(const std::filesystem::path& file);
+  static Truth load(const std::filesystem::path& file,
+                    const std::vector<std::string>& cameras = {"left", "right"});
   /// The instant that holds at `utime`, or nothing within 60 ms.
   [[nodiscard]] const TruthInstant* at(Microseconds utime) const;
   [[nodiscard]] const std::vector<TruthInstant>& instants() const { return instants_; }

@@ -4,6 +4,7 @@
 #include <array>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,8 +18,9 @@ namespace bodyschema::simulator {
 
 /// Where the hand may go and how the head stands.
 struct MotionSettings {
-  double distance_min_m = 0.25;  ///< hand centre to the middle between the eyes
-  double distance_max_m = 0.45;
+  /// Hand centre to the middle between the eyes; 0: where the cameras see the hand of this robot.
+  double distance_min_m = 0.0;
+  double distance_max_m = 0.0;
   double border_px = 6.0;        ///< hand base and fingertips stay this far inside the pictures
   double hand_radius_m = 0.075;  ///< room kept around the hand's centre when targets are chosen
   std::map<std::string, double> posture_deg;  ///< head and fingers; joints left out: RobotSetup's
@@ -33,6 +35,7 @@ struct MotionSettings {
 class MotionPlanner {
  public:
   /// @param frozen  arm joints that stay where they are
+  /// Throws DataError when distances are to be found and no posture shows the hand to the cameras.
   MotionPlanner(std::shared_ptr<const RobotModel> model, const RobotSetup& setup, const StereoRig& rig,
                 MotionSettings settings, std::uint64_t seed, bool head_moves = false,
                 const std::vector<std::string>& frozen = {});
@@ -64,8 +67,16 @@ class MotionPlanner {
   /// @param pixel  where it appears, mean of all cameras; @param distance_m  from between the eyes
   Eigen::Vector3d point_in_view(const Eigen::Vector2d& pixel, double distance_m, const Eigen::VectorXd& q);
   [[nodiscard]] const Eigen::VectorXd& base_posture() const { return base_; }
+  /// With the distances in force.
+  [[nodiscard]] const MotionSettings& settings() const { return settings_; }
 
  private:
+  struct Range {
+    double min_m, max_m;
+  };
+  /// Distances of the hand in postures drawn at random that show it: the nearer half. Nothing: hardly
+  /// any posture does.
+  std::optional<Range> seen_distances();
   void compute(const Eigen::VectorXd& q);
   Eigen::VectorXd random_arm(const Eigen::VectorXd& like, double share);
   Eigen::VectorXd move_head(Eigen::VectorXd q);
