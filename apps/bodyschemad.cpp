@@ -34,6 +34,11 @@ void check_configuration(const apps::CommonOptions& common, const std::string& l
     std::printf("extended model: %s\n", describe(*model).c_str());
   }
   for (const auto& complaint : check_network(lcm_url)) std::printf("network: %s\n", complaint.c_str());
+  try {
+    const LcmLink link(lcm_url);
+  } catch (const DeviceError& e) {
+    std::printf("network: %s\n", e.what());
+  }
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Opens a page in Chromium without a screen, in several tabs at once if asked, waits until UNTIL is true in
-each (or a minute has passed), and prints one JSON object: {"tabs": [value of EXPRESSION in every tab]}. Talks
+each (or two minutes have passed), and prints one JSON object: {"tabs": [value of EXPRESSION in every tab]}. Talks
 to the browser over a pair of pipes. A browser that goes away or does not answer is no word on the page: it is
 started anew, three times at most, and each such end is told on standard error.
 
@@ -18,8 +18,8 @@ import sys
 import tempfile
 import time
 
-PAGE_S = 60  # for the page to come to UNTIL
-ANSWER_S = 30  # for the browser to answer one question
+PAGE_S = 120  # for the page to come to UNTIL
+ANSWER_S = 60  # for the browser to answer one question
 STARTS = 3
 
 
@@ -131,6 +131,8 @@ def look(browser, a):
     end = time.monotonic() + PAGE_S
     while time.monotonic() < end and not all(evaluate(tab, a.until) for tab in tabs):
         time.sleep(0.2)
+    if time.monotonic() >= end:
+        print(f"the page did not come to {a.until} in {PAGE_S} s", file=sys.stderr)
     values = [evaluate(tab, a.expression) for tab in tabs]
     if a.screenshot:
         size = browser.ask("Page.getLayoutMetrics", tabs[0])["cssContentSize"]

@@ -45,7 +45,8 @@ class LivePageInBrowser : public testing::Test {
                                         "--until", "Number(document.body.dataset.updates) > 3"};
     command.insert(command.end(), more.begin(), more.end());
     Process chromium(command, scratch_.folder());
-    EXPECT_EQ(chromium.wait(Seconds(240)), 0) << chromium.err();
+    EXPECT_EQ(chromium.wait(Seconds(400)), 0) << chromium.err();
+    std::fputs(chromium.err().c_str(), stderr);
     const auto json = nlohmann::json::parse(chromium.out(), nullptr, false);
     return json.is_object() ? json["tabs"] : nlohmann::json::array({""});
   }

@@ -412,6 +412,10 @@ TEST_F(Service, ChecksAndPrintsTheConfigurationWithoutTheNetwork) {
   EXPECT_EQ(check.wait(kStart), 0);
   EXPECT_THAT(check.out(), HasSubstr("good"));
   EXPECT_THAT(check.out(), HasSubstr("ICUB_JOINT_STATE and ICUB_CAMERAS in"));
+  Process wrong({"bodyschemad", "--config", reach_configuration(), "--check-config", "-l", "nonsense://"},
+                scratch_.folder());
+  EXPECT_EQ(wrong.wait(kStart), 0) << "the configuration is good all the same";
+  EXPECT_THAT(wrong.out(), HasSubstr("network: LCM cannot use 'nonsense://'"));
   Process print(daemon({"--print-config", "--set", "filter.particles=77"}), scratch_.folder());
   EXPECT_EQ(print.wait(kStart), 0);
   EXPECT_THAT(print.out(), HasSubstr("particles: 77"));
