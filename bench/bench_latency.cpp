@@ -167,7 +167,6 @@ int main(int argc, char** argv) {
     const int seconds = wish != nullptr ? std::max(2, std::atoi(wish)) : 60;
     benchmark::RegisterBenchmark("daemon/contour/8k/320x240/200",
                                  [seconds](benchmark::State& state) { latency(state, seconds); })
-        ->MeasureProcessCPUTime()  // of the player; the daemon's own is printed beside it
         ->UseManualTime()
         ->Iterations(1000)
         ->Unit(benchmark::kMillisecond);
