@@ -8,20 +8,18 @@
 
 using namespace bodyschema;
 
-/// Whatever is answered; hangs up after asking.
-static std::string ask(int port, std::string_view request) {
-  return test::talk(port, request, std::chrono::milliseconds(300), test::Afterwards::kHangUp);
-}
-
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static LivePage page(0, {"left", "right"});
-  ask(page.port(), fuzz::as_text(data, size));
+  test::talk(page.port(), fuzz::as_text(data, size), std::chrono::milliseconds(300), test::Afterwards::kHangUp);
   static int count = 0;
-  if (++count % 100 == 0 &&
-      ask(page.port(), "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n").find("200 OK") ==
-          std::string::npos) {
-    std::fputs("the page no longer answers\n", stderr);
-    std::abort();
+  if (++count % 50 == 0) {
+    // The page's threads come last on a busy machine: slow is not dead. Who has hung up gets no answer.
+    const std::string answer =
+        test::talk(page.port(), "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n", std::chrono::seconds(15));
+    if (answer.find("200 OK") == std::string::npos) {
+      std::fprintf(stderr, "the page no longer answers a good request, but: '%s'\n", answer.substr(0, 500).c_str());
+      std::abort();
+    }
   }
   return 0;
 }
