@@ -117,6 +117,15 @@ class Diagnoser {
     return std::find(causes.begin(), causes.end(), cause) != causes.end();
   }
 
+  [[nodiscard]] ErrorModel offsets_at(const std::map<std::string, double>& start) const {
+    ErrorModel offsets(source_.roles());
+    for (const auto& target : effect_targets("joint_offset", source_.roles())) {
+      const auto given = start.find(target.joint);
+      offsets.add("joint_offset", target).parameters()[0].value = given == start.end() ? 0.0 : given->second;
+    }
+    return offsets;
+  }
+
   static std::vector<CauseName> causes_of(const ErrorModel& model) {
     std::vector<CauseName> causes;
     for (std::size_t e = 0; e < model.size(); ++e) {
@@ -129,20 +138,19 @@ class Diagnoser {
   /// Offsets alone before all else: nuisances let loose on outlines tens of pixels away run off.
   void fit_offsets() {
     constexpr double kStuck_px = 1.5, kWidest_px = 40.0;
-    const auto from = [&](bool given) {
-      ErrorModel offsets(source_.roles());
-      for (const auto& target : effect_targets("joint_offset", source_.roles())) {
-        auto& offset = offsets.add("joint_offset", target);
-        const auto start = options_.start_offsets.find(target.joint);
-        if (given && start != options_.start_offsets.end()) offset.parameters()[0].value = start->second;
-      }
+    const auto from = [&](ErrorModel offsets) {
       const double left_px = fitter_.approach(offsets, {}, kWidest_px);
       return std::pair{left_px, std::move(offsets)};
     };
-    auto best = from(true);
-    if (best.first > kStuck_px && !options_.start_offsets.empty()) {
-      auto other = from(false);
+    auto best = from(offsets_at(options_.start_offsets));
+    const auto try_from = [&](ErrorModel start) {
+      if (best.first <= kStuck_px) return;
+      auto other = from(std::move(start));
       if (other.first < best.first) best = std::move(other);
+    };
+    if (!options_.start_offsets.empty()) try_from(offsets_at({}));
+    if (best.first > kStuck_px) {
+      for (auto& start : scattered_starts(source_, best.second)) try_from(std::move(start));
     }
     offsets_ = best.second;
     for (std::size_t e = 0; e < best.second.size(); ++e) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "bodyschema/effects/catalogue.hpp"
+#include "trial_random.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
@@ -118,6 +119,28 @@ class NearerModel {
 };
 
 }  // namespace
+
+std::vector<ErrorModel> scattered_starts(MeasurementSource& source, const ErrorModel& offsets) {
+  constexpr int kDrawn = 150;
+  constexpr std::size_t kKept = 3, kEvery = 16;
+  constexpr double kSpread_rad = 10.0 * kPi / 180.0, kFar_px = 10.0;
+  if (!source.set_search(kFar_px, kEvery)) return {};
+  const double outline = outline_points(linearise(source, offsets));
+  TrialRandom random(1);
+  std::vector<Guess> guesses;
+  for (int i = 0; i < kDrawn; ++i) {
+    Guess guess{offsets, 0.0};
+    for (std::size_t e = 0; e < guess.model.size(); ++e) {
+      guess.model[e].parameters()[0].value = kSpread_rad * random.normal();
+    }
+    guess.misfit = misfit(linearise(source, guess.model), outline);
+    guesses.push_back(std::move(guess));
+  }
+  std::sort(guesses.begin(), guesses.end(), [](const auto& a, const auto& b) { return a.misfit < b.misfit; });
+  std::vector<ErrorModel> starts;
+  for (std::size_t i = 0; i < kKept; ++i) starts.push_back(std::move(guesses[i].model));
+  return starts;
+}
 
 std::optional<ErrorModel> nearer_model(MeasurementSource& source, const CoordinateLayout& layout, ModelFitter& fitter,
                                        const ErrorModel& offsets, const std::vector<CauseName>& causes) {

@@ -8,6 +8,10 @@
 
 namespace bodyschema::diagnosis {
 
+/// Offsets from which a fit may get to the outlines where it was caught on the way: the nearest of
+/// many scattered ones, always the same for a log. None where the source needs no search.
+std::vector<ErrorModel> scattered_starts(MeasurementSource& source, const ErrorModel& offsets);
+
 /// Where a linear search stays far from the outlines: causes tried for real, each with the offsets
 /// fitted anew, the one that brings the outlines nearest kept, and so on while it is worth it. What is
 /// linear misleads about errors this large. Besides single causes all lengths together are tried (a

@@ -5,7 +5,8 @@ the page says is printed: every line of it must appear in the output, where `...
 
 usage: run_page.py PAGE BIN_DIR SOURCE_DIR SCRATCH_DIR
 /usr/share/bodyschema (configurations, robots) and /usr/share/doc/bodyschema stand for the source tree,
-/etc/bodyschema for the folder of the robot that the package's file there names. Exit 77 means skipped.
+/etc/bodyschema for the folder of the robot that the package's file there names. A page that uses
+BODYSCHEMA_DATA is skipped where that folder is absent. Exit 77 means skipped.
 """
 import os
 import pathlib
@@ -41,8 +42,13 @@ def main():
     environment = dict(os.environ, PATH=f"{programs}:{os.environ['PATH']}",
                        LCM_DEFAULT_URL=f"udpm://239.255.76.67:{20000 + os.getpid() % 20000}?ttl=0")
     environment.pop("BODYSCHEMA_SHARE", None)
+    environment.setdefault("BODYSCHEMA_DATA", str(source.parent / "shared/data"))
+    text = page.read_text(encoding="utf-8")
+    if "$BODYSCHEMA_DATA" in text and not pathlib.Path(environment["BODYSCHEMA_DATA"]).is_dir():
+        print(f"{page.name}: {environment['BODYSCHEMA_DATA']} is absent, skipped")
+        return SKIPPED
     output, runs = "", 0
-    for kind, content in BLOCK.findall(page.read_text(encoding="utf-8")):
+    for kind, content in BLOCK.findall(text):
         content = content.replace("/usr/share/doc/bodyschema", str(source / "docs"))
         content = content.replace("/usr/share/bodyschema", str(source))
         content = content.replace("/etc/bodyschema", str(source / "config/icub_right"))

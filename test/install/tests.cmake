@@ -72,7 +72,7 @@ if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
       COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/docs/run_page.py
         ${file} ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_SOURCE_DIR}
         ${PROJECT_BINARY_DIR}/test-docs/${page})
-    set_tests_properties(docs.${page} PROPERTIES LABELS docs TIMEOUT 300 SKIP_RETURN_CODE 77)
+    set_tests_properties(docs.${page} PROPERTIES LABELS docs TIMEOUT 900 SKIP_RETURN_CODE 77)
   endforeach()
 endif()
 
