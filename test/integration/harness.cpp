@@ -2,7 +2,9 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <signal.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -138,6 +140,19 @@ std::string private_lcm_url() {
   static int count = 0;
   const int port = 20'000 + (getpid() * 7 + ++count) % 12'000;
   return "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
+}
+
+int free_port() {
+  const int descriptor = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  const bool known = bind(descriptor, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
+                     getsockname(descriptor, reinterpret_cast<sockaddr*>(&address), &size) == 0;
+  close(descriptor);
+  if (!known) throw std::runtime_error("this machine has no free TCP port");
+  return ntohs(address.sin_port);
 }
 
 std::string why_no_lcm() {

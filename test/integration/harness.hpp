@@ -82,6 +82,8 @@ class Scratch {
 
 /// A network of this test's own: a port nobody else uses, packets that stay on this machine.
 std::string private_lcm_url();
+/// A TCP port of this machine that nobody has taken.
+int free_port();
 /// Why LCM cannot be used here; empty when it can.
 std::string why_no_lcm();
 

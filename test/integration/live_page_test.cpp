@@ -67,7 +67,7 @@ class LivePageInBrowser : public testing::Test {
   }
 
   const std::string url_ = private_lcm_url();
-  const int port_ = 33'000 + getpid() % 10'000;
+  const int port_ = free_port();
   Scratch scratch_;
 };
 
@@ -203,7 +203,7 @@ double quantile(std::vector<double> values, double share) {
 TEST(LivePageViewers, DoNotSlowTheEstimator) {
   if (const std::string reason = why_no_lcm(); !reason.empty()) GTEST_SKIP() << reason;
   const std::string url = private_lcm_url();
-  const int port = 33'000 + getpid() % 10'000;
+  const int port = free_port();
   Scratch scratch;
   Process service({"bodyschemad", "--config", reach_configuration(), "-l", url, "--page", std::to_string(port)},
                   scratch.folder());
