@@ -36,20 +36,6 @@ std::vector<double> normalised(std::vector<double> value) {
   return value;
 }
 
-/// Farthest that a joint of the head moved, rad.
-double head_range(const MeasurementSource& source) {
-  double range = 0.0;
-  for (const auto joint : source.roles().head) {
-    double low = 1e9, high = -1e9;
-    for (const auto& view : source.views()) {
-      low = std::min(low, view.joints.q[joint]);
-      high = std::max(high, view.joints.q[joint]);
-    }
-    range = std::max(range, high - low);
-  }
-  return range;
-}
-
 /// Generic features of one joint, added to the set as candidates named "unexplained".
 class GenericFeatures {
  public:
@@ -291,7 +277,7 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
       list.push_back({{"principal_point", "", source_name}, "the log has one camera"});
     }
   }
-  if (const double range = head_range(source); range < kHeadStill) {
+  if (const double range = largest_range(source.views(), source.roles().head); range < kHeadStill) {
     exclude_all("base_shift", "the head moved " + number(range / kDeg, 1) +
                                   " deg: a shifted base looks like errors of neck and eyes");
   }
@@ -371,7 +357,8 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
 std::vector<CauseName> lookalikes(const MeasurementSource& source, const CauseName& cause) {
   const auto& roles = source.roles();
   std::vector<CauseName> list;
-  if (cause.name != "base_shift" || head_range(source) >= kHeadStill) return list;
+  const bool head_moved = largest_range(source.views(), roles.head) >= kHeadStill;
+  if (cause.name != "base_shift" || head_moved) return list;
   for (const auto& target : effect_targets("head_offset", roles)) {
     list.push_back({"head_offset", target.joint, target.source});
   }

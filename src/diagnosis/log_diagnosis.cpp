@@ -88,12 +88,12 @@ class LogDiagnosis {
   /// What no regression says: which motion is missing altogether.
   void add_remarks(DiagnosisReport& report) const {
     const auto& roles = measurement_.roles();
-    if (!roles.head.empty() && range_of(roles.head) < kStill_rad) {
+    if (!roles.head.empty() && largest_range(measurement_.views(), roles.head) < kStill_rad) {
       report.warnings.push_back(
           "the head stood still: errors of neck and eye tilt, a shifted base (base_shift), lengths between base and "
           "eyes and a common shift of the pictures look nearly alike; move the head by 20 to 30 deg");
     }
-    if (!roles.fingers.empty() && range_of(roles.fingers) < kStill_rad) {
+    if (!roles.fingers.empty() && largest_range(measurement_.views(), roles.fingers) < kStill_rad) {
       report.warnings.push_back("the fingers stood still: of their encoders only a common error shows");
     }
     double speed = 0.0;
@@ -103,20 +103,6 @@ class LogDiagnosis {
     if (speed < kStill_rad) {
       report.warnings.push_back("the arm stands still in every picture: nothing that depends on speed can be tested");
     }
-  }
-
-  /// Largest range of any of these joints over the pictures.
-  [[nodiscard]] double range_of(const std::vector<Eigen::Index>& joints) const {
-    double range = 0.0;
-    for (const auto joint : joints) {
-      double low = 1e9, high = -1e9;
-      for (const auto& view : measurement_.views()) {
-        low = std::min(low, view.joints.q[joint]);
-        high = std::max(high, view.joints.q[joint]);
-      }
-      range = std::max(range, high - low);
-    }
-    return range;
   }
 
   /// The diagnosis; what it refuses is refused in the log's name.

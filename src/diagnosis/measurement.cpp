@@ -1,5 +1,6 @@
 #include "bodyschema/diagnosis/measurement.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "bodyschema/effects/catalogue.hpp"
@@ -166,6 +167,17 @@ Eigen::MatrixXd ViewCompressor::link_jacobian(std::size_t link) const {
     jacobian.col(column).tail<3>() << motion(2, 1), motion(0, 2), motion(1, 0);
   }
   return jacobian;
+}
+
+double largest_range(std::span<const ViewInput> views, const std::vector<Eigen::Index>& joints) {
+  double range = 0.0;
+  for (const auto joint : joints) {
+    const auto [low, high] = std::minmax_element(views.begin(), views.end(), [joint](const auto& a, const auto& b) {
+      return a.joints.q[joint] < b.joints.q[joint];
+    });
+    if (low != views.end()) range = std::max(range, high->joints.q[joint] - low->joints.q[joint]);
+  }
+  return range;
 }
 
 }  // namespace bodyschema

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include "diagnosis/trial_robot.hpp"
 
@@ -54,7 +56,11 @@ TEST(NoiseCorrelation, OfWhiteNoiseLengthensNoBlock) {
   // Of 60 seeds most gave 0.05 s, half a sample; a twentieth above 0.27 s, one 0.31 s: a hundredth of
   // slow noise cannot be told from none. Blocks of 2 s are lengthened from 0.4 s on.
   constexpr double kShortestBlock_s = 2.0;
-  EXPECT_LT(5.0 * noise_correlation_s(rests(test::seed(), 0.0, 1.0)), kShortestBlock_s);
+  std::vector<double> measured;
+  for (std::uint64_t i = 0; i < 15; ++i) measured.push_back(noise_correlation_s(rests(test::seed() + i, 0.0, 1.0)));
+  std::sort(measured.begin(), measured.end());
+  EXPECT_LT(measured[measured.size() / 2], 0.15);
+  EXPECT_LT(5.0 * measured[measured.size() - 2], kShortestBlock_s);
   EXPECT_EQ(noise_correlation_s({}), 0.0);
 }
 

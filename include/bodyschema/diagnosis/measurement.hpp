@@ -128,4 +128,7 @@ class MeasurementSource {
   virtual Eigen::MatrixXd hand_jacobian(std::size_t view, const Corrections& corrections) = 0;
 };
 
+/// The largest range of any of these joints over the views, radians.
+double largest_range(std::span<const ViewInput> views, const std::vector<Eigen::Index>& joints);
+
 }  // namespace bodyschema
