@@ -43,6 +43,18 @@ double ms_between(std::int64_t from_us, std::int64_t to_us) {
   return 1e-3 * static_cast<double>(to_us - from_us);
 }
 
+/// Called before there are threads. glibc would give each of some ten threads an arena of its own (up to
+/// eight per core), hand it on to the threads after it, one for every frame's look ahead, and each would
+/// keep the room for the most that was ever waiting in it; and it would take pictures from the arenas once
+/// the first had been freed. Resident memory rose in steps by that: 156 MiB after two minutes of faults
+/// instead of 136, for no less processor time. Two arenas, and pictures from the system, keep it flat.
+void keep_memory_flat() {
+#ifdef __GLIBC__
+  mallopt(M_ARENA_MAX, 2);
+  mallopt(M_MMAP_THRESHOLD, 128 * 1024);  // where glibc starts, but it stays there
+#endif
+}
+
 /// What the replaced session has freed lies scattered over the arenas of many threads; without this,
 /// memory would grow by some 17 MB with each of the first reloads.
 void give_back_memory() {
@@ -93,6 +105,7 @@ class Daemon {
         all_stages_(options.timings ? kTimingsWindow : 1) {}
 
   void run() {
+    keep_memory_flat();
     const Signals signals;
     auto pipeline = load(load_configuration_);
     open_files();

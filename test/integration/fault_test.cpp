@@ -160,7 +160,7 @@ class World : public testing::Test {
       for (std::size_t k = 0; k < message.mean_rad.size(); ++k) {
         const auto it = truth.find(message.joint_name[k]);
         double offset = it == truth.end() ? 0.0 : it->second;
-        if (message.joint_name[k] == stalled_joint_) offset += stalled_by(message.utime);
+        if (message.joint_name[k] == stalled_joint_) offset += stall_->at(message.utime);
         const double error = std::abs(message.mean_rad[k] - offset);
         const double sd = std::sqrt(message.covariance_rad2[k][k]);
         worst_sd_ = std::max(worst_sd_, error / sd);
@@ -169,15 +169,6 @@ class World : public testing::Test {
             << degrees(sd);
       }
     }
-  }
-
-  /// What the stalled joint's encoder reads beyond what it would read, at a stamp; zero before and after.
-  [[nodiscard]] double stalled_by(Microseconds utime) const {
-    const auto next = stall_->lower_bound(utime);
-    if (next == stall_->end() || next == stall_->begin()) return 0.0;
-    const auto before = std::prev(next);
-    const double along = static_cast<double>(utime - before->first) / static_cast<double>(next->first - before->first);
-    return before->second + along * (next->second - before->second);
   }
 
   /// Of the last status of a finished test.
@@ -302,8 +293,8 @@ TEST_F(World, EncoderWraps) {
 TEST_F(World, EncoderStalls) {
   // Messages go on with stamps that advance; one joint's reading stays as it was. What an offset is then
   // changes with the arm, and estimates are measured by that.
-  stalled_joint_ = "r_elbow";
-  suffer({.name = "encoder of r_elbow stalls", .faults = faults::encoder_stalls("r_elbow", stall_),
+  stalled_joint_ = faults::kStalls;
+  suffer({.name = "encoder of r_elbow stalls", .faults = faults::encoder_stalls(faults::kStalls, stall_),
           .words = "the encoder of r_elbow stands still", .level = HealthLevel::kError, .notice_s = 15.0,
           .lasts_s = 20.0});
 }

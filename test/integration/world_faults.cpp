@@ -172,12 +172,29 @@ Fault encoder_not_a_number() {
   });
 }
 
+void Stall::add(Microseconds stamp, double rad) {
+  const std::lock_guard lock(mutex_);
+  readings_[stamp] = rad;
+}
+
+double Stall::at(Microseconds stamp) const {
+  constexpr Microseconds kNear = 100'000;  // further apart are two stalls
+  const std::lock_guard lock(mutex_);
+  const auto next = readings_.lower_bound(stamp);
+  if (next == readings_.end() || next == readings_.begin()) return 0.0;
+  const auto before = std::prev(next);
+  const Microseconds apart = next->first - before->first;
+  if (apart > kNear) return 0.0;
+  const double along = static_cast<double>(stamp - before->first) / static_cast<double>(apart);
+  return before->second + along * (next->second - before->second);
+}
+
 Fault encoder_stalls(const std::string& joint, std::shared_ptr<Stall> stall) {
   return on_joints([joint, stall, stalled = std::optional<float>()](joint_state_t& j, MessageSink&) mutable {
     for (std::size_t k = 0; k < j.joint_name.size(); ++k) {
       if (j.joint_name[k] != joint) continue;
       if (!stalled) stalled = j.joint_position[k];
-      if (stall) (*stall)[j.utime] = *stalled - j.joint_position[k];
+      stall->add(j.utime, *stalled - j.joint_position[k]);
       j.joint_position[k] = *stalled;
       j.joint_velocity[k] = 0.0f;
     }
@@ -243,7 +260,7 @@ Fault rubbish_between() {
   return {.pictures = spoil(kCameras), .joints = spoil(kJoints)};
 }
 
-std::vector<Named> all(unsigned seed) {
+std::vector<Named> all(unsigned seed, const std::shared_ptr<Stall>& stall) {
   return {{"left camera dies", [] { return camera_dies(0); }},
           {"right camera dies", [] { return camera_dies(1); }},
           {"both cameras die", both_cameras_die},
@@ -260,6 +277,7 @@ std::vector<Named> all(unsigned seed) {
           {"encoders stop", encoders_stop},
           {"encoders 140 ms late", [] { return encoders_late(140'000); }},
           {"encoder reports NaN", encoder_not_a_number},
+          {"encoder of r_elbow stalls", [stall] { return encoder_stalls(kStalls, stall); }},
           {"encoder of r_elbow wraps", [] { return encoder_wraps("r_elbow"); }},
           {"encoder of r_elbow jumps", [] { return encoder_jumps("r_elbow"); }},
           {"r_elbow missing", [] { return joint_missing("r_elbow"); }},

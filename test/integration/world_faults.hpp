@@ -2,6 +2,8 @@
 
 #include <map>
 #include <memory>
+#include <mutex>
+#include <string>
 #include <vector>
 
 #include "harness.hpp"
@@ -37,11 +39,19 @@ Fault second_publisher(LcmLink& link);
 Fault encoders_stop();
 Fault encoders_late(Microseconds delay);
 Fault encoder_not_a_number();
-/// What a stalled encoder reads beyond what it would read, radians, by stamp.
-using Stall = std::map<Microseconds, double>;
-/// The joint keeps the value it has, whatever the arm does. Written to `stall`, if any, which may be
-/// read once the robot has stopped.
-Fault encoder_stalls(const std::string& joint, std::shared_ptr<Stall> stall = {});
+/// What a stalled encoder reads beyond what it would read. Any thread.
+class Stall {
+ public:
+  void add(Microseconds stamp, double rad);
+  /// Between two readings on a straight line, as the service does it; zero where none are near. Radians.
+  [[nodiscard]] double at(Microseconds stamp) const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<Microseconds, double> readings_;
+};
+/// The joint keeps the value it has, whatever the arm does, which is written to `stall`.
+Fault encoder_stalls(const std::string& joint, std::shared_ptr<Stall> stall);
 Fault encoder_wraps(const std::string& joint);
 /// By 60 deg, to and fro.
 Fault encoder_jumps(const std::string& joint);
@@ -59,7 +69,8 @@ struct Named {
   std::string name;
   std::function<Fault()> make;
 };
-/// All of them.
-std::vector<Named> all(unsigned seed);
+/// All of them. What the encoder of kStalls reads while it stalls is written to `stall`.
+inline constexpr const char* kStalls = "r_elbow";
+std::vector<Named> all(unsigned seed, const std::shared_ptr<Stall>& stall);
 
 }  // namespace bodyschema::integration::faults
