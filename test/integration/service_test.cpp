@@ -249,6 +249,30 @@ TEST_F(Service, ReloadsOnSighupAndRefusesABrokenConfiguration) {
   EXPECT_EQ(service.wait(Seconds(10)), 0);
 }
 
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+/// Arenas of glibc's allocator beside the main one: each begins on a multiple of 64 MiB.
+int arenas_of(pid_t pid) {
+  int arenas = 0;
+  std::ifstream maps("/proc/" + std::to_string(pid) + "/maps");
+  for (std::string line; std::getline(maps, line);) {
+    const std::uint64_t begin = std::stoull(line, nullptr, 16);
+    const bool nameless = line.find_first_of("/[") == std::string::npos;
+    if (nameless && begin % (64u << 20) == 0 && line.find(" rw-p ") != std::string::npos) ++arenas;
+  }
+  return arenas;
+}
+
+TEST_F(Service, ItsThreadsShareTwoArenas) {
+  // One for each thread, kept and handed on, let memory rise in steps for hours.
+  Listener listener(url_);
+  Process service(daemon(), scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  Player player(url_, reach_log());
+  ASSERT_TRUE(listener.wait_offsets(20, Seconds(30)));
+  EXPECT_LE(arenas_of(service.pid()), 1);
+}
+#endif
+
 TEST_F(Service, RecordingIsReadableUpToTheLastMessageWhenKilled) {
   const auto record = scratch_ / "killed.lcmlog";
   Listener listener(url_);
