@@ -485,6 +485,7 @@ struct Estimator::Impl {
     estimate.weakest = weakest_direction(estimate.covariance_rad2, setup.estimated_joints);
     if (!particles_only() && !contradicted && current == EstimatorState::kConverging &&
         fusion.frames() > kSettled_frames && estimate.stalled_joint.empty() && !stalled.doubtful() &&
+        !stalled.dropped_while_standing() &&
         estimate.hand_sd_m < options.converged_hand_sd_m) {
       current = EstimatorState::kConverged;
     }
@@ -498,9 +499,10 @@ struct Estimator::Impl {
                                    [](const auto& camera) { return camera.has_value(); });
     if (particles_only() || seen == observation.cameras.end()) return;
     for (Eigen::Index k = 0; k < joints; ++k) reading(k) = (*seen)->joints.q(joint_index[static_cast<std::size_t>(k)]);
-    const bool settled = !contradicted && fusion.frames() > kSettled_frames;
+    const bool remembers = fusion.frames() > kSettled_frames;
+    const bool settled = remembers && !contradicted;
     stalled.look(reading, estimate.offset_rad, estimate.covariance_rad2.diagonal().cwiseMax(0.0).cwiseSqrt(), explained,
-                 settled);
+                 settled, remembers);
     const auto drift = stalled.drift_rad().array().square();
     estimate.covariance_rad2.diagonal().array() += drift;
     frame_state.covariance.diagonal().head(joints).array() += drift;

@@ -22,9 +22,12 @@ double StalledEncoders::Track::drift_rad() const {
 }
 
 void StalledEncoders::look(const Eigen::VectorXd& reading_rad, const Eigen::VectorXd& offset_rad,
-                           const Eigen::VectorXd& sd_rad, bool fits, bool settled) {
+                           const Eigen::VectorXd& sd_rad, bool fits, bool settled, bool remembers) {
   joint_ = -1;
   doubtful_ = false;
+  dropped_while_standing_ = false;
+  remembered_ = remembered_ || remembers;
+  frames_since_drop_ = remembered_ && !remembers ? 0 : frames_since_drop_ + 1;
   for (Eigen::Index k = 0; k < reading_rad.size(); ++k) {
     Track& track = tracks_[static_cast<std::size_t>(k)];
     if (std::abs(track.reading_rad - reading_rad(k)) > kStands_rad) {
@@ -38,6 +41,8 @@ void StalledEncoders::look(const Eigen::VectorXd& reading_rad, const Eigen::Vect
     }
     drift_rad_(k) = track.drift_rad();
     ++track.frames_since;
+    ++track.stood;
+    if (track.stood >= kStanding && frames_since_drop_ < kRecent) dropped_while_standing_ = true;
     if (fits) {
       const double away_rad = std::abs(offset_rad(k) - track.offset_rad);
       track.away = track.known && away_rad > std::max(kMove_rad, kMove_sd * std::hypot(sd_rad(k), track.sd_rad))

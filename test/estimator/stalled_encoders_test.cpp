@@ -13,10 +13,10 @@ namespace {
 class TwoJoints : public ::testing::Test {
  protected:
   void look(double reading_0_deg, double offset_0_deg, double reading_1_deg = 10.0, double offset_1_deg = 2.0,
-            bool fits = true, bool settled = true) {
+            bool fits = true, bool settled = true, bool remembers = true) {
     const Eigen::Vector2d reading(radians(reading_0_deg), radians(reading_1_deg));
     const Eigen::Vector2d offset(radians(offset_0_deg), radians(offset_1_deg));
-    encoders_.look(reading, offset, Eigen::Vector2d::Constant(radians(0.1)), fits, settled);
+    encoders_.look(reading, offset, Eigen::Vector2d::Constant(radians(0.1)), fits, settled, remembers);
   }
   StalledEncoders encoders_{2};
 };
@@ -70,6 +70,28 @@ TEST_F(TwoJoints, TheDriftOfTheLastSecondIsTold) {
   EXPECT_EQ(encoders_.drift_rad()(1), 0.0) << "its encoder lives";
   look(30.0, 0.0, 10.0, 0.0, true, false);
   EXPECT_EQ(encoders_.drift_rad()(0), 0.0) << "a new search begins anew";
+}
+
+TEST_F(TwoJoints, AMemoryDroppedWhileAReadingStandsIsToldForASecond) {
+  const auto frames = [&](int n, bool remembers, bool stands) {
+    for (int i = 0; i < n; ++i) {
+      look(stands ? 30.0 : 30.0 + i % 2, 3.0, 10.0 + i % 2, 2.0, true, remembers, remembers);
+    }
+  };
+  frames(20, false, true);
+  EXPECT_FALSE(encoders_.dropped_while_standing()) << "there was none yet";
+  frames(20, true, true);
+  EXPECT_FALSE(encoders_.dropped_while_standing());
+  frames(3, false, true);
+  EXPECT_TRUE(encoders_.dropped_while_standing());
+  frames(29, true, true);
+  EXPECT_TRUE(encoders_.dropped_while_standing());
+  frames(2, true, true);
+  EXPECT_FALSE(encoders_.dropped_while_standing());
+  frames(20, true, false);
+  frames(3, false, false);
+  frames(10, true, false);
+  EXPECT_FALSE(encoders_.dropped_while_standing()) << "all encoders live";
 }
 
 TEST_F(TwoJoints, TheJointSeenToMoveMostIsNamed) {

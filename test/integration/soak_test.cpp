@@ -96,7 +96,10 @@ class Honesty {
       double offset = it == truth_.end() ? 0.0 : it->second;
       if (message.joint_name[k] == faults::kStalls) offset += stall_->at(message.utime);
       const double error = std::abs(message.mean_rad[k] - offset);
-      if (error <= std::max(5.0 * std::sqrt(message.covariance_rad2[k][k]), radians(1.0))) continue;
+      const double sd = std::sqrt(message.covariance_rad2[k][k]);
+      if (error <= std::max(5.0 * sd, radians(1.0))) continue;
+      std::printf("not honest at %lld, %s: %s off by %.2f deg, says %.2f\n", static_cast<long long>(message.utime),
+                  during.c_str(), message.joint_name[k].c_str(), degrees(error), degrees(sd));
       ++dishonest_[during];
       worst_deg_ = std::max(worst_deg_, degrees(error));
       break;

@@ -19,8 +19,9 @@ class StalledEncoders {
   /// @param offset_rad  their offsets as known with this frame, and one sigma
   /// @param fits  whether those offsets explain the frame's pictures; otherwise it says nothing
   /// @param settled  whether the offsets are a memory of several frames, not that of a new search
+  /// @param remembers  whether there is such a memory, be it doubted at the moment
   void look(const Eigen::VectorXd& reading_rad, const Eigen::VectorXd& offset_rad, const Eigen::VectorXd& sd_rad,
-            bool fits, bool settled);
+            bool fits, bool settled, bool remembers);
   /// How far each offset has run in the last second (at 30 Hz) under a reading that stands, radians; zero
   /// for joints whose reading moves. A memory of frames lags behind a moving arm by about as much, which
   /// its own covariance does not tell.
@@ -28,13 +29,17 @@ class StalledEncoders {
   /// Whether a joint has been seen to move under a reading that stands, in the last second: a slip of an
   /// arm at rest, or the beginning of a stall.
   [[nodiscard]] bool doubtful() const { return doubtful_; }
+  /// Whether a memory had to be dropped in the last second while a reading stood. If its encoder stalls, a
+  /// young memory holds frames that no one set of offsets explains, and the other joints make up for it.
+  [[nodiscard]] bool dropped_while_standing() const { return dropped_while_standing_; }
   /// The joint that stalls, -1 if none; of several, the one seen to move most.
   [[nodiscard]] Eigen::Index joint() const { return joint_; }
   /// How far it has been seen to move under its reading, to and fro added up, radians.
   [[nodiscard]] double moved_rad() const { return joint_ < 0 ? 0.0 : tracks_[static_cast<std::size_t>(joint_)].moved_rad; }
 
  private:
-  static constexpr std::size_t kRecent = 30;  ///< frames
+  static constexpr std::size_t kRecent = 30;    ///< frames
+  static constexpr std::size_t kStanding = 15;  ///< frames; readings of a slow joint stand for some
   /// Since the reading last changed.
   struct Track {
     double reading_rad = 0.0;
@@ -43,6 +48,7 @@ class StalledEncoders {
     double sd_rad = 0.0;      ///< of that
     int away = 0;             ///< frames in a row that saw it elsewhere
     int moves = 0;
+    std::size_t stood = 0;         ///< frames
     std::size_t frames_since = 0;  ///< the last move
     double moved_rad = 0.0;
     std::array<double, kRecent> recent_rad{};  ///< settled offsets, round and round
@@ -52,6 +58,9 @@ class StalledEncoders {
   std::vector<Track> tracks_;
   Eigen::VectorXd drift_rad_;
   bool doubtful_ = false;
+  bool dropped_while_standing_ = false;
+  bool remembered_ = false;                   ///< there has been a memory
+  std::size_t frames_since_drop_ = kRecent;
   Eigen::Index joint_ = -1;
 };
 
