@@ -383,7 +383,7 @@ std::string splitting_motion(const std::vector<CauseName>& same) {
   if ((has("slip") || has("drift")) && (has("slip") + has("drift") + has("unexplained") > 1)) {
     say("Revisit the first postures in the middle and at the end of the log.");
   }
-  if (has("axis_tilt") || has("joint_coupling")) {
+  if (has("axis_tilt") || has("axis_shift") || has("joint_coupling")) {
     say("Move " + joint + " and its neighbours one at a time through their full ranges.");
   }
   if (has("head_offset") || has("base_shift") || (has("principal_point") && !has("vergence"))) {

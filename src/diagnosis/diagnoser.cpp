@@ -44,7 +44,7 @@ class Diagnoser {
       fitter_.accumulate_on({}, before_);
       found = nearer ? search(nearer->first, nearer->second) : search(before_.at, baseline_);
     }
-    if (searches() && found.after.at.rms_px() > options_.trusted_rms_px) look_nearer(found);
+    if (searches() && found.after.at.rms_px() > options_.noise_rms_px) look_nearer(found);
     auto report = findings(source_, options_.selection, layout_, fitter_.plan(), found, baseline_, before_, excluded_);
     word_verdict(report, options_, found.selection.crowded);
     progress(1.0);
@@ -79,7 +79,8 @@ class Diagnoser {
 
   /// Much is wrong at once: causes that were tried for real, if they leave less.
   void look_nearer(Found& found) {
-    if (other_shape_ || !fitter_.look_closely()) return;
+    if (other_shape_) return;
+    fitter_.look_closely();
     // While the head stands still a shifted base stands for whatever lies between base and eyes.
     const auto excluded = excluded_;
     std::erase_if(excluded_, [](const auto& item) { return item.cause.name == "base_shift"; });
@@ -98,7 +99,8 @@ class Diagnoser {
       if (name == "joint_offset" || name == "slip" || name == "drift") continue;  // need a time
       for (const auto& target : effect_targets(name, source_.roles())) {
         const CauseName cause{name, target.joint, target.source};
-        if (!is_excluded(excluded_, cause)) causes.push_back(cause);
+        // Nuisances are fitted in any case, once the outlines are near.
+        if (!is_excluded(excluded_, cause) && !contains(options_.nuisances, cause)) causes.push_back(cause);
       }
     }
     const auto model = nearer_model(source_, layout_, fitter_, offsets_, causes);
@@ -162,11 +164,11 @@ class Diagnoser {
 
   /// One pass over the catalogue, linear about `at`, the linearisation of `model`.
   Found search(const Linearisation& at, const ErrorModel& model) {
-    return search(at, model, options_.nuisances, options_.fixed_causes);
+    return search(at, model, options_.nuisances, options_.fixed_causes.value_or(std::vector<CauseName>{}));
   }
-  /// @param causes  exactly these instead of a search
+  /// @param given  causes to begin with
   Found search(const Linearisation& at, const ErrorModel& model, const std::vector<CauseName>& nuisances,
-               const std::optional<std::vector<CauseName>>& causes) {
+               const std::vector<CauseName>& given) {
     const auto& plan = fitter_.plan();
     Found found{make_candidates(source_, at, plan, layout_, nuisances, excluded_), {}, baseline_, {}};
     auto& set = found.set;
@@ -176,10 +178,8 @@ class Diagnoser {
     progress(0.6);
     drop_aliased_columns(statistics, set);
     auto rules = options_.selection;
-    if (causes) {
-      rules.search = false;
-      rules.fixed = candidates_of(set, *causes);
-    }
+    rules.search = searches();
+    rules.given = candidates_of(set, given);
     found.selection = select_causes(statistics, set.offsets, set.candidates, rules);
     progress(0.65);
 

@@ -15,8 +15,8 @@ constexpr double kStep = 1e-5;
 
 bool moves_links(Kind kind) {
   return kind == Kind::kJoint || kind == Kind::kAlong || kind == Kind::kTilt1 ||
-         kind == Kind::kTilt2 || kind == Kind::kBaseX || kind == Kind::kBaseY ||
-         kind == Kind::kBaseZ || kind == Kind::kShiftX;
+         kind == Kind::kTilt2 || kind == Kind::kShift1 || kind == Kind::kShift2 || kind == Kind::kBaseX || kind == Kind::kBaseY ||
+         kind == Kind::kBaseZ || kind == Kind::kCameraX;
 }
 
 template <class C>
@@ -27,10 +27,12 @@ auto& slot_of(const CoordinateLayout::Entry& entry, C& c) {
     case Kind::kAlong: return c.adjustments[joint].along_m;
     case Kind::kTilt1: return c.adjustments[joint].tilt_1_rad;
     case Kind::kTilt2: return c.adjustments[joint].tilt_2_rad;
+    case Kind::kShift1: return c.adjustments[joint].shift_1_m;
+    case Kind::kShift2: return c.adjustments[joint].shift_2_m;
     case Kind::kBaseX: return c.base_shift_m.x();
     case Kind::kBaseY: return c.base_shift_m.y();
     case Kind::kBaseZ: return c.base_shift_m.z();
-    case Kind::kShiftX: return c.camera.shift_x_m;
+    case Kind::kCameraX: return c.camera.shift_x_m;
     case Kind::kFocal: return c.camera.focal_scale;
     case Kind::kCx: return c.camera.cx_px;
     case Kind::kCy: return c.camera.cy_px;
@@ -54,8 +56,12 @@ CoordinateLayout::CoordinateLayout(const JointRoles& roles) {
     entries_.push_back({Kind::kTilt1, joint});
     entries_.push_back({Kind::kTilt2, joint});
   }
-  for (const auto kind : {Kind::kBaseX, Kind::kBaseY, Kind::kBaseZ, Kind::kShiftX, Kind::kFocal, Kind::kCx, Kind::kCy, Kind::kK1,
-                          Kind::kScale, Kind::kDilation}) {
+  for (const auto& target : effect_targets("axis_shift", roles)) {
+    entries_.push_back({Kind::kShift1, roles.index(target.joint)});
+    entries_.push_back({Kind::kShift2, roles.index(target.joint)});
+  }
+  for (const auto kind : {Kind::kBaseX, Kind::kBaseY, Kind::kBaseZ, Kind::kCameraX, Kind::kFocal, Kind::kCx, Kind::kCy,
+                          Kind::kK1, Kind::kScale, Kind::kDilation}) {
     entries_.push_back({kind, -1});
   }
 }

@@ -63,8 +63,8 @@ class ModelFitter {
 
   /// The narrowest search, px.
   void set_finest(double search_px) { finest_px_ = search_px; }
-  /// All pictures with the search at its narrowest. False where the source needs no search.
-  bool look_closely() { return source_.set_search(finest_px_); }
+  /// All pictures with the search at its narrowest.
+  void look_closely() { source_.set_search(finest_px_); }
   /// Blocks by the noise that a fit leaves.
   void set_plan(BlockPlan plan) { plan_ = std::move(plan); }
   [[nodiscard]] const BlockPlan& plan() const { return *plan_; }

@@ -39,7 +39,7 @@ class NearerModel {
       if (round == 0) ideas.push_back(lengths());
       auto guess = best_of(ideas, best.model);
       if (!guess || guess->misfit > kBetter * best.misfit) break;
-      best = without_idle(std::move(*guess), best.model);
+      best = std::move(*guess);
       fit = fitter_.fit(best.model, {}, kRough);
       nearer = true;
     }
@@ -80,10 +80,13 @@ class NearerModel {
     return best;
   }
 
+  /// Lengths between base and hand. Which of them the log asks for is decided where all of it is
+  /// looked at.
   [[nodiscard]] Idea lengths() const {
     Idea idea;
     for (const auto& cause : causes_) {
-      if (cause.name == "base_shift" || cause.name == "link_length") idea.push_back(cause);
+      const auto& name = cause.name;
+      if (name == "base_shift" || name == "link_length" || name == "axis_shift") idea.push_back(cause);
     }
     return idea;
   }
@@ -97,18 +100,6 @@ class NearerModel {
       if (!best || guess.misfit < best->misfit) best = std::move(guess);
     }
     return best;
-  }
-
-  /// Of causes tried together, those that are missed when left out.
-  [[nodiscard]] Guess without_idle(Guess guess, const ErrorModel& before) {
-    constexpr double kMissed = 1.02;
-    for (auto e = guess.model.size(); e-- > before.size() && guess.model.size() > before.size() + 1;) {
-      auto less = guess.model;
-      less.remove(guess.model[e].name(), guess.model[e].target());
-      const double cost = misfit(fitter_.fit(less, {}, kRough).at, outline_);
-      if (cost < kMissed * guess.misfit) guess = {std::move(less), cost};
-    }
-    return guess;
   }
 
   MeasurementSource& source_;

@@ -33,7 +33,7 @@ class Selector {
   Selector(const BlockStatistics& statistics, const Columns& always,
            const std::vector<Candidate>& candidates, const SelectionOptions& options)
       : statistics_(statistics), always_(always), candidates_(candidates), options_(options),
-        gain_floor_(options.gain_floor) {
+        gain_floor_(options.gain_floor), generic_gain_floor_(options.generic_gain_floor) {
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       if (candidates[c].nuisance) model_.push_back(c);
     }
@@ -51,19 +51,13 @@ class Selector {
         result.not_testable.push_back(c);
       }
     }
+    begin_with_given();
     if (options_.search) {
+      drop_causes();
       add_causes();
       simplify();
       drop_causes();
-      stand_out(result);
-    } else {
-      for (const auto c : options_.fixed) {
-        if (!contains(model_, c) && fit(with(model_, c)).usable) {
-          causes_.push_back(c);
-          model_.push_back(c);
-        }
-      }
-      refit();
+      if (options_.given.empty()) stand_out(result);
     }
     for (const auto c : reported()) result.causes.push_back(describe(c));
     std::stable_sort(result.causes.begin(), result.causes.end(),
@@ -170,7 +164,7 @@ class Selector {
 
   [[nodiscard]] bool enters(std::size_t candidate, const CandidateScore& s) const {
     const auto& c = candidates_[candidate];
-    const double least = c.generic() ? std::max(gain_floor_, options_.generic_gain_floor) : gain_floor_;
+    const double least = c.generic() ? std::max(gain_floor_, generic_gain_floor_) : gain_floor_;
     const bool large = c.temporal() && s.gain > options_.gain_large;
     const double z = large ? options_.z_large : options_.z_enter;
     return s.testable && s.z > z && s.gain > least && s.t > options_.t_enter &&
@@ -260,6 +254,20 @@ class Selector {
            });
   }
 
+  void begin_with_given() {
+    for (const auto c : options_.given) {
+      if (contains(model_, c) || !fit(with(model_, c)).usable) continue;
+      causes_.push_back(c);
+      model_.push_back(c);
+    }
+    if (options_.given.empty()) return;
+    refit();
+    if (!options_.search) return;
+    // What they leave is little of what there was; the next cause is measured by it.
+    gain_floor_ *= current_.heldout() / baseline_;
+    generic_gain_floor_ *= current_.heldout() / baseline_;
+  }
+
   void add_causes() {
     while (static_cast<int>(causes_.size()) < options_.max_causes) {
       const auto best = best_addition();
@@ -271,17 +279,20 @@ class Selector {
     }
   }
 
-  /// Causes that later ones have made superfluous.
+  /// Causes that others have made superfluous, the one that is missed least first.
   void drop_causes() {
-    for (bool again = true; again;) {
-      again = false;
+    while (true) {
+      std::optional<std::size_t> least;
+      double least_gain = 0.0;
       for (const auto c : causes_) {
-        if (enters(c, test(c).score)) continue;
-        remove(c);
-        dropped_.push_back(c);
-        again = true;
-        break;
+        const auto score = test(c).score;
+        if (enters(c, score) || (least && score.gain >= least_gain)) continue;
+        least = c;
+        least_gain = score.gain;
       }
+      if (!least) return;
+      remove(*least);
+      dropped_.push_back(*least);
     }
   }
 
@@ -317,9 +328,7 @@ class Selector {
   void stand_out(Selection& result) {
     find_rest(result);
     const auto list = reported();
-    result.crowded = list.size() >= options_.crowd ||
-                     (result.rest_gain > options_.crowd_rest_gain &&
-                      result.rest_t > options_.crowd_rest_t);
+    result.crowded = list.size() >= options_.crowd || result.rest_t > options_.crowd_rest_t;
     if (!result.crowded) return;
     gain_floor_ = options_.crowd_floor;
     for (const auto c : list) {
@@ -460,6 +469,7 @@ class Selector {
   const std::vector<Candidate>& candidates_;
   const SelectionOptions& options_;
   double gain_floor_;  ///< least gain of a cause
+  double generic_gain_floor_;
   Ids model_;    ///< candidates in the fit: nuisances, then causes
   Ids causes_;   ///< those that were added
   Ids dropped_;  ///< and those that were dropped again: not tried twice

@@ -144,10 +144,13 @@ Corrections FaultyRobot::body(std::size_t camera) const {
 void FaultyRobot::build(const TrialFault& fault, std::size_t camera, Corrections& body) const {
   const auto& name = fault.cause.name;
   const double v = fault.value;
-  if (name == "link_length" || name == "axis_tilt") {
+  if (name == "link_length" || name == "axis_tilt" || name == "axis_shift") {
     auto& a = body.adjustments[static_cast<std::size_t>(roles_.index(fault.cause.joint))];
     if (name == "link_length") {
       a.along_m += 1e-3 * v;
+    } else if (name == "axis_shift") {
+      a.shift_1_m += 1e-3 * v;
+      a.shift_2_m += 1e-3 * fault.second;
     } else {
       a.tilt_1_rad += v * kDeg;
       a.tilt_2_rad += fault.second * kDeg;

@@ -27,7 +27,7 @@ constexpr Entry kCatalogue[] = {
     BODYSCHEMA_EFFECT(distortion),     BODYSCHEMA_EFFECT(silhouette_bias),
     BODYSCHEMA_EFFECT(mesh_scale),     BODYSCHEMA_EFFECT(finger_posture),
     BODYSCHEMA_EFFECT(drift),          BODYSCHEMA_EFFECT(slip),
-    BODYSCHEMA_EFFECT(base_shift),
+    BODYSCHEMA_EFFECT(base_shift),     BODYSCHEMA_EFFECT(axis_shift),
 };
 #undef BODYSCHEMA_EFFECT
 

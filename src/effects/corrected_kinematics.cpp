@@ -86,7 +86,8 @@ void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q,
     Pose C = Pose::Identity();
     C.linear() = R;
     C.translation() = axis.point_W - R * axis.point_W +
-                      joints_[j].outwards * adjustment.along_m * axis.direction_W;
+                      joints_[j].outwards * adjustment.along_m * axis.direction_W +
+                      adjustment.shift_1_m * tilt_axis(joint, 0) + adjustment.shift_2_m * tilt_axis(joint, 1);
     for (std::size_t l = 0; l < link_count_; ++l) {
       if (moves(joint, l)) X_CB[l] = C * X_CB[l];
     }

@@ -274,13 +274,13 @@ struct Estimator::Impl {
   /// The memory is about to be dropped for a frame that contradicts it. If it is the frame that is
   /// wrong, the next ones will agree with the memory again.
   void shelve(const PullJudge& usual) {
-    if (stalled.doubtful() || stalled.joint() >= 0) return;  // what was learned then may be wrong itself
+    if (stalled.suspected()) return;  // what was learned then may be wrong itself
     if (fusion.frames() >= kYoungMemory_frames) shelf = {fusion, usual, kShelf_frames};
   }
 
   /// Takes the memory back from the shelf once a frame agrees with it.
   void reconsider(const Observation& observation) {
-    if (stalled.doubtful() || stalled.joint() >= 0) shelf.reset();
+    if (stalled.suspected()) shelf.reset();
     if (!shelf) return;
     const Candidate candidate = follow(observation, shelf->fusion);
     if (shelf->pulls.judge(pull_of(candidate)) == PullJudge::Verdict::kAgrees && fits(candidate.evidence)) {
@@ -484,8 +484,7 @@ struct Estimator::Impl {
     }
     estimate.weakest = weakest_direction(estimate.covariance_rad2, setup.estimated_joints);
     if (!particles_only() && !contradicted && current == EstimatorState::kConverging &&
-        fusion.frames() > kSettled_frames && estimate.stalled_joint.empty() && !stalled.doubtful() &&
-        !stalled.dropped_while_standing() &&
+        fusion.frames() > kSettled_frames && !stalled.suspected() && !stalled.dropped_while_standing() &&
         estimate.hand_sd_m < options.converged_hand_sd_m) {
       current = EstimatorState::kConverged;
     }

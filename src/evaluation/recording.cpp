@@ -5,6 +5,7 @@
 #include "bodyschema/bus/yarp_import.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
+#include "bodyschema/diagnosis/log_diagnosis.hpp"
 #include "bodyschema/evaluation/statistics.hpp"
 #include "bodyschema/pipeline/hand_errors.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
@@ -57,6 +58,15 @@ class ScratchFile {
  private:
   fs::path path_;
 };
+
+/// What the diagnosis of the log makes of a configuration: its extended model, in `out`.
+fs::path diagnose_into(const Configuration& configuration, const fs::path& log, const fs::path& out) {
+  LogDiagnosisOptions options;
+  options.log = log;
+  options.out = out;
+  diagnose_log(configuration, options);
+  return out / "extended_model.yaml";
+}
 
 void show(ExperimentContext& context, const std::string& title, const RecordingResult& result) {
   context.report.heading("recording: " + title);
@@ -190,18 +200,29 @@ void run_recording(ExperimentContext& context) {
     const char* file;
     const char* title;
     std::vector<std::string> overrides{};
+    std::vector<std::string> modes = {"best", "paper"};
+    bool diagnosed = false;  ///< extended by what the diagnosis finds in the same log
   };
   for (const Case& robot : {Case{"exact", "icub_unity/estimator.yaml", "exact robot"},
                             Case{"icub_hand", "icub_unity/estimator_official_hand.yaml", "official hand",
                                  {"robot.urdf=" + official_hand.path().string()}},
-                            Case{"nominal", "icub_unity/estimator_v1.yaml", "nominal robot (icub_v1)"}}) {
-    for (const std::string mode : {"best", "paper"}) {
+                            Case{"nominal", "icub_unity/estimator_v1.yaml", "nominal robot (icub_v1)"},
+                            Case{"nominal_diagnosed", "icub_unity/estimator_v1.yaml", "nominal robot, diagnosed", {}, {"best"},
+                                 true}}) {
+    std::vector<std::string> extension;
+    if (robot.diagnosed) {
+      const auto model = diagnose_into(Configuration::load(context.recorded / robot.file), log.path(),
+                                       context.options.out / "recording_nominal_diagnosis");
+      extension.push_back("robot.extended_model=" + fs::absolute(model).string());
+    }
+    for (const auto& mode : robot.modes) {
       // The published filter is random: its figure is the median of ten seeds.
       const int seeds = mode == "paper" ? 10 : 1;
       std::vector<double> px, mm, deg, online;
       RecordingResult result;
       for (int seed = 1; seed <= seeds; ++seed) {
         std::vector<std::string> overrides = robot.overrides;
+        overrides.insert(overrides.end(), extension.begin(), extension.end());
         overrides.push_back("estimator.mode=" + mode);
         overrides.push_back("filter.seed=" + std::to_string(seed));
         if (mode == "paper") overrides.push_back("filter.initial_sd_deg=10");

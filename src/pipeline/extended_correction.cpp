@@ -29,7 +29,7 @@ bool in_cameras(const std::string& name) {
 
 bool in_urdf(const std::string& name) {
   return name == "head_offset" || name == "vergence" || name == "link_length" ||
-         name == "axis_tilt" || name == "baseline" || name == "base_shift";
+         name == "axis_tilt" || name == "axis_shift" || name == "baseline" || name == "base_shift";
 }
 
 Instant at_rest(Eigen::Index joints, std::size_t camera) {
@@ -39,8 +39,8 @@ Instant at_rest(Eigen::Index joints, std::size_t camera) {
   return at;
 }
 
-/// Where an adjustment puts the joint, in terms of the URDF: along its axis as written there, and a
-/// rotation vector in its parent's frame.
+/// Where an adjustment puts the joint, in terms of the URDF: along its axis as written there; a shift
+/// and a rotation vector in its parent's frame.
 JointPlacement placed(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
                       const StereoRig& rig, Eigen::Index joint, const JointAdjustment& adjustment) {
   const auto& info = robot->joints()[static_cast<std::size_t>(joint)];
@@ -58,8 +58,10 @@ JointPlacement placed(const std::shared_ptr<const RobotModel>& robot, const Robo
       kinematics.X_WC().linear() * (moved[1].translation() - X_CL[1].translation());
   const Eigen::Vector3d tilt_W = adjustment.tilt_1_rad * kinematics.tilt_axis(joint, 0) +
                                  adjustment.tilt_2_rad * kinematics.tilt_axis(joint, 1);
-  return {info.name, axis_W.dot(step_W), Eigen::Vector3d::Zero(),
-          (kinematics.X_WC() * X_CL.front()).linear().transpose() * tilt_W};
+  const Eigen::Vector3d shift_W = adjustment.shift_1_m * kinematics.tilt_axis(joint, 0) +
+                                  adjustment.shift_2_m * kinematics.tilt_axis(joint, 1);
+  const Eigen::Matrix3d R_PW = (kinematics.X_WC() * X_CL.front()).linear().transpose();
+  return {info.name, axis_W.dot(step_W), R_PW * shift_W, R_PW * tilt_W};
 }
 
 /// The whole arm moved along the root's axes: its first joint, in the frame of the link that carries it.

@@ -169,7 +169,7 @@ const std::vector<FaultKind>& fault_kinds() {
       faults::joint_offset(),    faults::compliance(),      faults::payload(),
       faults::backlash(),        faults::encoder_gain(),    faults::eccentricity(),
       faults::joint_coupling(),  faults::latency(),         faults::camera_skew(),
-      faults::link_length(),     faults::axis_tilt(),       faults::head_offset(),
+      faults::link_length(),     faults::axis_tilt(),       faults::axis_shift(),      faults::head_offset(),
       faults::vergence(),        faults::baseline(),        faults::focal_length(),
       faults::principal_point(), faults::distortion(),      faults::silhouette_bias(),
       faults::mesh_scale(),      faults::finger_posture(),  faults::drift(),

@@ -110,7 +110,8 @@ void TrueKinematics::compute(const Eigen::VectorXd& q, std::span<Pose> X_WB) {
       D.linear() = (Eigen::AngleAxisd(turn, tilted) * Eigen::AngleAxisd(-turn, axis.direction_W)).toRotationMatrix();
     }
     D.translation() = axis.point_W - D.linear() * axis.point_W +
-                      m->outwards * m->change.lengthening_m * axis.direction_W;
+                      m->outwards * m->change.lengthening_m * axis.direction_W +
+                      R_WP * (m->change.shift_1_m * m->tilt_1_P + m->change.shift_2_m * m->tilt_2_P);
     for (std::size_t l = 0; l < link_count_; ++l) {
       if (nominal_->moves(m->change.joint, l)) X_WB[l] = D * X_WB[l];
     }

@@ -46,6 +46,31 @@ TEST(LazyBreakers, NothingWrongIsNothing) {
   EXPECT_FALSE(report.exclusion_limits.empty());
 }
 
+TEST(LazyBreakers, AModelOfAnotherRobotIsWrongInSeveralLengthsAndInNothingElse) {
+  // The differences between the first iCub's nominal lengths and those of a robot built otherwise.
+  const auto log = make_synthetic_log(
+      robot(), log_with({fault("base_shift", "", -7.6, 2.0), fault("axis_shift", "r_shoulder_yaw", -15.4),
+                         fault("axis_shift", "r_elbow", 30.4, 5.0), fault("axis_shift", "r_wrist_prosup", 3.9, 15.0),
+                         fault("axis_shift", "r_wrist_pitch", 3.7)}),
+      test::log_seed());
+  auto options = usual_options(*log);
+  options.noise_rms_px = 0.8;  // with it offsets alone do not explain the log
+  const auto report = diagnose(*log, options);
+  ASSERT_EQ(report.causes.size(), 5u) << report.sentence;
+  const auto expect = [&](const CauseName& cause, double first, double second) {
+    const auto* found = find(report, cause);
+    ASSERT_NE(found, nullptr) << cause.text() << ": " << report.sentence;
+    EXPECT_NEAR(found->parameters.at(0).estimate, first, 0.5) << cause.text();
+    EXPECT_NEAR(found->parameters.at(1).estimate, second, 0.5) << cause.text();
+  };
+  expect({"base_shift", "", ""}, -7.6, 2.0);
+  expect({"axis_shift", "r_shoulder_yaw", ""}, -15.4, 0.0);
+  expect({"axis_shift", "r_elbow", ""}, 30.4, 5.0);
+  expect({"axis_shift", "r_wrist_prosup", ""}, 3.9, 15.0);
+  expect({"axis_shift", "r_wrist_pitch", ""}, 3.7, 0.0);
+  EXPECT_LT(report.after.rms_px, 0.5 * report.before.rms_px);
+}
+
 TEST(LazyBreakers, DuplicatedFramesSharpenNothing) {
   const auto log = make_synthetic_log(robot(), log_with({fault("backlash", "r_elbow", 0.8)}), test::log_seed());
   std::vector<std::size_t> twice;

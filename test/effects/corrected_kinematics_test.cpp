@@ -87,6 +87,20 @@ TEST_F(CorrectedKinematicsTest, TiltTurnsTheAxisAndKeepsTheZeroPose) {
   EXPECT_LT((tip(corrections) - expected).norm(), 1e-12);
 }
 
+TEST_F(CorrectedKinematicsTest, ShiftMovesTheAxisAcrossItselfAndTurnsWithTheLinkThatCarriesIt) {
+  const auto plain = tip(corrections);
+  corrections.adjustments[1].shift_1_m = 0.01;
+  corrections.adjustments[1].shift_2_m = -0.02;
+  const Eigen::Vector3d shift = 0.01 * kinematics.tilt_axis(1, 0) - 0.02 * kinematics.tilt_axis(1, 1);
+  EXPECT_LT((tip(corrections) - plain - shift).norm(), 1e-12);
+  // Joint a carries b: half a turn of it brings the shift to the other side.
+  q[0] += kPi;
+  const auto turned = tip(Corrections(2));
+  const Eigen::Vector3d across(-shift.x(), -shift.y(), shift.z());
+  EXPECT_LT((tip(corrections) - turned - across).norm(), 1e-12);
+  EXPECT_NEAR(shift.norm(), std::hypot(0.01, 0.02), 1e-12);
+}
+
 TEST_F(CorrectedKinematicsTest, AdjustmentsOfTwoJointsCompose) {
   // Lengthening joint a's link along z and b's along its own axis: both are seen at the tip.
   const auto plain = tip(corrections);

@@ -28,7 +28,7 @@ double dq_deg(const Corrections& c, Eigen::Index joint) { return degrees(c.dq[jo
 
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
-  EXPECT_EQ(effect_names().size(), 23u);
+  EXPECT_EQ(effect_names().size(), 24u);
   auto at = instant(r);
   at.q.setConstant(0.7);
   at.encoder.setConstant(0.8);

@@ -115,6 +115,8 @@ TEST_F(ExportCorrection, TheUrdfHoldsWhatItCanOfAnExtendedModel) {
   put("link_length", {"r_wrist_prosup", ""});
   put("axis_tilt", {"r_shoulder_yaw", ""});
   put("axis_tilt", {"r_elbow", ""});
+  put("axis_shift", {"r_elbow", ""});
+  put("axis_shift", {"r_wrist_prosup", ""});
   put("baseline", {});
   put("base_shift", {});
   put("focal_length", {});

@@ -15,7 +15,7 @@
 namespace bodyschema {
 
 /// The generalised coordinates in which one picture's residuals are compressed: joints of arm, head
-/// and fingers, link lengths, tilts of arm axes, camera, size and thickness of the parts. Every
+/// and fingers, link lengths, tilts and shifts of arm axes, camera, size and thickness of the parts. Every
 /// cause of the catalogue is a linear map of its parameters to them.
 class CoordinateLayout {
  public:
@@ -27,8 +27,8 @@ class CoordinateLayout {
   [[nodiscard]] Eigen::Index joint(Eigen::Index joint) const;
 
   enum class Kind {
-    kJoint, kAlong, kTilt1, kTilt2, kBaseX, kBaseY, kBaseZ,
-    kShiftX, kFocal, kCx, kCy, kK1, kScale, kDilation
+    kJoint, kAlong, kTilt1, kTilt2, kShift1, kShift2, kBaseX, kBaseY, kBaseZ,
+    kCameraX, kFocal, kCx, kCy, kK1, kScale, kDilation
   };
   struct Entry {
     Kind kind;

@@ -46,13 +46,16 @@ struct SelectionOptions {
   double least_worse = 1e-3;   ///< ... provided the loss grows by this share of the baseline's
   double t_generic = 2.0;      ///< a generic feature must beat named causes by this much
   int max_causes = 6;
-  /// Many small errors live together where so many causes were found, or where all others together
-  /// would still take away more than this; then a cause must stand out from them by its gain.
+  /// Many small errors live together where so many causes were found, or where all others together,
+  /// each a little, would still take away held-out loss (paired t above this; on a clean log it is
+  /// below -1.5); then a cause must stand out from them by its gain.
   std::size_t crowd = 3;
-  double crowd_rest_gain = 0.004, crowd_rest_t = 1.0;
+  double crowd_rest_t = 0.0;
   double crowd_floor = 0.4;
-  bool search = true;  ///< false: `fixed` are the causes
-  std::vector<std::size_t> fixed;
+  /// Causes that are there from the beginning; a search drops those that the data does not ask for
+  /// and adds others. They are many because much is wrong, which makes no crowd of small errors.
+  std::vector<std::size_t> given;
+  bool search = true;  ///< false: `given` are the causes
 };
 
 /// How a candidate fared when tested against the model so far.

@@ -32,6 +32,8 @@ class StalledEncoders {
   /// Whether a memory had to be dropped in the last second while a reading stood. If its encoder stalls, a
   /// young memory holds frames that no one set of offsets explains, and the other joints make up for it.
   [[nodiscard]] bool dropped_while_standing() const { return dropped_while_standing_; }
+  /// Whether an encoder stalls or may be about to be found out.
+  [[nodiscard]] bool suspected() const { return doubtful_ || joint_ >= 0; }
   /// The joint that stalls, -1 if none; of several, the one seen to move most.
   [[nodiscard]] Eigen::Index joint() const { return joint_; }
   /// How far it has been seen to move under its reading, to and fro added up, radians.

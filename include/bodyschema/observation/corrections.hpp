@@ -19,7 +19,11 @@ struct JointAdjustment {
   double along_m = 0.0;     ///< the joint (and all beyond) moved along its own axis, away from the root, metres
   double tilt_1_rad = 0.0;  ///< tilt of the joint's axis in its parent link, about `tilt_axis(0)`
   double tilt_2_rad = 0.0;  ///< ... about `tilt_axis(1)` of CorrectedKinematics
-  [[nodiscard]] bool is_zero() const { return along_m == 0 && tilt_1_rad == 0 && tilt_2_rad == 0; }
+  double shift_1_m = 0.0;   ///< the joint (and all beyond) moved along `tilt_axis(0)`, metres
+  double shift_2_m = 0.0;   ///< ... along `tilt_axis(1)`
+  [[nodiscard]] bool is_zero() const {
+    return along_m == 0 && tilt_1_rad == 0 && tilt_2_rad == 0 && shift_1_m == 0 && shift_2_m == 0;
+  }
 };
 
 /// Everything in which the prediction of one camera's picture at one instant departs from what URDF

@@ -59,6 +59,8 @@ struct JointMisplacement {
   double lengthening_m = 0.0;  ///< everything beyond moves this much further out along the axis
   double tilt_1_rad = 0.0;     ///< turn of the axis about the first perpendicular direction
   double tilt_2_rad = 0.0;     ///< ... about the second
+  double shift_1_m = 0.0;      ///< everything beyond moves along the first perpendicular direction
+  double shift_2_m = 0.0;      ///< ... along the second
 };
 
 /// The robot and its cameras as built, where that is not what URDF and configuration say.

@@ -26,6 +26,7 @@ FaultKind latency();
 FaultKind camera_skew();
 FaultKind link_length();
 FaultKind axis_tilt();
+FaultKind axis_shift();
 FaultKind head_offset();
 FaultKind vergence();
 FaultKind baseline();
