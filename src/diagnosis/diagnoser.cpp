@@ -77,7 +77,7 @@ class Diagnoser {
     for (auto& item : untestable(source_, before_.at)) excluded_.push_back(std::move(item));
   }
 
-  /// Much is wrong at once: causes that were tried for real, if they leave less.
+  /// Much is wrong at once: causes that were tried for real, if they are plausible and leave less.
   void look_nearer(Found& found) {
     if (other_shape_) return;
     fitter_.look_closely();
@@ -86,7 +86,9 @@ class Diagnoser {
     std::erase_if(excluded_, [](const auto& item) { return item.cause.name == "base_shift"; });
     auto again = found_nearer();
     const double outline = outline_points(before_.at);
-    if (again && misfit(again->after.at, outline) < misfit(found.after.at, outline)) {
+    // What no robot can be gives way to anything plausible that is better than offsets alone.
+    const auto& to_beat = plausible(found.extended) ? found.after.at : before_.at;
+    if (again && plausible(again->extended) && misfit(again->after.at, outline) < misfit(to_beat, outline)) {
       found = std::move(*again);
     } else {
       excluded_ = excluded;

@@ -174,24 +174,42 @@ ImageMeasurement::ImageMeasurement(std::shared_ptr<const RobotModel> model, cons
 
 ImageMeasurement::~ImageMeasurement() = default;
 
+ImageMeasurement::Seen ImageMeasurement::seen_of(const CameraObservation& camera,
+                                                 const PinholeIntrinsics& k) const {
+  const auto pixels = static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
+  Seen seen{camera.coverage, camera.valid};
+  if (seen.coverage.size() == pixels) return seen;
+  seen.coverage.resize(pixels);
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u) {
+      seen.coverage[static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width) + static_cast<std::size_t>(u)] =
+          camera.mask.at(u, v) ? 255 : 0;
+    }
+  }
+  return seen;
+}
+
+bool ImageMeasurement::repeats_the_last(const std::vector<std::pair<ViewInput, Seen>>& pictures) const {
+  return std::all_of(pictures.begin(), pictures.end(), [&](const auto& picture) {
+    const auto& [view, seen] = picture;
+    for (auto v = views_.size(); v-- > 0;) {
+      if (views_[v].camera == view.camera) return views_[v].joints.q == view.joints.q && seen_[v] == seen;
+    }
+    return false;
+  });
+}
+
 void ImageMeasurement::add(const Observation& observation) {
+  std::vector<std::pair<ViewInput, Seen>> pictures;
   for (std::size_t c = 0; c < observation.cameras.size() && c < rig_.cameras.size(); ++c) {
     const auto& camera = observation.cameras[c];
     if (!camera || camera->mask.empty()) continue;
-    const auto& k = rig_.cameras[c].intrinsics;
-    const auto pixels = static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
-    Seen seen{camera->coverage, camera->valid};
-    if (seen.coverage.size() != pixels) {
-      seen.coverage.resize(pixels);
-      for (int v = 0; v < k.height; ++v) {
-        for (int u = 0; u < k.width; ++u) {
-          seen.coverage[static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width) +
-                        static_cast<std::size_t>(u)] = camera->mask.at(u, v) ? 255 : 0;
-        }
-      }
-    }
     ViewInput view{camera->joints, c};
     view.joints.utime = camera->utime;
+    pictures.emplace_back(std::move(view), seen_of(*camera, rig_.cameras[c].intrinsics));
+  }
+  if (repeats_the_last(pictures)) return;
+  for (auto& [view, seen] : pictures) {
     // Left and right of one observation may carry stamps in either order.
     auto at = views_.size();
     while (at > 0 && views_[at - 1].joints.utime > view.joints.utime) --at;

@@ -1,6 +1,7 @@
 #include "nearer_model.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "bodyschema/effects/catalogue.hpp"
@@ -97,7 +98,7 @@ class NearerModel {
       Guess guess{model, 0.0};
       for (const auto& cause : idea) guess.model.add(cause.name, {cause.joint, cause.source});
       guess.misfit = misfit(fitter_.fit(guess.model, {}, kRough).at, outline_);
-      if (!best || guess.misfit < best->misfit) best = std::move(guess);
+      if (plausible(guess.model) && (!best || guess.misfit < best->misfit)) best = std::move(guess);
     }
     return best;
   }
@@ -131,6 +132,17 @@ std::vector<ErrorModel> scattered_starts(MeasurementSource& source, const ErrorM
   std::vector<ErrorModel> starts;
   for (std::size_t i = 0; i < kKept; ++i) starts.push_back(std::move(guesses[i].model));
   return starts;
+}
+
+bool plausible(const ErrorModel& model) {
+  constexpr double kLargest = 20.0;  // typical sizes
+  for (std::size_t e = 0; e < model.size(); ++e) {
+    if (model[e].name() == "joint_offset") continue;
+    for (const auto& p : model[e].parameters()) {
+      if (p.fitted && std::abs(p.value) > kLargest * p.typical) return false;
+    }
+  }
+  return true;
 }
 
 std::optional<ErrorModel> nearer_model(MeasurementSource& source, const CoordinateLayout& layout, ModelFitter& fitter,

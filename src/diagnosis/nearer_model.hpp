@@ -12,6 +12,10 @@ namespace bodyschema::diagnosis {
 /// many scattered ones, always the same for a log. None where the source needs no search.
 std::vector<ErrorModel> scattered_starts(MeasurementSource& source, const ErrorModel& offsets);
 
+/// Whether a robot may be built so wrong: a cause of more than twenty times its typical size stands in for
+/// another, however well it fits.
+bool plausible(const ErrorModel& model);
+
 /// Where a linear search stays far from the outlines: causes tried for real, each with the offsets
 /// fitted anew, the one that brings the outlines nearest kept, and so on while it is worth it. What is
 /// linear misleads about errors this large. Besides single causes all lengths together are tried (a

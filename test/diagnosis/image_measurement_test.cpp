@@ -15,7 +15,8 @@ using test::robot;
 /// Silhouettes of the robot in postures before its eyes, as masks that an ideal vision would give.
 class Pictures : public testing::Test {
  protected:
-  static std::unique_ptr<ImageMeasurement> measurement(int threads = 1) {
+  /// @param copies  of each observation, 30 ms apart
+  static std::unique_ptr<ImageMeasurement> measurement(int threads = 1, int copies = 1) {
     const auto& r = robot();
     auto result = std::make_unique<ImageMeasurement>(r.model, r.setup, r.rig, threads);
     const auto postures = make_synthetic_log(r, {}, 1);
@@ -43,7 +44,10 @@ class Pictures : public testing::Test {
         camera.mask = scorer->render(X_CB, c);
         seen.cameras.push_back(std::move(camera));
       }
-      result->add(seen);
+      for (int copy = 0; copy < copies; ++copy) {
+        result->add(seen);
+        for (auto& camera : seen.cameras) camera->utime += 30'000;
+      }
     }
     return result;
   }
@@ -110,6 +114,14 @@ TEST_F(Pictures, EveryOtherInstantIsHalfOfThem) {
   EXPECT_GT(half.outline, 0.3 * all.outline);
   EXPECT_LT(half.outline, 0.7 * all.outline);
   EXPECT_NEAR(half.misfit / half.outline, all.misfit / all.outline, 0.3 * all.misfit / all.outline);
+}
+
+TEST_F(Pictures, ThatRepeatTheLastOnesSayNothingNew) {
+  const auto once = measurement(), thrice = measurement(1, 3);
+  ASSERT_EQ(once->views().size(), thrice->views().size());
+  for (std::size_t v = 0; v < once->views().size(); ++v) {
+    EXPECT_EQ(once->views()[v].joints.utime, thrice->views()[v].joints.utime);
+  }
 }
 
 TEST_F(Pictures, ThreadsChangeNothing) {

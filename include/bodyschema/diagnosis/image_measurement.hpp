@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "bodyschema/camera/stereo_rig.hpp"
@@ -25,7 +26,8 @@ class ImageMeasurement final : public MeasurementSource {
   ~ImageMeasurement() override;
 
   /// Adds both pictures of an observation whose masks and coverage have been filled in. In order
-  /// of time.
+  /// of time. One that repeats the last, with the same outlines at the same encoder readings, says
+  /// nothing new and is left out: a simulator at rest, a driver that publishes twice.
   void add(const Observation& observation);
   /// The encoder log at full rate, in order of time.
   void set_stream(std::vector<JointSample> stream) { stream_ = std::move(stream); }
@@ -46,8 +48,11 @@ class ImageMeasurement final : public MeasurementSource {
   struct Seen {
     std::vector<std::uint8_t> coverage;
     BinaryMask valid;
+    friend bool operator==(const Seen&, const Seen&) = default;
   };
   struct Worker;
+  [[nodiscard]] Seen seen_of(const CameraObservation& camera, const PinholeIntrinsics& intrinsics) const;
+  [[nodiscard]] bool repeats_the_last(const std::vector<std::pair<ViewInput, Seen>>& pictures) const;
 
   RobotSetup setup_;
   StereoRig rig_;
