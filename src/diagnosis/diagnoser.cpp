@@ -45,7 +45,8 @@ class Diagnoser {
       found = nearer ? search(nearer->first, nearer->second) : search(before_.at, baseline_);
     }
     if (searches() && found.after.at.rms_px() > options_.noise_rms_px) look_nearer(found);
-    auto report = findings(source_, options_.selection, layout_, fitter_.plan(), found, baseline_, before_, excluded_);
+    auto report = findings(source_, options_.selection, layout_, fitter_.plan(), found, baseline_, before_, excluded_,
+                           options_.systematic_share);
     word_verdict(report, options_, found.selection.crowded);
     progress(1.0);
     return report;

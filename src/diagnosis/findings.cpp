@@ -39,8 +39,10 @@ double inflation(const BlockFit& fit) {
 class Findings {
  public:
   Findings(MeasurementSource& source, const SelectionOptions& rules, const CoordinateLayout& layout,
-           const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before)
-      : source_(source), rules_(rules), layout_(layout), plan_(plan), found_(found), baseline_(baseline),
+           const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before,
+           double systematic_share)
+      : source_(source), rules_(rules), layout_(layout), plan_(plan), found_(found),
+        systematic_share_(systematic_share), baseline_(baseline),
         before_(before), inflation_(inflation(found.after.fit)), jacobians_(source.views().size()) {}
 
   DiagnosisReport report(const std::vector<NotTestable>& excluded) {
@@ -63,7 +65,9 @@ class Findings {
   }
 
  private:
-  [[nodiscard]] std::array<double, 2> interval(Eigen::Index column, double value, double typical) const {
+  /// @param systematic  standard deviation that comes on top of what differs between blocks
+  [[nodiscard]] std::array<double, 2> interval(Eigen::Index column, double value, double typical,
+                                               double systematic = 0.0) const {
     const auto& fit = found_.after.fit;
     if (!fit.usable) {
       const double inf = std::numeric_limits<double>::infinity();
@@ -71,7 +75,7 @@ class Findings {
     }
     const double floor = 0.7 * inflation_ * fit.model_variance[column];
     const double sd = std::sqrt(std::max(fit.covariance(column, column), floor)) * typical;
-    const double half = student95(static_cast<double>(plan_.block_count()) - 1.0) * sd;
+    const double half = std::hypot(student95(static_cast<double>(plan_.block_count()) - 1.0) * sd, 1.96 * systematic);
     return {value - half, value + half};
   }
 
@@ -121,7 +125,7 @@ class Findings {
         const auto& ref = found_.after.parameters[c];
         if (cause_of(found_.extended[ref.effect]) != cause.cause) continue;
         const auto& p = found_.extended[ref.effect].parameters()[ref.parameter];
-        const auto ci = interval(static_cast<Eigen::Index>(c), p.value, p.typical);
+        const auto ci = interval(static_cast<Eigen::Index>(c), p.value, p.typical, systematic_share_ * std::abs(p.value));
         cause.parameters.push_back({p.name, p.unit, p.in_unit(),
                                     {ci[0] / p.si_per_unit, ci[1] / p.si_per_unit}});
       }
@@ -308,6 +312,7 @@ class Findings {
   const CoordinateLayout& layout_;
   const BlockPlan& plan_;
   const Found& found_;
+  double systematic_share_;
   const ErrorModel& baseline_;
   const ModelFit& before_;
   double inflation_;
@@ -323,8 +328,8 @@ CauseName name_of(const Candidate& candidate) {
 DiagnosisReport findings(MeasurementSource& source, const SelectionOptions& rules,
                          const CoordinateLayout& layout, const BlockPlan& plan, const Found& found,
                          const ErrorModel& baseline, const ModelFit& before,
-                         const std::vector<NotTestable>& excluded) {
-  return Findings(source, rules, layout, plan, found, baseline, before).report(excluded);
+                         const std::vector<NotTestable>& excluded, double systematic_share) {
+  return Findings(source, rules, layout, plan, found, baseline, before, systematic_share).report(excluded);
 }
 
 }  // namespace bodyschema::diagnosis

@@ -24,6 +24,6 @@ CauseName name_of(const Candidate& candidate);
 DiagnosisReport findings(MeasurementSource& source, const SelectionOptions& rules,
                          const CoordinateLayout& layout, const BlockPlan& plan, const Found& found,
                          const ErrorModel& baseline, const ModelFit& before,
-                         const std::vector<NotTestable>& excluded);
+                         const std::vector<NotTestable>& excluded, double systematic_share);
 
 }  // namespace bodyschema::diagnosis

@@ -51,6 +51,8 @@ class LogDiagnosis {
     };
     diagnosis.noise_rms_px = kNoise_px;
     diagnosis.trusted_rms_px = kShapeError_px;
+    diagnosis.systematic_share = kSystematicShare;
+    diagnosis.selection.crowd_rest_t = kCrowdThroughPictures;
     auto report = diagnosed(diagnosis);
     add_remarks(report);
     LogPictures::place_hand(pipeline_, measurement_.views(), report);
@@ -189,6 +191,11 @@ class LogDiagnosis {
 
   static constexpr Microseconds kLearnEvery = 90'000;
   static constexpr double kNoise_px = 0.5;       ///< rms after the extension; a good model leaves 0.3
+  /// Measured: intervals by blocks alone held 61 % of 23 known parameters in simulated pictures, whose
+  /// estimates missed by 1.6 % (median).
+  static constexpr double kSystematicShare = 0.02;
+  /// Pictures err a little in many ways at once: of logs with nothing wrong one had 0.25.
+  static constexpr double kCrowdThroughPictures = 1.0;
   static constexpr double kShapeError_px = 0.8;  ///< ... and where this is left, parts have another shape
   static constexpr double kStill_rad = 0.5 * kPi / 180.0;
   static constexpr const char* kAdvice =

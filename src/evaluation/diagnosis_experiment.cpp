@@ -167,8 +167,12 @@ Json json_of(const TrialOutcome& o) {
   for (const auto& c : o.report.causes) {
     Json same = Json::array();
     for (const auto& s : c.same) same.push_back(s.text());
+    Json parameters = Json::array();
+    for (const auto& p : c.parameters) {
+      parameters.push_back({{"parameter", p.parameter}, {"estimate", p.estimate}, {"ci95", {p.ci95[0], p.ci95[1]}}});
+    }
     answer.push_back({{"cause", c.cause.text()}, {"variable", c.variable}, {"class", same},
-                      {"z", c.z}, {"heldout_gain", c.heldout_gain}});
+                      {"z", c.z}, {"heldout_gain", c.heldout_gain}, {"parameters", parameters}});
   }
   return {{"row", kTrialRowNames[static_cast<std::size_t>(o.row)]}, {"seed", o.seed},
           {"truth", truth}, {"answer", answer}, {"sentence", o.report.sentence},

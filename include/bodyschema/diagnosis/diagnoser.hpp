@@ -35,6 +35,10 @@ struct DiagnosisOptions {
   /// Rms that noise alone leaves, px, and above which no name is trusted; the defaults are for
   /// sources whose noise is not known.
   double noise_rms_px = 1e9, trusted_rms_px = 1e9;
+  /// One sigma, as a share of an estimate, of errors that all blocks have in common and that therefore
+  /// do not show between them: how a picture's blur and threshold place an outline, what encoders did
+  /// between two readings. Widens the intervals of causes.
+  double systematic_share = 0.0;
   std::function<void(double)> progress;  ///< called with the share done
 };
 
