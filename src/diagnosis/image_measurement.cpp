@@ -174,8 +174,7 @@ ImageMeasurement::ImageMeasurement(std::shared_ptr<const RobotModel> model, cons
 
 ImageMeasurement::~ImageMeasurement() = default;
 
-ImageMeasurement::Seen ImageMeasurement::seen_of(const CameraObservation& camera,
-                                                 const PinholeIntrinsics& k) const {
+ImageMeasurement::Seen ImageMeasurement::seen_of(const CameraObservation& camera, const PinholeIntrinsics& k) {
   const auto pixels = static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
   Seen seen{camera.coverage, camera.valid};
   if (seen.coverage.size() == pixels) return seen;

@@ -15,8 +15,8 @@ constexpr double kStep = 1e-5;
 
 bool moves_links(Kind kind) {
   return kind == Kind::kJoint || kind == Kind::kAlong || kind == Kind::kTilt1 ||
-         kind == Kind::kTilt2 || kind == Kind::kShift1 || kind == Kind::kShift2 || kind == Kind::kBaseX || kind == Kind::kBaseY ||
-         kind == Kind::kBaseZ || kind == Kind::kCameraX;
+         kind == Kind::kTilt2 || kind == Kind::kShift1 || kind == Kind::kShift2 ||
+         kind == Kind::kBaseX || kind == Kind::kBaseY || kind == Kind::kBaseZ || kind == Kind::kCameraX;
 }
 
 template <class C>

@@ -71,6 +71,21 @@ TEST(LazyBreakers, AModelOfAnotherRobotIsWrongInSeveralLengthsAndInNothingElse) 
   EXPECT_LT(report.after.rms_px, 0.5 * report.before.rms_px);
 }
 
+TEST(LazyBreakers, WhatAllBlocksHaveInCommonWidensTheIntervals) {
+  const auto log = make_synthetic_log(robot(), log_with({fault("link_length", "r_wrist_prosup", 5.0)}), test::log_seed());
+  auto options = usual_options(*log);
+  const auto narrow = diagnose(*log, options);
+  options.systematic_share = 0.02;
+  const auto wide = diagnose(*log, options);
+  ASSERT_EQ(narrow.causes.size(), 1u) << narrow.sentence;
+  ASSERT_EQ(wide.causes.size(), 1u) << wide.sentence;
+  const auto& a = narrow.causes[0].parameters.at(0);
+  const auto& b = wide.causes[0].parameters.at(0);
+  EXPECT_EQ(a.estimate, b.estimate);
+  const double half_a = 0.5 * (a.ci95[1] - a.ci95[0]), half_b = 0.5 * (b.ci95[1] - b.ci95[0]);
+  EXPECT_NEAR(half_b, std::hypot(half_a, 1.96 * 0.02 * a.estimate), 1e-9);
+}
+
 TEST(LazyBreakers, DuplicatedFramesSharpenNothing) {
   const auto log = make_synthetic_log(robot(), log_with({fault("backlash", "r_elbow", 0.8)}), test::log_seed());
   std::vector<std::size_t> twice;

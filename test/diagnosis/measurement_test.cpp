@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "bodyschema/effects/catalogue.hpp"
 #include "diagnosis/trial_robot.hpp"
 
 namespace bodyschema {
@@ -62,11 +63,15 @@ TEST(ViewCompressor, DerivativesAgreeWithMovingTheRobot) {
   }
 }
 
-TEST(CoordinateLayout, HoldsSomeSixtyCoordinatesAndReadsThem) {
+TEST(CoordinateLayout, HoldsWhatTheCatalogueMovesAndReadsIt) {
   const auto roles = JointRoles::of(robot().model, robot().setup);
   const CoordinateLayout layout(roles);
-  EXPECT_GE(layout.size(), 40);
-  EXPECT_LE(layout.size(), 70);
+  const auto arm = static_cast<Eigen::Index>(roles.arm.size());
+  const auto joints = arm + static_cast<Eigen::Index>(roles.head.size() + roles.fingers.size());
+  const auto pairs = arm + static_cast<Eigen::Index>(effect_targets("axis_shift", roles).size());  // tilts and shifts
+  const auto lengths = static_cast<Eigen::Index>(effect_targets("link_length", roles).size());
+  constexpr Eigen::Index kBaseCameraAndParts = 3 + 5 + 2;
+  EXPECT_EQ(layout.size(), joints + 2 * pairs + lengths + kBaseCameraAndParts);
   Corrections c(static_cast<Eigen::Index>(roles.names.size()));
   c.dq[roles.arm[3]] = 0.25;
   c.dilation_px = 0.5;

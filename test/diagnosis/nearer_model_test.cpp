@@ -50,6 +50,17 @@ TEST(NearerModel, FindsSeveralLengthsThatAreFarOff) {
   EXPECT_NEAR(shift->parameters()[1].in_unit(), -20.0, 2.0);
 }
 
+TEST(NearerModel, NoRobotIsBuiltSoWrongThatItsElbowTiltsByThirtyDegrees) {
+  const auto tilted = [](double deg) {
+    ErrorModel model(JointRoles::of(test::robot().model, test::robot().setup));
+    model.add("axis_tilt", {"r_elbow", ""}).parameters()[0].value = radians(deg);
+    model.add("joint_offset", {"r_elbow", ""}).parameters()[0].value = radians(40.0);  // which may well be
+    return plausible(model);
+  };
+  EXPECT_TRUE(tilted(5.0));
+  EXPECT_FALSE(tilted(-30.0));
+}
+
 TEST(NearerModel, FindsNothingWhereOffsetsExplainIt) { EXPECT_FALSE(look({}).model.has_value()); }
 
 }  // namespace

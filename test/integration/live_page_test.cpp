@@ -216,31 +216,38 @@ TEST(LivePageViewers, DoNotSlowTheEstimator) {
   const char* wish = std::getenv("BODYSCHEMA_VIEWER_ROUNDS");
   const int rounds = wish != nullptr ? std::max(1, std::atoi(wish)) : 3;
   std::vector<double> latency_ms[2];
-  std::size_t estimates[2] = {0, 0};
   int pictures = 0;
   for (int round = 0; round < rounds; ++round) {
     for (const int watched : {0, 1}) {
       std::vector<std::unique_ptr<Viewer>> viewers;
       for (int i = 0; i < 4 * watched; ++i) viewers.push_back(std::make_unique<Viewer>(port));
       std::this_thread::sleep_for(std::chrono::milliseconds(500));
-      const std::size_t begin = listener.offsets().size();
-      std::this_thread::sleep_for(std::chrono::milliseconds(3000));
-      const auto published = listener.offsets();
-      estimates[watched] += published.size() - begin;
-      for (std::size_t i = begin; i < published.size(); ++i) {
-        // With the hand out of view there is little to do: only alike can be compared.
-        if (published[i].state == "converged") latency_ms[watched].push_back(published[i].latency_ms);
+      std::size_t next = listener.offsets().size();
+      std::size_t converged = 0;
+      int shown = 0;
+      // Three seconds; on a machine that is busy with other work, as long as it takes.
+      for (int second = 0; second < 60 && (second < 3 || converged < 4 || (watched == 1 && shown <= 8)); ++second) {
+        std::this_thread::sleep_for(std::chrono::seconds(1));
+        const auto published = listener.offsets();
+        for (; next < published.size(); ++next) {
+          // With the hand out of view there is little to do: only alike can be compared.
+          if (published[next].state != "converged") continue;
+          latency_ms[watched].push_back(published[next].latency_ms);
+          ++converged;
+        }
+        shown = 0;
+        for (const auto& viewer : viewers) shown += viewer->pictures();
       }
-      for (const auto& viewer : viewers) pictures += viewer->pictures();
+      pictures += shown;
       if (watched == 1) {  // the page goes on drawing for as long as it takes a viewer for there
         viewers.clear();
         std::this_thread::sleep_for(std::chrono::milliseconds(3200));
       }
     }
   }
-  ASSERT_GT(pictures, 0) << "the viewers did see pictures";
-  EXPECT_GT(estimates[0], 0u);
-  EXPECT_GT(estimates[1], 0u);
+  ASSERT_GT(latency_ms[0].size(), 10u);
+  ASSERT_GT(latency_ms[1].size(), 10u);
+  ASSERT_GT(pictures, 8 * rounds) << "the viewers did see pictures";
   const double alone = quantile(latency_ms[0], 0.5);
   const double watched = quantile(latency_ms[1], 0.5);
   std::printf("picture to estimate, nobody watching: median %.1f ms, 90 %% within %.1f ms (%zu estimates)\n"
@@ -248,8 +255,6 @@ TEST(LivePageViewers, DoNotSlowTheEstimator) {
               alone, quantile(latency_ms[0], 0.9), latency_ms[0].size(), pictures, watched,
               quantile(latency_ms[1], 0.9), latency_ms[1].size(), watched / alone);
   if (wish != nullptr) {
-    EXPECT_GT(latency_ms[0].size(), 10u);
-    EXPECT_GT(latency_ms[1].size(), 10u);
     EXPECT_LT(watched, 1.5 * alone);
   }
   service.signal(SIGTERM);

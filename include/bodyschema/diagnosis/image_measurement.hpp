@@ -51,7 +51,7 @@ class ImageMeasurement final : public MeasurementSource {
     friend bool operator==(const Seen&, const Seen&) = default;
   };
   struct Worker;
-  [[nodiscard]] Seen seen_of(const CameraObservation& camera, const PinholeIntrinsics& intrinsics) const;
+  static Seen seen_of(const CameraObservation& camera, const PinholeIntrinsics& intrinsics);
   [[nodiscard]] bool repeats_the_last(const std::vector<std::pair<ViewInput, Seen>>& pictures) const;
 
   RobotSetup setup_;
