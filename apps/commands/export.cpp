@@ -14,6 +14,7 @@ void add_export(CLI::App& app) {
     CommonOptions common;
     std::string summary;
     std::string out;
+    bool anyway = false;
   };
   auto a = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand(
@@ -22,6 +23,7 @@ void add_export(CLI::App& app) {
       "Example:\n  bodyschema export out/reach/summary.json --config config/icub_right/estimator.yaml --out out/apply");
   command->add_option("summary", a->summary, "summary.json of a replay")->required();
   command->add_option("-o,--out", a->out, "Folder for the files")->required();
+  command->add_flag("--anyway", a->anyway, "Also when the replay did not end converged");
   a->common.add_to(*command);
   a->common.add_extended_model_to(*command);
   command->callback([a] {
@@ -32,7 +34,7 @@ void add_export(CLI::App& app) {
     }
     const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
     const StereoRig rig = StereoRig::from(configuration.section("cameras"));
-    std::fputs(export_correction(a->summary, setup, rig, a->out).c_str(), stdout);
+    std::fputs(export_correction(a->summary, setup, rig, a->out, a->anyway).c_str(), stdout);
   });
 }
 

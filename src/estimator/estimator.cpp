@@ -49,7 +49,7 @@ Eigen::VectorXd encoder_sds(const std::vector<Parameter>& parameters, std::size_
   return sd;
 }
 
-/// A change of the state that evidence predicts to lower the cost by this much, px^2.
+/// The cost that the evidence predicts after a change of the state, px^2.
 double predicted_cost(const ContourEvidence& evidence, const Eigen::VectorXd& step) {
   return evidence.cost - 2.0 * evidence.b.dot(step) + step.dot(evidence.A * step);
 }
@@ -208,6 +208,7 @@ struct Estimator::Impl {
     cloud_covariance = filter.covariance();
     frame_state = {state, cloud_covariance};
     filter.resample_and_spread();
+    // Says that the spread is at its smallest, no more: the published filter knows no better of itself.
     current = EstimatorState::kConverging;
     if (filter.spread_rad() <= options.filter.spread_min_rad) current = EstimatorState::kConverged;
     times.filter_ms += elapsed_ms(start);
@@ -513,7 +514,8 @@ struct Estimator::Impl {
   /// The state of a robot that is as its encoders and model say.
   [[nodiscard]] Eigen::VectorXd uncorrected() const { return Eigen::VectorXd::Zero(state.size()); }
 
-  /// One sigma of the hand's position in a camera, from the covariance of this frame's state.
+  /// How well the hand is known in a camera, by this frame's covariance: the root of the summed variances
+  /// of x, y and z.
   double hand_sd(const Exposure& at, std::size_t camera) {
     constexpr double kStep = 1e-4;
     const Eigen::Index n = std::min<Eigen::Index>(state.size(), frame_state.covariance.rows());

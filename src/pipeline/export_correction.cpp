@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/estimator/estimate.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "bodyschema/robot/urdf_origin.hpp"
 #include "estimate_json.hpp"
@@ -19,6 +20,8 @@ namespace bodyschema {
 namespace {
 
 using tinyxml2::XMLElement;
+
+constexpr double kHardlyKnown_deg = 0.5;
 
 Eigen::Vector3d triple(const XMLElement* element, const char* attribute,
                        const Eigen::Vector3d& fallback) {
@@ -123,6 +126,10 @@ void check_same_model(const std::filesystem::path& summary, const RobotSetup& se
   }
 }
 
+bool is_one_of(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
 std::string cameras_yaml(const StereoRig& rig) {
   std::string text =
       "# Intrinsics with the extended model applied: px; distortion k1 k2 p1 p2 k3 as OpenCV. Put in place\n"
@@ -162,12 +169,14 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
 
 }  // namespace
 
-Correction read_correction(const std::filesystem::path& summary) {
+Correction read_correction(const std::filesystem::path& summary, bool anyway) {
   std::ifstream stream(summary);
   if (!stream) throw FileError(summary.string() + ": no such file; expected a replay's summary.json");
   Correction correction;
+  std::string state;
   try {
     const auto estimate = nlohmann::ordered_json::parse(stream).at("estimate");
+    state = estimate.at("state").get<std::string>();
     for (const auto& [joint, value] : estimate.at("offset_deg").items()) {
       correction.offsets_rad.emplace_back(joint, radians(value.get<double>()));
     }
@@ -181,6 +190,16 @@ Correction read_correction(const std::filesystem::path& summary) {
     }
   } catch (const nlohmann::json::exception& e) {
     throw FileError(summary.string() + ": not a replay's summary.json: " + e.what());
+  }
+  if (state != to_string(EstimatorState::kConverged)) {
+    const std::string ending = "the replay ended as '" + state + "'; its offsets are not to be applied";
+    if (!anyway) throw DataError(summary.string() + ": " + ending + " (--anyway)");
+    correction.warnings.push_back(ending);
+  }
+  for (const auto& [joint, sd] : correction.sd_rad) {
+    if (degrees(sd) <= kHardlyKnown_deg) continue;
+    correction.warnings.push_back(fmt::format(
+        "{}: known to {:.2f} deg only (one sigma); this motion hardly told it", joint, degrees(sd)));
   }
   return correction;
 }
@@ -216,14 +235,19 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
   for (const auto& [name, value] : correction.nuisances) {
     if (XMLElement* joint = find_joint(robot, name)) correct_joint(document, joint, value);
   }
+  for (auto warning = correction.warnings.rbegin(); warning != correction.warnings.rend(); ++warning) {
+    std::string text = ' ' + *warning + ' ';
+    for (auto at = text.find("--"); at != std::string::npos; at = text.find("--")) text.erase(at, 1);  // ends it
+    robot->InsertFirstChild(document.NewComment(text.c_str()));
+  }
   if (document.SaveFile(out.c_str()) != tinyxml2::XML_SUCCESS) {
     throw FileError(out.string() + ": cannot be written");
   }
 }
 
 std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup,
-                              const StereoRig& rig, const std::filesystem::path& out) {
-  Correction correction = read_correction(summary);
+                              const StereoRig& rig, const std::filesystem::path& out, bool anyway) {
+  Correction correction = read_correction(summary, anyway);
   std::optional<ErrorModel> model;
   std::vector<AppliedEffect> applied;
   if (!setup.extended_model.empty()) {
@@ -246,20 +270,33 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
     yaml += note;
     delta += note;
   }
+  std::string warnings;
+  for (const auto& warning : correction.warnings) {
+    warnings += "warning: " + warning + '\n';
+    yaml += "# " + warning + '\n';
+    delta += "# " + warning + '\n';
+  }
   yaml += "version: 1\noffset_deg:\n";
   for (const auto& [joint, offset] : correction.offsets_rad) {
     yaml += fmt::format("  {}: {:.4f}\n", joint, degrees(offset));
     delta += fmt::format("{:<24} {:+.4f}\n", joint, degrees(offset));
   }
   if (!correction.nuisances.empty()) {
-    yaml += "# Estimated beside the offsets; joints in rad, encoder - true. The offsets hold together with them.\nnuisance:\n";
-    for (const auto& [name, value] : correction.nuisances) yaml += fmt::format("  {}: {:.6g}\n", name, value);
+    yaml += "# Estimated beside the offsets; joints in rad, encoder - true. Arm and head offsets hold together:\n"
+            "# apply both or neither.\nnuisance:\n";
+    std::string head;
+    for (const auto& [name, value] : correction.nuisances) {
+      yaml += fmt::format("  {}: {:.6g}\n", name, value);
+      if (is_one_of(setup.head_joints, name)) head += fmt::format("{:<24} {:+.4f}\n", name, degrees(value));
+    }
+    if (!head.empty()) delta += "# head; holds together with the arm: apply both or neither\n" + head;
   }
   yaml += "stddev_deg:\n";
   for (const auto& [joint, sd] : correction.sd_rad) yaml += fmt::format("  {}: {:.4f}\n", joint, degrees(sd));
   write_text(out / "offsets.yaml", yaml);
   write_text(out / "calibration_delta.txt", delta);
   std::string files =
+      warnings +
       fmt::format("corrected URDF        {}\noffsets by joint      {}\niCub calibrationDelta {}\n",
                   (out / "corrected.urdf").string(), (out / "offsets.yaml").string(),
                   (out / "calibration_delta.txt").string());

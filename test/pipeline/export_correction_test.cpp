@@ -33,7 +33,16 @@ class ExportCorrection : public ::testing::Test {
   }
   void write_summary(const std::string& more = "") const {
     std::ofstream(folder_ / "summary.json")
-        << R"({"estimate": {"offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1}})" << more << "}";
+        << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1}})"
+        << more << "}";
+  }
+  /// Exports a replay that ended so, with a well and a badly known joint and what stood beside them.
+  std::string export_of(const std::string& state, bool anyway = false) const {
+    std::ofstream(folder_ / "summary.json")
+        << R"({"estimate": {"state": ")" << state << R"(", "offset_deg": {"r_elbow": -2.0, "r_wrist_yaw": 3.0},
+          "stddev_deg": {"r_elbow": 0.1, "r_wrist_yaw": 1.234},
+          "nuisance": {"neck_pitch": 0.05, "mesh_scale": 0.01}}})";
+    return export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out", anyway);
   }
   ~ExportCorrection() override { fs::remove_all(folder_); }
   fs::path folder_;
@@ -83,7 +92,7 @@ TEST_F(ExportCorrection, TheCorrectedUrdfGivesTheCorrectedPose) {
 
 TEST_F(ExportCorrection, WritesThreeFilesAndRefusesWhatDoesNotFit) {
   std::ofstream(folder_ / "summary.json")
-      << R"({"estimate": {"offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1}}})";
+      << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1}}})";
   export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
   std::ifstream yaml(folder_ / "out/offsets.yaml");
   const std::string text((std::istreambuf_iterator<char>(yaml)), {});
@@ -91,10 +100,52 @@ TEST_F(ExportCorrection, WritesThreeFilesAndRefusesWhatDoesNotFit) {
   EXPECT_TRUE(fs::exists(folder_ / "out/calibration_delta.txt"));
 
   std::ofstream(folder_ / "summary.json")
-      << R"({"estimate": {"offset_deg": {"no_joint": 1.0}, "stddev_deg": {}}})";
+      << R"({"estimate": {"state": "converged", "offset_deg": {"no_joint": 1.0}, "stddev_deg": {}}})";
   EXPECT_THROW(export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out"), FileError);
   std::ofstream(folder_ / "summary.json") << "{}";
   EXPECT_THROW(export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out"), FileError);
+}
+
+TEST_F(ExportCorrection, AReplayThatDidNotEndConvergedIsOnlyAppliedAnyway) {
+  for (const std::string state : {"diverged", "hand_not_in_view", "converging", "learning_background"}) {
+    try {
+      export_of(state);
+      ADD_FAILURE() << "no error: " << state;
+    } catch (const DataError& e) {
+      EXPECT_EQ(e.what(), (folder_ / "summary.json").string() + ": the replay ended as '" + state +
+                              "'; its offsets are not to be applied (--anyway)");
+    }
+    EXPECT_FALSE(fs::exists(folder_ / "out/offsets.yaml"));
+  }
+  const std::string warning = "the replay ended as 'diverged'";
+  EXPECT_THAT(export_of("diverged", true), ::testing::HasSubstr(warning));
+  for (const char* file : {"out/offsets.yaml", "out/calibration_delta.txt", "out/corrected.urdf"}) {
+    EXPECT_THAT(content(file), ::testing::HasSubstr(warning)) << file;
+  }
+  EXPECT_THAT(export_of("converged"), ::testing::Not(::testing::HasSubstr("ended as")));
+}
+
+TEST_F(ExportCorrection, AJointThatTheMotionHardlyToldIsNamedInEveryFile) {
+  const std::string warning = "r_wrist_yaw: known to 1.23 deg only (one sigma); this motion hardly told it";
+  const std::string printed = export_of("converged");
+  EXPECT_THAT(printed, ::testing::HasSubstr(warning));
+  EXPECT_THAT(printed, ::testing::Not(::testing::HasSubstr("r_elbow")));
+  for (const char* file : {"out/offsets.yaml", "out/calibration_delta.txt", "out/corrected.urdf"}) {
+    EXPECT_THAT(content(file), ::testing::HasSubstr(warning)) << file;
+  }
+  EXPECT_NO_THROW(Configuration::load(folder_ / "out/offsets.yaml"));
+  RobotModelOptions options = setup_.model;
+  options.urdf = folder_ / "out/corrected.urdf";
+  EXPECT_NO_THROW(RobotModel::load(options));
+}
+
+// Arm and head offsets hold together: a calibrator that gets one without the other is wrong.
+TEST_F(ExportCorrection, TheCalibrationDeltaHoldsTheHeadJointsToo) {
+  export_of("converged");
+  const std::string delta = content("out/calibration_delta.txt");
+  EXPECT_THAT(delta, ::testing::ContainsRegex("r_elbow +-2.0000"));
+  EXPECT_THAT(delta, ::testing::ContainsRegex("neck_pitch +\\+2.8648"));
+  EXPECT_THAT(delta, ::testing::Not(::testing::HasSubstr("mesh_scale")));
 }
 
 TEST_F(ExportCorrection, TheUrdfHoldsWhatItCanOfAnExtendedModel) {

@@ -41,7 +41,7 @@ struct EstimatorOptions {
   double memory_frames = 300.0;      ///< best: frames after which a picture counts 1/e
   double lock_distance = 0.15;       ///< best: Hammoude distance below which frames are fused
   double lock_rms_px = 1.5;          ///< best: outline residual below which frames are fused
-  double converged_hand_sd_m = 1e-3; ///< best: state `converged` below this
+  double converged_hand_sd_m = 1e-3; ///< best: state `converged` below this; as Estimate::hand_sd_m
   std::size_t min_mask_px = 150;     ///< fewer observed pixels in all: hand not in view
 
   /// Reads the sections `estimator`, `filter` and `silhouette`. Throws ConfigurationError.

@@ -22,14 +22,14 @@ class StalledEncoders {
   /// @param remembers  whether there is such a memory, be it doubted at the moment
   void look(const Eigen::VectorXd& reading_rad, const Eigen::VectorXd& offset_rad, const Eigen::VectorXd& sd_rad,
             bool fits, bool settled, bool remembers);
-  /// How far each offset has run in the last second (at 30 Hz) under a reading that stands, radians; zero
+  /// How far each offset has run in 30 frames (a second at 30 Hz) under a reading that stands, radians; zero
   /// for joints whose reading moves. A memory of frames lags behind a moving arm by about as much, which
   /// its own covariance does not tell.
   [[nodiscard]] const Eigen::VectorXd& drift_rad() const { return drift_rad_; }
-  /// Whether a joint has been seen to move under a reading that stands, in the last second: a slip of an
+  /// Whether a joint has been seen to move under a reading that stands, in the last 30 frames: a slip of an
   /// arm at rest, or the beginning of a stall.
   [[nodiscard]] bool doubtful() const { return doubtful_; }
-  /// Whether a memory had to be dropped in the last second while a reading stood. If its encoder stalls, a
+  /// Whether a memory had to be dropped in the last 30 frames while a reading stood. If its encoder stalls, a
   /// young memory holds frames that no one set of offsets explains, and the other joints make up for it.
   [[nodiscard]] bool dropped_while_standing() const { return dropped_while_standing_; }
   /// Whether an encoder stalls or may be about to be found out.

@@ -27,6 +27,8 @@ struct Correction {
   std::vector<std::pair<std::string, double>> sd_rad;
   /// What was estimated beside them; head joints among them are corrected in the URDF too.
   std::vector<std::pair<std::string, double>> nuisances;
+  /// What whoever applies it must know, one line each; stands in every file.
+  std::vector<std::string> warnings;
 
   // What an extended model adds that a URDF can hold.
   std::vector<std::pair<std::string, double>> known_offsets_rad;  ///< encoder - true, by joint
@@ -41,8 +43,10 @@ struct AppliedEffect {
   std::string remark;   ///< why not, or what else can be done
 };
 
-/// Reads the final offsets from a replay's `summary.json`. Throws FileError naming file and key.
-Correction read_correction(const std::filesystem::path& summary);
+/// Reads the final offsets from a replay's `summary.json`; warns of joints that are hardly known.
+/// @param anyway  also of a replay that did not end converged, with a warning
+/// Throws FileError naming file and key, DataError when the replay did not end converged.
+Correction read_correction(const std::filesystem::path& summary, bool anyway = false);
 
 /// Adds to `correction` what a URDF can hold of an extended model, and says of every effect where it
 /// went. Joint offsets are left out: those of the replay count.
@@ -61,12 +65,13 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
                           const std::filesystem::path& out);
 
 /// Writes `offsets.yaml` (by joint, deg), `corrected.urdf` and `calibration_delta.txt` (what to add
-/// to each joint's calibrationDelta in an iCub's calibrator file, deg) into `out`. With an extended
-/// model in `setup` also `cameras.yaml` (where it changes intrinsics) and `what_was_applied.txt`:
+/// to each joint's calibrationDelta in an iCub's calibrator file, deg) into `out`, head joints that
+/// were estimated included: arm and head offsets hold together. With an extended model in `setup` also `cameras.yaml` (where it changes intrinsics) and `what_was_applied.txt`:
 /// which of its effects these files hold, and which only work where the model itself is loaded.
-/// Throws ConfigurationError when the summary was made with another extended model than `setup` has.
-/// Returns the files, for people.
+/// Throws as read_correction does, and ConfigurationError when the summary was made with another
+/// extended model than `setup` has. Returns warnings and files, for people.
 std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup,
-                              const StereoRig& rig, const std::filesystem::path& out);
+                              const StereoRig& rig, const std::filesystem::path& out,
+                              bool anyway = false);
 
 }  // namespace bodyschema
