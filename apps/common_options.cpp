@@ -29,6 +29,10 @@ void CommonOptions::add_extended_model_to(CLI::App& app) {
 
 Configuration CommonOptions::load() const {
   set_up_logging(log_level);
+  return Configuration::load(find_data_file(config), choices());
+}
+
+std::vector<std::string> CommonOptions::choices() const {
   std::vector<std::string> all = overrides;
   if (!engine.empty()) all.push_back("silhouette.engine=" + engine);
   if (!mode.empty()) all.push_back("estimator.mode=" + mode);
@@ -38,7 +42,7 @@ Configuration CommonOptions::load() const {
     for (const char c : extended_model) quoted += c == '\'' ? "''" : std::string(1, c);
     all.push_back("robot.extended_model='" + quoted + "'");
   }
-  return Configuration::load(find_data_file(config), all);
+  return all;
 }
 
 namespace {

@@ -24,6 +24,8 @@ struct CommonOptions {
   void add_extended_model_to(CLI::App& app);
   /// The configuration with the command line's choices on top.
   [[nodiscard]] Configuration load() const;
+  /// Those choices as overrides, "filter.particles=500".
+  [[nodiscard]] std::vector<std::string> choices() const;
 };
 
 /// How --help is laid out in every program: as CLI11 does, without saying a value's type twice.

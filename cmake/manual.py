@@ -97,7 +97,7 @@ def man_page(page, version, names):
             lines += [".PP", f"Each has its own page: {related}."]
     others = ", ".join(f"{roff(name)}(1)" for name in names if name != page.name)
     lines += [".SH SEE ALSO", *([others + ","] if others else []), "the pages in",
-              roff("/usr/share/doc/bodyschema/")]
+              roff("/usr/share/doc/bodyschema/docs/")]
     return "\n".join(lines) + "\n"
 
 

@@ -35,6 +35,7 @@ void add_evaluate(CLI::App& app) {
   command->add_option("-o,--out", a->out, "Folder for summary.json and report.html")->required();
   a->common.add_to(*command);
   command->get_option("--config")->required(false);
+  command->remove_option(command->get_option("--mode"));  // every experiment runs the modes it compares
   command->callback([a] {
     const Configuration configuration = a->common.load();
     if (a->common.print_config) {
@@ -42,6 +43,7 @@ void add_evaluate(CLI::App& app) {
       return;
     }
     a->options.out = a->out;
+    a->options.overrides = a->common.choices();
     const char* data = std::getenv("BODYSCHEMA_DATA");
     if (data != nullptr) a->options.data = data;
     const auto recorded = find_data_file("config");

@@ -5,8 +5,10 @@ from bodyschema import joint_offsets_t
 
 def show(channel, data):
     offsets = joint_offsets_t.decode(data)
-    print(offsets.state, *(f"{n} {math.degrees(m):+.2f}" for n, m in
-                           zip(offsets.joint_name, offsets.mean_rad)), flush=True)
+    if offsets.state == "converged":  # in any other state they are not to be relied on
+        print(*(f"{n} {math.degrees(m):+.2f}" for n, m in zip(offsets.joint_name, offsets.mean_rad)), flush=True)
+    else:
+        print(f"{offsets.state}: not to be used", flush=True)
 
 bus = lcm.LCM(os.environ.get("LCM_DEFAULT_URL", "udpm://239.255.76.67:7667?ttl=0"))
 bus.subscribe("ICUB_JOINT_OFFSETS", show)

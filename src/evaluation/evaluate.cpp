@@ -42,6 +42,9 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   const Pipeline reader(simulated);
   simulator::SimulatorSettings::from(simulated.section("simulator"));
   simulated.reject_unknown_keys();
+  if (reader.options().mode != EstimatorMode::kBest) {
+    throw ConfigurationError("estimator.mode: 'paper' changes nothing here: every experiment runs the modes it compares");
+  }
 
   std::error_code error;
   std::filesystem::create_directories(options.out, error);

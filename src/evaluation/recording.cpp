@@ -68,6 +68,17 @@ fs::path diagnose_into(const Configuration& configuration, const fs::path& log, 
   return out / "extended_model.yaml";
 }
 
+/// The choices about estimating. Robot, cameras and bus of the recording are its own.
+std::vector<std::string> about_estimating(const std::vector<std::string>& overrides) {
+  std::vector<std::string> chosen;
+  for (const auto& one : overrides) {
+    const std::string section = one.substr(0, one.find_first_of(".="));
+    if (section == "robot" || section == "cameras" || section == "bus" || section == "simulator") continue;
+    chosen.push_back(one);
+  }
+  return chosen;
+}
+
 void show(ExperimentContext& context, const std::string& title, const RecordingResult& result) {
   context.report.heading("recording: " + title);
   Chart chart;
@@ -209,11 +220,11 @@ void run_recording(ExperimentContext& context) {
                             Case{"nominal", "icub_unity/estimator_v1.yaml", "nominal robot (icub_v1)"},
                             Case{"nominal_diagnosed", "icub_unity/estimator_v1.yaml", "nominal robot, diagnosed", {}, {"best"},
                                  true}}) {
-    std::vector<std::string> extension;
+    std::vector<std::string> choices = about_estimating(context.options.overrides);
     if (robot.diagnosed) {
-      const auto model = diagnose_into(Configuration::load(context.recorded / robot.file), log.path(),
+      const auto model = diagnose_into(Configuration::load(context.recorded / robot.file, choices), log.path(),
                                        context.options.out / "recording_nominal_diagnosis");
-      extension.push_back("robot.extended_model=" + fs::absolute(model).string());
+      choices.push_back("robot.extended_model=" + fs::absolute(model).string());
     }
     for (const auto& mode : robot.modes) {
       // The published filter is random: its figure is the median of ten seeds.
@@ -221,8 +232,8 @@ void run_recording(ExperimentContext& context) {
       std::vector<double> px, mm, deg, online;
       RecordingResult result;
       for (int seed = 1; seed <= seeds; ++seed) {
-        std::vector<std::string> overrides = robot.overrides;
-        overrides.insert(overrides.end(), extension.begin(), extension.end());
+        std::vector<std::string> overrides = choices;
+        overrides.insert(overrides.end(), robot.overrides.begin(), robot.overrides.end());
         overrides.push_back("estimator.mode=" + mode);
         overrides.push_back("filter.seed=" + std::to_string(seed));
         if (mode == "paper") overrides.push_back("filter.initial_sd_deg=10");
@@ -248,7 +259,7 @@ void run_recording(ExperimentContext& context) {
                                    result.uncorrected.mm, final_px, final_mm, final_deg, online_px);
     }
   }
-  context.table += fmt::format("{:<38} {:>16} {:>16}\n", "authors' published estimate", "", "16.3 / 17.3");
+  context.table += "published, not measured here: the recording's authors, in their own model, are 16.3 px / 17.3 mm off\n";
 }
 
 }  // namespace bodyschema

@@ -272,7 +272,6 @@ class Replay {
     // The last tenth of the frames, at most 30, as the estimate was then; and the final estimate
     // applied to every frame of the log.
     const std::size_t tail = std::clamp<std::size_t>(online_.size() / 10, 1, 30);
-    const std::array<std::string, 2> names = {"left", "right"};
     std::string table = fmt::format("\n{:<34} {:>16} {:>16} {:>18} {:>18}\n", "error, before -> after",
                                     "position mm", "rotation deg", "fingertips mm", "fingertips px");
     const bool tips = !pipeline_.setup().fingertip_links.empty();
@@ -285,6 +284,7 @@ class Replay {
                            cell(t.rotation_deg), tips ? cell(t.tip_mm) : "-", tips ? cell(t.tip_px) : "-");
     };
     for (std::size_t c = 0; c < pipeline_.rig().cameras.size(); ++c) {
+      const std::string& name = pipeline_.rig().cameras[c].name;
       ErrorTotals last_frames;
       for (std::size_t i = online_.size() - tail; i < online_.size(); ++i) {
         if (online_[i][c]) last_frames.add(online_[i][c]->first, online_[i][c]->second);
@@ -298,10 +298,10 @@ class Replay {
         all.add(hand_error(pipeline_.estimator().hand_pose(frame.exposure(c), c, false), *truth, c, intrinsics),
                 hand_error(pipeline_.estimator().hand_pose(frame.exposure(c), c, true), *truth, c, intrinsics));
       }
-      row(fmt::format("{} eye, last {} frames", names[c], tail), last_frames);
-      row(fmt::format("{} eye, final offsets, all frames", names[c]), all);
-      summary["errors"][names[c]] = {{"last_frames", last_frames.json()},
-                                     {"final_on_all_frames", all.json()}};
+      row(fmt::format("{} eye, last {} frames", name, tail), last_frames);
+      row(fmt::format("{} eye, final offsets, all frames", name), all);
+      summary["errors"][name] = {{"last_frames", last_frames.json()},
+                                {"final_on_all_frames", all.json()}};
     }
     return table;
   }

@@ -229,7 +229,7 @@ std::string robot_yaml(const StarterOptions& options, const Parts& parts,
 std::string estimator_yaml(const StarterOptions& options) {
   return fmt::format(
       "# The included files of config/ are the installed ones and explain every key.\n"
-      "include: [config/estimator.yaml, config/bus.yaml, config/icub_right/vision.yaml, "
+      "include: [config/estimator.yaml, config/bus.yaml, config/vision.yaml, "
       "robot.yaml]\n"
       "vision:\n"
       "  method: statistics                # or single_colour, learned_background: "

@@ -77,7 +77,7 @@ bool FramePublisher::publish(const SimulatedFrame& frame, MessageSink& sink, con
     const CameraFrame& camera = *frame.cameras[c];
     const Microseconds utime = camera.utime + options_.utime_shift;
     last_shutter = std::max(last_shutter, camera.utime);
-    images.image_types.push_back(c == 0 ? bot_core::images_t::LEFT : bot_core::images_t::RIGHT);
+    images.image_types.push_back(camera.name == "right" ? bot_core::images_t::RIGHT : bot_core::images_t::LEFT);
     switch (options_.format) {
       case PictureFormat::kRgb: images.images.push_back(to_message(camera.image, utime)); break;
       case PictureFormat::kGray: images.images.push_back(to_message(to_gray(camera.image), utime)); break;
@@ -131,6 +131,7 @@ TruthWriter::TruthWriter(std::filesystem::path file, const Simulator& simulator,
   Json cameras = Json::array();
   for (const auto& camera : robot.body().cameras) {
     const auto& k = camera.intrinsics;
+    camera_names_.push_back(camera.name);
     cameras.push_back({{"name", camera.name}, {"width", k.width}, {"height", k.height}, {"fx", k.fx}, {"fy", k.fy},
                        {"cx", k.cx}, {"cy", k.cy}, {"distortion", camera.distortion}});
   }
@@ -171,7 +172,7 @@ void TruthWriter::add(const SimulatedFrame& frame) {
   for (const auto& tip_C : first.fingertips_C) tips_P.push_back(first.X_CP.inverse(Eigen::Isometry) * tip_C);
   line["fingertips_in_hand_m"] = list(tips_P);
   for (std::size_t c = 0; c < frame.truth.size(); ++c) {
-    const std::string side = c == 0 ? "left" : "right";
+    const std::string& side = camera_names_[c];
     const CameraTruth& truth = frame.truth[c];
     line["hand_in_" + side + "_camera"] = rows(truth.X_CP);
     line["fingertips_in_" + side + "_camera_m"] = list(truth.fingertips_C);

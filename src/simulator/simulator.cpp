@@ -348,6 +348,7 @@ std::optional<SimulatedFrame> Simulator::next() {
     const auto& dies = s.plan.camera_dies;
     if (dies && dies->first == c && stamp_s >= s.when.motion_begin_s + dies->second) continue;
     frame.cameras[c].emplace();
+    frame.cameras[c]->name = s.rig.cameras[c].name;
     frame.cameras[c]->utime = s.utime(stamp_s);
   }
   const auto shoot = [&](std::size_t c) {

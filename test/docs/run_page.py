@@ -49,7 +49,7 @@ def main():
         return SKIPPED
     output, runs = "", 0
     for kind, content in BLOCK.findall(text):
-        content = content.replace("/usr/share/doc/bodyschema", str(source / "docs"))
+        content = content.replace("/usr/share/doc/bodyschema", str(source))
         content = content.replace("/usr/share/bodyschema", str(source))
         content = content.replace("/etc/bodyschema", str(source / "config/icub_right"))
         if kind == "sh":

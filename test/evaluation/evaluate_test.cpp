@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
 
 #include "bodyschema/core/error.hpp"
@@ -12,11 +13,12 @@ namespace {
 
 using ::testing::HasSubstr;
 
+const std::filesystem::path kConfigs = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config";
+
 /// The message of the error that evaluating with such arguments ends in; nothing may be written.
 std::string refusal(const std::string& experiment, const std::vector<std::string>& overrides) {
   const auto out = std::filesystem::temp_directory_path() / "bodyschema-evaluate-refused";
-  const std::filesystem::path file =
-      std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml";
+  const std::filesystem::path file = kConfigs / "icub_right/evaluation.yaml";
   EvaluationOptions options;
   options.experiment = experiment;
   options.trials = 1;
@@ -38,6 +40,29 @@ TEST(Evaluate, AMistypedExperimentIsNamedWithTheNearestOne) {
 TEST(Evaluate, AMistypedKeyIsAnErrorBeforeTheWork) {
   EXPECT_THAT(refusal("likelihood", {"filter.particless=10"}), HasSubstr("did you mean 'filter.particles'"));
   EXPECT_THAT(refusal("likelihood", {"simulator.blurr_px=1"}), HasSubstr("simulator.blurr_px"));
+}
+
+TEST(Evaluate, AModeIsRefusedAsEveryExperimentRunsItsOwn) {
+  EXPECT_THAT(refusal("likelihood", {"estimator.mode=paper"}), HasSubstr("estimator.mode: 'paper'"));
+}
+
+TEST(Evaluate, WhatIsSetAboutEstimatingReachesTheRecordingToo) {
+  const char* data = std::getenv("BODYSCHEMA_DATA");
+  EvaluationOptions options;
+  options.experiment = "recording";
+  options.data = data != nullptr ? std::filesystem::path(data)
+                                 : std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "../shared/data";
+  if (!std::filesystem::exists(options.data / "eyehand-sim/truth.json")) GTEST_SKIP() << "no recording";
+  options.out = std::filesystem::path(testing::TempDir()) / "bodyschema-evaluate-recording";
+  // The simulator's robot is another one; how it is estimated is not.
+  options.overrides = {"robot.urdf=/nowhere.urdf", "simulator.seed=1", "filter.particles=minus_one"};
+  try {
+    evaluate(Configuration::load(kConfigs / "icub_right/evaluation.yaml"), kConfigs, options);
+    ADD_FAILURE() << "no error";
+  } catch (const ConfigurationError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("filter.particles"));
+  }
+  std::filesystem::remove_all(options.out);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 # Run by ctest (see tests.cmake): the pages agree with the tree. Every storey is described, in order;
-# every link to a file leads somewhere.
+# every link to a file or a heading leads somewhere.
 file(READ ${SOURCE_DIR}/docs/architecture.md page)
 string(REGEX MATCHALL "\n\\| `[a-z_]+` \\|" rows "${page}")
 string(REGEX REPLACE "[^a-z_;]" "" rows "${rows}")
@@ -7,20 +7,9 @@ if(NOT rows STREQUAL "${STOREYS}")
   message(SEND_ERROR "docs/architecture.md describes\n  ${rows}\nbut the storeys are\n  ${STOREYS}")
 endif()
 
+include(${CMAKE_CURRENT_LIST_DIR}/links.cmake)
 file(GLOB_RECURSE pages ${SOURCE_DIR}/docs/*.md)
-foreach(page IN LISTS pages ITEMS ${SOURCE_DIR}/README.md)
-  file(READ ${page} text)
-  get_filename_component(folder ${page} DIRECTORY)
-  # CMake takes a bracket inside a list for a quotation, so the mark goes first.
-  string(REGEX REPLACE "\\]\\(" " leads-to=" text "${text}")
-  string(REGEX MATCHALL " leads-to=[^][;)#: ]+" links "${text}")
-  foreach(link IN LISTS links)
-    string(REPLACE " leads-to=" "" link "${link}")
-    if(NOT EXISTS ${folder}/${link})
-      message(SEND_ERROR "${page}: the link to ${link} leads nowhere")
-    endif()
-  endforeach()
-endforeach()
+check_links(${pages} ${SOURCE_DIR}/README.md ${SOURCE_DIR}/SECURITY.md ${SOURCE_DIR}/bench/README.md)
 
 # The port that the page on the service names is the one that its unit opens.
 file(READ ${SOURCE_DIR}/docs/launch_at_boot.md page)

@@ -19,7 +19,10 @@ foreach(path IN ITEMS
     usr/share/bodyschema/lcmtypes/bodyschema_joint_offsets_t.lcm
     usr/share/bodyschema/python/bodyschema/joint_offsets_t.py
     usr/lib/cmake/bodyschema/bodyschemaConfig.cmake
-    usr/include/bodyschema/robot/robot_model.hpp)
+    usr/include/bodyschema/robot/robot_model.hpp
+    usr/share/doc/bodyschema/README.md usr/share/doc/bodyschema/SECURITY.md
+    usr/share/doc/bodyschema/bench/README.md
+    usr/share/doc/bodyschema/docs/README.md usr/share/doc/bodyschema/docs/launch_at_boot.md)
   if(NOT EXISTS ${SCRATCH_DIR}/content/${path})
     message(SEND_ERROR "the package lacks ${path}")
   endif()
@@ -43,6 +46,11 @@ if(BUILD_TYPE STREQUAL "Release")
     endif()
   endforeach()
 endif()
+
+# Every link of an installed page leads somewhere.
+file(GLOB_RECURSE pages ${SCRATCH_DIR}/content/usr/share/doc/bodyschema/*.md)
+include(${CMAKE_CURRENT_LIST_DIR}/links.cmake)
+check_links(${pages})
 
 # The libraries that the programs link are dependencies; found by dpkg-shlibdeps.
 file(STRINGS ${SCRATCH_DIR}/control/control depends REGEX "^Depends:")

@@ -12,12 +12,14 @@ set_tests_properties(install.consumer PROPERTIES LABELS install TIMEOUT 300)
 find_package(Python3 COMPONENTS Interpreter QUIET)
 if(TARGET lcmtypes_python AND Python3_FOUND)
   # Skipped where PyPI's lcm cannot be installed or there is no route for multicast.
-  add_test(NAME install.python_example
-    COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/install/python_example.py
-      ${PROJECT_SOURCE_DIR}/docs/examples/listen.py
-      ${PROJECT_BINARY_DIR}/lcmtypes-python ${PROJECT_BINARY_DIR}/venv-lcm)
-  set_tests_properties(install.python_example PROPERTIES LABELS install TIMEOUT 240
-    SKIP_RETURN_CODE 77)
+  foreach(example IN ITEMS listen publish)
+    add_test(NAME install.python_example_${example}
+      COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/install/python_example.py
+        ${PROJECT_SOURCE_DIR}/docs/examples/${example}.py
+        ${PROJECT_BINARY_DIR}/lcmtypes-python ${PROJECT_BINARY_DIR}/venv-lcm)
+    set_tests_properties(install.python_example_${example} PROPERTIES LABELS install TIMEOUT 240
+      SKIP_RETURN_CODE 77 RESOURCE_LOCK venv-lcm)
+  endforeach()
 
   # Skipped where PyPI's mcap, the official reader, cannot be installed.
   add_test(NAME install.mcap_reads_back

@@ -97,6 +97,43 @@ TEST_F(ReplayTest, WritesEstimatesSummaryAndPictures) {
   EXPECT_FALSE(fs::is_empty(o.out / "masks"));
 }
 
+TEST_F(ReplayTest, ARigWithARightCameraAloneIsSimulatedAndReplayedUnderItsName) {
+  std::string yaml = Configuration::load(kConfig).print();
+  const auto left = yaml.find("left: {", yaml.find("cameras:"));
+  ASSERT_NE(left, std::string::npos);
+  yaml.erase(left, yaml.find("right: {", left) - left);
+  const Configuration right_only = Configuration::parse(yaml, kConfig.parent_path());
+  const RobotSetup setup = RobotSetup::from(right_only.section("robot"));
+  const StereoRig rig = StereoRig::from(right_only.section("cameras"));
+  ASSERT_EQ(rig.cameras.size(), 1u);
+  simulator::SimulationPlan plan;
+  plan.seed = 3;
+  plan.frames = 12;
+  plan.offsets_deg = {{"r_elbow", 4}};
+  ReplayOptions o;
+  o.log = folder_ / "right.log";
+  o.out = folder_ / "right";
+  o.truth = folder_ / "right.json";
+  {
+    simulator::Simulator simulator(setup.load(), setup, rig,
+                                   simulator::SimulatorSettings::from(right_only.section("simulator")), plan);
+    LogWriter log(o.log);
+    simulator::FramePublisher publisher(simulator.joint_names(), {});
+    simulator::TruthWriter truth(*o.truth, simulator, setup);
+    while (auto frame = simulator.next()) {
+      publisher.publish(*frame, log);
+      truth.add(*frame);
+    }
+    truth.close();
+  }
+  const std::string table = replay(right_only, o);
+  EXPECT_THAT(table, HasSubstr("right eye, last"));
+  EXPECT_THAT(table, ::testing::Not(HasSubstr("left eye")));
+  const auto summary = nlohmann::json::parse(content(o.out / "summary.json"));
+  EXPECT_FALSE(summary["errors"].contains("left"));
+  EXPECT_LT(summary["errors"]["right"]["last_frames"]["position_mm"]["after"].get<double>(), 5.0);
+}
+
 TEST_F(ReplayTest, TwoReplaysAreIdenticalWhateverTheThreads) {
   replay(configuration({"silhouette.threads=1"}), options("a"));
   for (const char* threads : {"silhouette.threads=2", "silhouette.threads=3"}) {

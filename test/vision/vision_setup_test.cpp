@@ -57,8 +57,8 @@ TEST(VisionSetup, RefusesNonsense) {
 }
 
 TEST(VisionSetup, ShippedFilesAreReadInFull) {
-  for (const char* robot : {"icub_right", "icub_unity", "icub_v2_5"}) {
-    const auto file = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config" / robot / "vision.yaml";
+  for (const char* name : {"vision.yaml", "icub_unity/vision.yaml"}) {
+    const auto file = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config" / name;
     const auto configuration = Configuration::load(file);
     EXPECT_NO_THROW(VisionSetup::from(configuration.section("vision"))) << file;
     EXPECT_NO_THROW(configuration.reject_unknown_keys()) << file;

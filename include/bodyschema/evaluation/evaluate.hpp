@@ -19,6 +19,9 @@ struct EvaluationOptions {
   /// The recording eyehand-sim and the official models; experiments that need them are skipped
   /// where the folder is absent.
   std::filesystem::path data;
+  /// Choices of the command line ("filter.particles=500"), in force in `simulated` already. Those about
+  /// estimating are applied to the recording's robots too; its robot, cameras and bus are its own.
+  std::vector<std::string> overrides;
 };
 
 /// Names accepted by EvaluationOptions::experiment, with one line about each.

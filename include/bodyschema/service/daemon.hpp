@@ -27,8 +27,8 @@ struct DaemonOptions {
 /// `load_configuration` again and starts estimating anew with it; a configuration that cannot be
 /// used is refused and work goes on as before.
 ///
-/// Three threads: one receives (Receiver), the calling one estimates and publishes, one says how
-/// things are once a second. Changes the process's signal handlers while it runs. Throws Error.
+/// Three threads of its own: one receives (Receiver), the calling one estimates and publishes, one says
+/// how things are once a second; scorer, look-ahead, recorder and page have theirs. Changes the process's signal handlers while it runs. Throws Error.
 void run_daemon(const std::function<Configuration()>& load_configuration, const DaemonOptions& options);
 
 }  // namespace bodyschema

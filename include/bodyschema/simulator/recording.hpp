@@ -48,6 +48,7 @@ class FramePublisher {
 ///                   "hand_in_left_camera": 4x4, "hand_in_right_camera": 4x4,
 ///                   "fingertips_in_hand_m", "fingertips_in_left_camera_m", "fingertips_px_left", ..}] }
 ///
+/// Of a rig with one camera, only that one is there, under its name.
 /// `utime` is the stamp of the frame's first picture; joints and poses are those of the moment of
 /// exposure. One thread.
 class TruthWriter {
@@ -64,6 +65,7 @@ class TruthWriter {
   std::filesystem::path file_;
   std::ofstream stream_;
   std::vector<std::string> joint_names_;
+  std::vector<std::string> camera_names_;
   Microseconds utime_shift_;
   bool first_ = true;
 };

@@ -59,6 +59,7 @@ struct CameraTruth {
 
 /// One picture as a camera delivers it.
 struct CameraFrame {
+  std::string name;                     ///< the rig's: "left", "right"
   Microseconds utime = 0;               ///< stamp
   Image image;                          ///< RGB; empty unless Output::kPictures
   BinaryMask silhouette;                ///< exact; empty with Output::kJoints

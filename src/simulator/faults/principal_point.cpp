@@ -18,8 +18,7 @@ FaultKind principal_point() {
     return body_fault([=](TrueBody& body) {
       for (std::size_t c = 0; c < body.cameras.size(); ++c) {
         double share = 1.0;
-        if (source == "left") share = c == 0 ? 1.0 : 0.0;
-        if (source == "right") share = c == 1 ? 1.0 : 0.0;
+        if (source == "left" || source == "right") share = body.cameras[c].name == source ? 1.0 : 0.0;
         if (source == "difference") share = c == 0 ? 0.5 : -0.5;
         auto& k = body.cameras[c].intrinsics;
         (along_x ? k.cx : k.cy) += share * shift;
