@@ -82,6 +82,29 @@ class GenericFeatures {
   Eigen::Index joint_;
 };
 
+/// How often the arm's joints come: messages of head and arm may come at different rates, and a joint says
+/// something new only when it moves. The quicker quarter of the times between changes; the mean period of
+/// all messages while nothing changes.
+double arm_period_s(std::span<const JointSample> stream, const JointRoles& roles) {
+  if (stream.size() < 2) return 1e9;
+  std::vector<double> periods;
+  std::size_t last = 0;
+  for (std::size_t i = 1; i < stream.size(); ++i) {
+    const bool changed = std::any_of(roles.arm.begin(), roles.arm.end(), [&](const auto joint) {
+      return stream[i].q[joint] != stream[last].q[joint];
+    });
+    if (!changed) continue;
+    periods.push_back(seconds(stream[i].utime - stream[last].utime));
+    last = i;
+  }
+  if (periods.size() < 4) {
+    return seconds(stream.back().utime - stream.front().utime) / static_cast<double>(stream.size() - 1);
+  }
+  const auto quarter = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 4);
+  std::nth_element(periods.begin(), quarter, periods.end());
+  return *quarter;
+}
+
 }  // namespace
 
 bool is_excluded(const std::vector<NotTestable>& excluded, const CauseName& cause) {
@@ -156,7 +179,6 @@ CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at,
     }
   }
 
-  const auto acceleration = accelerations(source);
   const int harmonics = std::clamp(static_cast<int>((end - begin) * 0.4), 3, 24);
   for (const auto joint : roles.arm) {
     const auto& name = roles.names[static_cast<std::size_t>(joint)];
@@ -169,7 +191,7 @@ CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at,
       q[i] = at.instants[i].q[joint];
       v[i] = at.instants[i].qdot[joint];
       v_abs[i] = std::abs(v[i]);
-      a[i] = acceleration[i][joint];
+      a[i] = at.instants[i].qddot[joint];
       if (at.instants[i].gravity_torque.size() > 0) {
         torque[i] = at.instants[i].gravity_torque[joint];
         has_torque = true;
@@ -277,7 +299,9 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
       list.push_back({{"principal_point", "", source_name}, "the log has one camera"});
     }
   }
-  if (const double range = largest_range(source.views(), source.roles().head); range < kHeadStill) {
+  if (roles.head.empty()) {
+    exclude_all("base_shift", "the cameras do not move against the base: a shifted base looks like errors of their place");
+  } else if (const double range = largest_range(source.views(), roles.head); range < kHeadStill) {
     exclude_all("base_shift", "the head moved " + number(range / kDeg, 1) +
                                   " deg: a shifted base looks like errors of neck and eyes");
   }
@@ -286,11 +310,8 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
     exclude_all("compliance", "the robot's URDF has no masses");
     exclude_all("payload", "the robot's URDF has no masses, so the arm's compliance is unknown");
   }
-  const double rate_s = stream.size() > 1 ? seconds(stream.back().utime - stream.front().utime) /
-                                                static_cast<double>(stream.size() - 1)
-                                          : 1e9;
-  if (rate_s > kSparseEncoders_s) {
-    exclude_all("backlash", "encoders come every " + number(1e3 * rate_s, 0) +
+  if (const double period_s = arm_period_s(stream, roles); period_s > kSparseEncoders_s) {
+    exclude_all("backlash", "the arm's encoders come every " + number(1e3 * period_s, 0) +
                                 " ms; the direction of motion needs 100 Hz or more");
   }
   double speed_square = 0.0;

@@ -339,10 +339,10 @@ std::vector<CauseName> usual_nuisances(const JointRoles& roles) {
   std::vector<CauseName> list = {{"mesh_scale", "", ""}, {"silhouette_bias", "", ""},
                                  {"focal_length", "", ""}};
   if (!roles.fingers.empty()) list.push_back({"finger_posture", "", ""});
-  if (roles.head.size() >= 6) list.push_back({"vergence", "", ""});
-  if (roles.head.size() >= 4) {
+  if (roles.has_pans()) list.push_back({"vergence", "", ""});
+  if (roles.neck.size() >= 4) {
     for (const std::size_t i : {std::size_t{1}, std::size_t{3}}) {
-      list.push_back({"head_offset", roles.names[static_cast<std::size_t>(roles.head[i])], ""});
+      list.push_back({"head_offset", roles.names[static_cast<std::size_t>(roles.neck[i])], ""});
     }
   }
   return list;

@@ -165,7 +165,7 @@ struct ImageMeasurement::Worker {
 
 ImageMeasurement::ImageMeasurement(std::shared_ptr<const RobotModel> model, const RobotSetup& setup,
                                    const StereoRig& rig, int threads)
-    : setup_(setup), rig_(rig), roles_(JointRoles::of(model, setup)),
+    : setup_(setup), rig_(rig), roles_(JointRoles::of(model, setup, rig)),
       instants_(model, setup.hand_link, setup.gravity_W) {
   for (int t = 0; t < std::max(1, threads); ++t) {
     workers_.push_back(std::make_unique<Worker>(model, roles_, setup, rig));
@@ -203,7 +203,7 @@ void ImageMeasurement::add(const Observation& observation) {
   for (std::size_t c = 0; c < observation.cameras.size() && c < rig_.cameras.size(); ++c) {
     const auto& camera = observation.cameras[c];
     if (!camera || camera->mask.empty()) continue;
-    ViewInput view{camera->joints, c};
+    ViewInput view{camera->joints, c, {}};
     view.joints.utime = camera->utime;
     pictures.emplace_back(std::move(view), seen_of(*camera, rig_.cameras[c].intrinsics));
   }
@@ -217,8 +217,14 @@ void ImageMeasurement::add(const Observation& observation) {
   }
 }
 
+void ImageMeasurement::set_stream(std::vector<JointSample> stream) {
+  stream_ = std::move(stream);
+  set_motion(views_, stream_);
+}
+
 void ImageMeasurement::instant(std::size_t view, const Eigen::VectorXd& offsets, Instant& out) {
   instants_.build(views_[view].joints, views_[view].camera, offsets, out);
+  out.qddot = views_[view].qddot;
 }
 
 void ImageMeasurement::compress(std::span<const Corrections> corrections,

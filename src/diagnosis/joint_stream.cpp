@@ -1,7 +1,5 @@
 #include "joint_stream.hpp"
 
-#include <algorithm>
-
 namespace bodyschema::diagnosis {
 
 namespace {
@@ -35,23 +33,6 @@ void JointStream::take(Bytes message) {
   }
 }
 
-std::vector<JointSample> JointStream::finish() {
-  constexpr Microseconds kHalfWindow = 30'000;
-  std::size_t a = 0, b = 0;
-  for (std::size_t i = 0; i < stream_.size(); ++i) {
-    while (a < i && stream_[a].utime < stream_[i].utime - kHalfWindow)
-      ++a;
-    b = std::max(b, i);
-    while (b + 1 < stream_.size() && stream_[b + 1].utime <= stream_[i].utime + kHalfWindow)
-      ++b;
-    const std::size_t low = a == i && i > 0 ? i - 1 : a;
-    const std::size_t high = b == i && i + 1 < stream_.size() ? i + 1 : b;
-    if (high > low) {
-      stream_[i].qdot =
-          (stream_[high].q - stream_[low].q) / seconds(stream_[high].utime - stream_[low].utime);
-    }
-  }
-  return std::move(stream_);
-}
+std::vector<JointSample> JointStream::finish() { return std::move(stream_); }
 
 }  // namespace bodyschema::diagnosis

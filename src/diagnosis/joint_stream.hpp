@@ -17,8 +17,7 @@ class JointStream {
   JointStream(const RobotModel& robot, const RobotSetup& setup, const BusOptions& bus);
   /// A message that does not decode or names none of the robot's joints is left out.
   void take(Bytes message);
-  /// The samples, with velocities from the positions themselves, over 60 ms: publishers differ in
-  /// theirs.
+  /// The samples; velocities as published, which set_motion replaces.
   std::vector<JointSample> finish();
 
  private:

@@ -102,7 +102,7 @@ class LogDiagnosis {
     for (const auto& view : measurement_.views()) {
       for (const auto joint : roles.arm) speed = std::max(speed, std::abs(view.joints.qdot[joint]));
     }
-    if (speed < kStill_rad) {
+    if (speed < kStill_rad_s) {
       report.warnings.push_back("the arm stands still in every picture: nothing that depends on speed can be tested");
     }
   }
@@ -198,6 +198,7 @@ class LogDiagnosis {
   static constexpr double kCrowdThroughPictures = 1.0;
   static constexpr double kShapeError_px = 0.8;  ///< ... and where this is left, parts have another shape
   static constexpr double kStill_rad = 0.5 * kPi / 180.0;
+  static constexpr double kStill_rad_s = 0.5 * kPi / 180.0;
   static constexpr const char* kAdvice =
       " for 60 to 120 s: slow and fast, the same postures in both directions, 15 s of rest";
 

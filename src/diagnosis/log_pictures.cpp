@@ -33,7 +33,9 @@ class ModelSilhouettes {
   }
 
   BinaryMask at(const JointSample& joints, std::size_t camera) {
-    for (; next_ < stream_.size() && stream_[next_].utime <= joints.utime; ++next_) online_.observe(stream_[next_]);
+    for (; next_ < stream_.size() && stream_[next_].utime <= joints.utime + kAhead; ++next_) {
+      online_.observe(stream_[next_]);
+    }
     online_.corrections(joints, camera, corrections_);
     const Eigen::VectorXd q = joints.q - offsets_;
     std::vector<Eigen::Isometry3f> X_CB(body_.part_count());
@@ -42,6 +44,8 @@ class ModelSilhouettes {
   }
 
  private:
+  static constexpr Microseconds kAhead = 100'000;  ///< for the motion about an exposure
+
   OnlineErrorModel online_;
   Eigen::VectorXd offsets_;
   std::span<const JointSample> stream_;

@@ -23,8 +23,8 @@ constexpr Microseconds kPicturePeriod = 100'000;
 /// The motion of a log without its pictures.
 class Motion final : public MeasurementSource {
  public:
-  Motion(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup)
-      : roles_(JointRoles::of(model, setup)),
+  Motion(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup, const StereoRig& rig)
+      : roles_(JointRoles::of(model, setup, rig)),
         builder_(model, setup.hand_link, setup.gravity_W),
         no_offsets_(Eigen::VectorXd::Zero(model->joint_count())) {}
 
@@ -35,16 +35,20 @@ class Motion final : public MeasurementSource {
                ? observation.utime + kPicturePeriod
                : due_ + kPicturePeriod;
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
-      if (observation.cameras[c]) views_.push_back({observation.cameras[c]->joints, c});
+      if (observation.cameras[c]) views_.push_back({observation.cameras[c]->joints, c, {}});
     }
   }
-  void set_stream(std::vector<JointSample> stream) { stream_ = std::move(stream); }
+  void set_stream(std::vector<JointSample> stream) {
+    stream_ = std::move(stream);
+    set_motion(views_, stream_);
+  }
 
   const JointRoles& roles() const override { return roles_; }
   std::span<const ViewInput> views() const override { return views_; }
   std::span<const JointSample> stream() const override { return stream_; }
   void instant(std::size_t view, const Eigen::VectorXd& offsets, Instant& out) override {
     builder_.build(views_[view].joints, views_[view].camera, offsets, out);
+    out.qddot = views_[view].qddot;
   }
   void compress(std::span<const Corrections>, std::vector<CompressedView>& out) override {
     out.clear();
@@ -84,7 +88,7 @@ LogTestability testability_of(const Configuration& configuration,
   const auto rig = StereoRig::from(configuration.section("cameras"));
   const auto bus = BusOptions::from(configuration.section("bus"));
   const auto model = setup.load();
-  Motion motion(model, setup);
+  Motion motion(model, setup, rig);
   diagnosis::JointStream joints(*model, setup, bus);
   ObservationStream stream(model, setup, rig, bus);
   LogReader reader(log);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "bodyschema/effects/catalogue.hpp"
+#include "bodyschema/observation/joint_motion.hpp"
 
 namespace bodyschema {
 namespace {
@@ -173,6 +174,10 @@ Eigen::MatrixXd ViewCompressor::link_jacobian(std::size_t link) const {
     jacobian.col(column).tail<3>() << motion(2, 1), motion(0, 2), motion(1, 0);
   }
   return jacobian;
+}
+
+void set_motion(std::span<ViewInput> views, std::span<const JointSample> stream) {
+  for (auto& view : views) joint_motion(stream, view.joints.utime, view.joints.qdot, view.qddot);
 }
 
 double largest_range(std::span<const ViewInput> views, const std::vector<Eigen::Index>& joints) {

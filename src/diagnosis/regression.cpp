@@ -179,26 +179,4 @@ BlockStatistics accumulate(const std::vector<CompressedView>& views, const Block
   return BlockStatistics(std::move(result));
 }
 
-std::vector<Eigen::VectorXd> accelerations(const MeasurementSource& source) {
-  constexpr Microseconds kHalfWindow = 50'000;
-  const auto stream = source.stream();
-  std::vector<Eigen::VectorXd> result;
-  result.reserve(source.views().size());
-  for (const auto& view : source.views()) {
-    const auto find = [&](Microseconds t) {
-      auto at = std::lower_bound(stream.begin(), stream.end(), t,
-                                 [](const JointSample& s, Microseconds u) { return s.utime < u; });
-      if (at == stream.end() && at != stream.begin()) --at;
-      return at;
-    };
-    const auto a = find(view.joints.utime - kHalfWindow), b = find(view.joints.utime + kHalfWindow);
-    Eigen::VectorXd acceleration = Eigen::VectorXd::Zero(view.joints.q.size());
-    if (a != stream.end() && b != stream.end() && b->utime > a->utime) {
-      acceleration = (b->qdot - a->qdot) / seconds(b->utime - a->utime);
-    }
-    result.push_back(std::move(acceleration));
-  }
-  return result;
-}
-
 }  // namespace bodyschema::diagnosis

@@ -50,7 +50,4 @@ BlockStatistics accumulate(const std::vector<CompressedView>& views, const Block
                            const std::vector<const SparseColumn*>& columns,
                            std::size_t switchable = 0);
 
-/// Acceleration of every joint at every view, rad/s^2, from the velocities of the log.
-std::vector<Eigen::VectorXd> accelerations(const MeasurementSource& source);
-
 }  // namespace bodyschema::diagnosis

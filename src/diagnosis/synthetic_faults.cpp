@@ -66,8 +66,8 @@ void FaultyRobot::transmit(const TrialFault& fault, std::size_t index, double t_
     const double x = (motor[j] - kink_[index].first) / kink_[index].second;
     q[j] += fault.value * kDeg * std::exp(-0.5 * x * x);
   } else if (name == "vergence") {
-    q[roles_.head[4]] += 0.5 * fault.value * kDeg;
-    q[roles_.head[5]] -= 0.5 * fault.value * kDeg;
+    q[roles_.left_pan] += 0.5 * fault.value * kDeg;
+    q[roles_.right_pan] -= 0.5 * fault.value * kDeg;
   } else if (name == "head_offset") {
     q[j] += fault.value * kDeg;
   } else if (name == "finger_posture") {

@@ -26,7 +26,7 @@ class SyntheticLog final : public SyntheticMeasurement {
  public:
   SyntheticLog(const TrialRobot& robot, const TrialOptions& options, std::uint64_t seed)
       : robot_(robot), options_(options), random_(seed),
-        roles_(JointRoles::of(robot.model, robot.setup)),
+        roles_(JointRoles::of(robot.model, robot.setup, robot.rig)),
         instants_(robot.model, robot.setup.hand_link, robot.setup.gravity_W),
         kinematics_(robot.model, shown_links(robot), camera_links(robot)),
         compressor_(robot.model, roles_, shown_links(robot), camera_links(robot)),
@@ -40,6 +40,7 @@ class SyntheticLog final : public SyntheticMeasurement {
     FaultyRobot faulty(robot_, roles_, options_, path_, random_);
     record_encoders(faulty);
     take_pictures(faulty);
+    set_motion(views_, stream_);
   }
 
   const Eigen::MatrixXd& true_corrections() const override { return truth_; }
@@ -49,6 +50,7 @@ class SyntheticLog final : public SyntheticMeasurement {
 
   void instant(std::size_t view, const Eigen::VectorXd& offsets, Instant& out) override {
     instants_.build(views_[view].joints, views_[view].camera, offsets, out);
+    out.qddot = views_[view].qddot;
   }
 
   void compress(std::span<const Corrections> corrections, std::vector<CompressedView>& out) override {
@@ -136,11 +138,6 @@ class SyntheticLog final : public SyntheticMeasurement {
       const double t = static_cast<double>(i) / kStreamRate_hz;
       stream_.push_back({microseconds(kStart_s + t), faulty.encoders(t), Eigen::VectorXd()});
     }
-    for (std::size_t i = 0; i < samples; ++i) {
-      const std::size_t a = i < 3 ? 0 : i - 3, b = std::min(samples - 1, i + 3);
-      stream_[i].qdot = (stream_[b].q - stream_[a].q) /
-                        seconds(stream_[b].utime - stream_[a].utime);
-    }
   }
 
   Eigen::Vector3d normal3() {
@@ -172,7 +169,7 @@ class SyntheticLog final : public SyntheticMeasurement {
       const bool burst = options_.noise_burst && t > burst_at && t < burst_at + burst_for;
       for (std::size_t c = 0; c < bodies.size(); ++c) {
         const double stamp = t + jitter + 0.002 * static_cast<double>(c);
-        views_.push_back({interpolate(stamp), c});
+        views_.push_back({interpolate(stamp), c, {}});
         const auto q_true = faulty.true_joints(faulty.exposure(stamp, c));
         kinematics_.compute(q_true, bodies[c], c, X_CB_);
         truth.push_back(Eigen::VectorXd(static_cast<Eigen::Index>(roles_.arm.size())));
@@ -234,7 +231,7 @@ class SyntheticLog final : public SyntheticMeasurement {
     const auto& a = *(at - 1);
     const auto& b = *at;
     const double s = static_cast<double>(utime - a.utime) / static_cast<double>(b.utime - a.utime);
-    return {utime, a.q + s * (b.q - a.q), a.qdot + s * (b.qdot - a.qdot)};
+    return {utime, a.q + s * (b.q - a.q), {}};
   }
 
   static constexpr std::size_t kStride = 7919;

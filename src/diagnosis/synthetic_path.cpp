@@ -76,8 +76,8 @@ class PathPlanner {
     for (int trial = 0; trial < 24; ++trial) {
       Eigen::VectorXd q = rest_posture;
       constexpr double low[4] = {-30, -5, -35, -25}, high[4] = {0, 5, 10, 0};
-      for (std::size_t i = 0; i < roles_.head.size() && i < 4; ++i) {
-        q[roles_.head[i]] = random_.uniform(low[i], high[i]) * kDeg;
+      for (std::size_t i = 0; i < roles_.neck.size() && i < 4; ++i) {
+        q[roles_.neck[i]] = random_.uniform(low[i], high[i]) * kDeg;
       }
       int hits = 0;
       for (int i = 0; i < 150; ++i) hits += hand_in_view(random_arm(q));

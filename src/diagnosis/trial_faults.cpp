@@ -136,7 +136,7 @@ TrialOptions draw_trial(const TrialRobot& robot, TrialRow row, std::uint64_t see
 }
 
 std::vector<TrialFault> trial_faults(const TrialRobot& robot, bool outside_catalogue) {
-  const auto roles = JointRoles::of(robot.model, robot.setup);
+  const auto roles = JointRoles::of(robot.model, robot.setup, robot.rig);
   const auto joint = [&](std::size_t i) { return roles.names[static_cast<std::size_t>(roles.arm[i])]; };
   std::vector<TrialFault> list;
   const auto by_joint = [&](const std::string& name) {

@@ -3,7 +3,8 @@
 namespace bodyschema::effects {
 namespace {
 
-/// The right picture is taken later than the left one although their stamps agree.
+/// The right picture is taken later than the left one although their stamps agree; second order in time
+/// as Latency is.
 class CameraSkew final : public Clonable<CameraSkew> {
  public:
   explicit CameraSkew(const EffectTarget& target)
@@ -12,7 +13,9 @@ class CameraSkew final : public Clonable<CameraSkew> {
             {EffectParameter{.name = "skew", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {
   }
   void apply(const Instant& at, Corrections& add_to) const override {
-    if (at.camera == 1) add_to.dq.noalias() += value(0) * at.qdot;
+    if (at.camera != 1) return;
+    add_to.dq.noalias() += value(0) * at.qdot;
+    add_to.dq.noalias() += 0.5 * value(0) * value(0) * at.qddot;
   }
 };
 

@@ -225,6 +225,7 @@ StereoRig ErrorModel::corrected(const StereoRig& rig) const {
   at.encoder.setZero(joints);
   at.q.setZero(joints);
   at.qdot.setZero(joints);
+  at.qddot.setZero(joints);
   Corrections corrections(joints);
   for (std::size_t c = 0; c < result.cameras.size(); ++c) {
     at.camera = c;

@@ -25,9 +25,7 @@ std::unique_ptr<Effect> make_head_offset(const EffectTarget& target, const Joint
 
 Targets head_offset_targets(const JointRoles& roles) {
   Targets targets;  // pans of the eyes belong to vergence
-  for (std::size_t i = 0; i < roles.head.size() && i < 4; ++i) {
-    targets.push_back({roles.names[static_cast<std::size_t>(roles.head[i])], ""});
-  }
+  for (const auto joint : roles.neck) targets.push_back({roles.names[static_cast<std::size_t>(joint)], ""});
   return targets;
 }
 

@@ -17,6 +17,7 @@ void InstantBuilder::build(const JointSample& sample, std::size_t camera,
   out.encoder = sample.q;
   out.q = sample.q - offsets;
   out.qdot = sample.qdot;
+  out.qddot.setZero(sample.q.size());
   if (model_->has_masses()) out.gravity_torque = torques_.compute(out.q, gravity_W_);
   if (hand_) {
     Pose X_WP;

@@ -1,4 +1,6 @@
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
@@ -6,26 +8,104 @@
 #include "bodyschema/robot/forward_kinematics.hpp"
 
 namespace bodyschema {
+namespace {
 
-JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSetup& setup) {
+/// What each joint does to the rendered links beyond the hand's frame.
+class FingerJoints {
+ public:
+  FingerJoints(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup)
+      : links_(with_hand(setup)), kinematics_(model, links_), q_(setup.default_joints(*model)),
+        X_WB_(links_.size()), turned_(links_.size()) {
+    kinematics_.compute(q_, X_WB_);
+    for (Eigen::Index j = 0; j < model->joint_count(); ++j) {
+      if (!kinematics_.moves(j, links_.size() - 1)) add(j);
+    }
+  }
+
+  [[nodiscard]] std::vector<Eigen::Index> curling() const {
+    constexpr double kParallel = 0.7;
+    std::vector<Eigen::Index> curling;
+    for (const auto& joint : joints_) {
+      const Joint& last = last_of(joint);
+      if (std::abs(joint.axis_W.dot(last.axis_W)) > kParallel) curling.push_back(joint.index);
+    }
+    return curling;
+  }
+
+ private:
+  struct Joint {
+    Eigen::Index index;
+    std::vector<std::size_t> links;  ///< those it moves
+    Eigen::Vector3d axis_W;
+  };
+
+  static std::vector<std::string> with_hand(const RobotSetup& setup) {
+    auto links = setup.model.rendered_links;
+    links.push_back(setup.hand_link);
+    return links;
+  }
+
+  void add(Eigen::Index j) {
+    Joint joint{j, {}, Eigen::Vector3d::Zero()};
+    for (std::size_t l = 0; l + 1 < links_.size(); ++l) {
+      if (kinematics_.moves(j, l)) joint.links.push_back(l);
+    }
+    if (joint.links.empty()) return;
+    constexpr double kStep = 0.01;
+    Eigen::VectorXd q = q_;
+    q[j] += kStep;
+    kinematics_.compute(q, turned_);
+    const auto l = joint.links.front();
+    const Eigen::AngleAxisd turn(Eigen::Matrix3d(turned_[l].linear() * X_WB_[l].linear().transpose()));
+    if (turn.angle() < 0.1 * kStep) return;  // it slides
+    joint.axis_W = turn.axis();
+    joints_.push_back(std::move(joint));
+  }
+
+  /// The joint furthest out of those that move a part of what `joint` moves; joints come in order from
+  /// the root.
+  [[nodiscard]] const Joint& last_of(const Joint& joint) const {
+    const Joint* last = &joint;
+    for (const auto& other : joints_) {
+      if (other.index > last->index && std::includes(last->links.begin(), last->links.end(),
+                                                     other.links.begin(), other.links.end())) {
+        last = &other;
+      }
+    }
+    return *last;
+  }
+
+  std::vector<std::string> links_;
+  ForwardKinematics kinematics_;
+  Eigen::VectorXd q_;
+  std::vector<Pose> X_WB_, turned_;
+  std::vector<Joint> joints_;
+};
+
+}  // namespace
+
+JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSetup& setup,
+                          const StereoRig& rig) {
   JointRoles roles;
   for (const auto& joint : model->joints()) roles.names.push_back(joint.name);
   for (const auto& name : setup.estimated_joints) roles.arm.push_back(roles.index(name));
   for (const auto& name : setup.head_joints) roles.head.push_back(roles.index(name));
 
-  auto links = setup.model.rendered_links;
-  links.push_back(setup.hand_link);
-  const ForwardKinematics fk(model, links);
-  for (Eigen::Index j = 0; j < model->joint_count(); ++j) {
-    if (fk.moves(j, links.size() - 1)) continue;
-    const auto& name = roles.names[static_cast<std::size_t>(j)];
-    const bool spreads = name.find("oppose") != std::string::npos ||
-                         name.find("abduction") != std::string::npos ||
-                         name.find("_hand_finger") != std::string::npos;
-    bool moves_part = false;
-    for (std::size_t l = 0; l + 1 < links.size(); ++l) moves_part = moves_part || fk.moves(j, l);
-    if (moves_part && !spreads) roles.fingers.push_back(j);
+  std::vector<std::string> cameras;
+  for (const auto& camera : rig.cameras) cameras.push_back(camera.link);
+  const ForwardKinematics eyes(model, cameras);
+  for (const auto joint : roles.head) {
+    const bool left = eyes.moves(joint, 0);
+    const bool right = cameras.size() < 2 ? left : eyes.moves(joint, 1);
+    if (left && right) {
+      roles.neck.push_back(joint);
+    } else if (left) {
+      roles.left_pan = joint;
+    } else if (right) {
+      roles.right_pan = joint;
+    }
   }
+  roles.fingers = FingerJoints(model, setup).curling();
   return roles;
 }
 

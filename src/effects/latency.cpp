@@ -3,9 +3,9 @@
 namespace bodyschema::effects {
 namespace {
 
-/// The image shows the past: at its stamp the arm was where the encoders were `delay` earlier.
-/// dq = -delay * velocity, for head and arm alike; over 20-100 ms the change of velocity is small
-/// against the smallest delay that matters.
+/// The image shows the past: at its stamp the arm was where the encoders were `delay` earlier, head and
+/// arm alike. dq = -delay * velocity + delay^2 / 2 * acceleration; without the second term 60 ms would be
+/// 0.2 deg off in an arm that babbles.
 class Latency final : public Clonable<Latency> {
  public:
   explicit Latency(const EffectTarget& target)
@@ -14,6 +14,7 @@ class Latency final : public Clonable<Latency> {
                      .name = "delay", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {}
   void apply(const Instant& at, Corrections& add_to) const override {
     add_to.dq.noalias() -= value(0) * at.qdot;
+    add_to.dq.noalias() += 0.5 * value(0) * value(0) * at.qddot;
   }
 };
 

@@ -25,11 +25,11 @@ class Vergence final : public Clonable<Vergence> {
 }  // namespace
 
 std::unique_ptr<Effect> make_vergence(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<Vergence>(target, roles.head[4], roles.head[5]);
+  return std::make_unique<Vergence>(target, roles.left_pan, roles.right_pan);
 }
 
 Targets vergence_targets(const JointRoles& roles) {
-  return roles.head.size() >= 6 ? Targets{EffectTarget{}} : Targets{};
+  return roles.has_pans() ? Targets{EffectTarget{}} : Targets{};
 }
 
 }  // namespace bodyschema::effects

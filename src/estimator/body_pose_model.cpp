@@ -23,7 +23,7 @@ std::vector<std::string> camera_links(const StereoRig& rig) {
 BodyPoseModel::BodyPoseModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
                              const StereoRig& rig, std::vector<Parameter> parameters)
     : rig_(rig), parameters_(std::move(parameters)),
-      finger_joints_(JointRoles::of(robot, setup).fingers),
+      finger_joints_(JointRoles::of(robot, setup, rig).fingers),
       part_count_(setup.model.rendered_links.size()),
       fingertip_count_(setup.fingertip_links.size()),
       kinematics_(robot, evaluated_links(setup), camera_links(rig)),

@@ -252,7 +252,7 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
   std::vector<AppliedEffect> applied;
   if (!setup.extended_model.empty()) {
     const auto robot = setup.load();
-    model = ErrorModel::load(setup.extended_model, JointRoles::of(robot, setup));
+    model = ErrorModel::load(setup.extended_model, JointRoles::of(robot, setup, rig));
     applied = add_extended_model(*model, robot, setup, rig, correction);
   }
   check_same_model(summary, setup, model);

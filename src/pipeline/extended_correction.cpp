@@ -35,7 +35,7 @@ bool in_urdf(const std::string& name) {
 Instant at_rest(Eigen::Index joints, std::size_t camera) {
   Instant at;
   at.camera = camera;
-  at.encoder = at.q = at.qdot = Eigen::VectorXd::Zero(joints);
+  at.encoder = at.q = at.qdot = at.qddot = Eigen::VectorXd::Zero(joints);
   return at;
 }
 

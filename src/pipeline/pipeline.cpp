@@ -33,9 +33,10 @@ class Digest {
 };
 
 std::optional<ErrorModel> load_error_model(const RobotSetup& setup,
-                                           const std::shared_ptr<const RobotModel>& robot) {
+                                           const std::shared_ptr<const RobotModel>& robot,
+                                           const StereoRig& rig) {
   if (setup.extended_model.empty()) return std::nullopt;
-  return ErrorModel::load(setup.extended_model, JointRoles::of(robot, setup));
+  return ErrorModel::load(setup.extended_model, JointRoles::of(robot, setup, rig));
 }
 
 StereoRig corrected(const StereoRig& rig, const std::optional<ErrorModel>& model) {
@@ -80,7 +81,7 @@ Pipeline::Pipeline(const Configuration& configuration)
       bus_(BusOptions::from(configuration.section("bus"))),
       options_(EstimatorOptions::from(configuration)),
       robot_(load(setup_, StereoRig::from(configuration.section("cameras")))),
-      error_model_(load_error_model(setup_, robot_)),
+      error_model_(load_error_model(setup_, robot_, StereoRig::from(configuration.section("cameras")))),
       rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
       estimator_(robot_, setup_, rig_, options_),
       configuration_hash_(configuration.hash()),

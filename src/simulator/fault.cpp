@@ -134,7 +134,9 @@ FaultSite::FaultSite(std::shared_ptr<const RobotModel> robot, const RobotSetup& 
   links.insert(links.end(), setup.fingertip_links.begin(), setup.fingertip_links.end());
   const std::size_t first_camera = links.size();
   for (const auto& camera : rig.cameras) links.push_back(camera.link);
-  const ForwardKinematics kinematics(model, links);
+  ForwardKinematics kinematics(model, links);
+  std::vector<Pose> poses(links.size());
+  kinematics.compute(setup.default_joints(*model), poses);
 
   for (const auto& name : setup.estimated_joints) arm.push_back(model->joint_index(name));
   for (const auto& name : setup.head_joints) {
@@ -152,16 +154,19 @@ FaultSite::FaultSite(std::shared_ptr<const RobotModel> robot, const RobotSetup& 
       (kinematics.moves(joint, first_camera) ? left_pan : right_pan) = joint;
     }
   }
-  for (Eigen::Index joint = 0; joint < model->joint_count(); ++joint) {
-    if (kinematics.moves(joint, 0)) continue;
-    bool curls = false;
-    for (std::size_t l = 1; l < first_camera; ++l) curls |= kinematics.moves(joint, l);
-    const auto& name = model->joints()[static_cast<std::size_t>(joint)].name;
-    // The thumb's opposition and the spread of the fingers turn them sideways.
-    if (curls && name.find("oppose") == std::string::npos && name.find("finger") == std::string::npos) {
-      fingers.push_back(joint);
+  // What curls a finger turns about the axis of its last joint, or nearly so; the thumb's opposition and
+  // the spread of the fingers turn them sideways.
+  for (std::size_t tip = 1; tip < first_camera; ++tip) {
+    Eigen::Vector3d curl_W = Eigen::Vector3d::Zero();
+    for (Eigen::Index joint = model->joint_count(); joint-- > 0;) {
+      if (kinematics.moves(joint, 0) || !kinematics.moves(joint, tip)) continue;
+      const Eigen::Vector3d axis_W = kinematics.joint_axis(joint).direction_W;
+      if (curl_W.isZero()) curl_W = axis_W;
+      const bool known = std::find(fingers.begin(), fingers.end(), joint) != fingers.end();
+      if (std::abs(axis_W.dot(curl_W)) > std::sqrt(0.5) && !known) fingers.push_back(joint);
     }
   }
+  std::sort(fingers.begin(), fingers.end());
 }
 
 const std::vector<FaultKind>& fault_kinds() {

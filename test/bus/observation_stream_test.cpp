@@ -67,7 +67,7 @@ TEST(ObservationStream, CarriesWhatTheExtendedModelKnowsAtEachExposure) {
   RobotSetup setup = RobotSetup::from(configuration.section("robot"));
   setup.model.rendered_links.clear();
   const auto robot = setup.load();
-  const JointRoles roles = JointRoles::of(robot, setup);
+  const JointRoles roles = JointRoles::of(robot, setup, StereoRig::from(configuration.section("cameras")));
   const auto elbow = roles.index("r_elbow");
   ErrorModel model(roles);
   model.add("backlash", {"r_elbow", ""}).parameters()[0].value = 0.02;

@@ -26,7 +26,7 @@ double along_normal(CorrectedKinematics& kinematics, const Eigen::VectorXd& q, c
 
 TEST(ViewCompressor, DerivativesAgreeWithMovingTheRobot) {
   const auto& r = robot();
-  const auto roles = JointRoles::of(r.model, r.setup);
+  const auto roles = JointRoles::of(r.model, r.setup, r.rig);
   const std::vector<std::string> links = {"r_forearm", "r_hand", "r_index_3"};
   const std::vector<std::string> cameras = {r.rig.cameras[0].link, r.rig.cameras[1].link};
   ViewCompressor compressor(r.model, roles, links, cameras);
@@ -64,7 +64,7 @@ TEST(ViewCompressor, DerivativesAgreeWithMovingTheRobot) {
 }
 
 TEST(CoordinateLayout, HoldsWhatTheCatalogueMovesAndReadsIt) {
-  const auto roles = JointRoles::of(robot().model, robot().setup);
+  const auto roles = JointRoles::of(robot().model, robot().setup, robot().rig);
   const CoordinateLayout layout(roles);
   const auto arm = static_cast<Eigen::Index>(roles.arm.size());
   const auto joints = arm + static_cast<Eigen::Index>(roles.head.size() + roles.fingers.size());

@@ -52,7 +52,7 @@ TEST(NearerModel, FindsSeveralLengthsThatAreFarOff) {
 
 TEST(NearerModel, NoRobotIsBuiltSoWrongThatItsElbowTiltsByThirtyDegrees) {
   const auto tilted = [](double deg) {
-    ErrorModel model(JointRoles::of(test::robot().model, test::robot().setup));
+    ErrorModel model(JointRoles::of(test::robot().model, test::robot().setup, test::robot().rig));
     model.add("axis_tilt", {"r_elbow", ""}).parameters()[0].value = radians(deg);
     model.add("joint_offset", {"r_elbow", ""}).parameters()[0].value = radians(40.0);  // which may well be
     return plausible(model);

@@ -169,6 +169,8 @@ TEST(Latency, PictureShowsThePast) {
   const auto c = corrections(*effect, 50.0, at);
   EXPECT_NEAR(dq_deg(c, kElbow), -1.5, 1e-12);
   EXPECT_NEAR(dq_deg(c, 2), 0.5, 1e-12);
+  at.qddot[kElbow] = radians(80.0);  // so 50 ms ago it was 0.1 deg further on
+  EXPECT_NEAR(dq_deg(corrections(*effect, 50.0, at), kElbow), -1.4, 1e-12);
 }
 
 TEST(CameraSkew, OnlyTheRightPictureIsLater) {

@@ -11,6 +11,9 @@ inline JointRoles roles() {
              "r_eye_pan",  "s_pitch",   "s_roll",   "s_yaw",     "elbow",
              "prosup",     "w_pitch",   "w_yaw",    "index",     "thumb"};
   r.head = {0, 1, 2, 3, 4, 5};
+  r.neck = {0, 1, 2, 3};
+  r.left_pan = 4;
+  r.right_pan = 5;
   r.arm = {6, 7, 8, 9, 10, 11, 12};
   r.fingers = {13, 14};
   return r;
@@ -22,6 +25,7 @@ inline Instant instant(const JointRoles& r) {
   at.encoder.setZero(n);
   at.q.setZero(n);
   at.qdot.setZero(n);
+  at.qddot.setZero(n);
   at.gravity_torque.setZero(n);
   at.payload_torque.setZero(n);
   return at;

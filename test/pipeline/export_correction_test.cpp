@@ -154,7 +154,7 @@ TEST_F(ExportCorrection, TheUrdfHoldsWhatItCanOfAnExtendedModel) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   const auto robot = setup_.load();
-  ErrorModel model(JointRoles::of(robot, setup_));
+  ErrorModel model(JointRoles::of(robot, setup_, rig_));
   const auto put = [&](const char* name, const EffectTarget& target) {
     for (auto& p : model.add(name, target).parameters()) {
       if (p.fitted) p.value = 3.0 * p.typical * uniform(random);

@@ -30,7 +30,7 @@ class ImageMeasurement final : public MeasurementSource {
   /// nothing new and is left out: a simulator at rest, a driver that publishes twice.
   void add(const Observation& observation);
   /// The encoder log at full rate, in order of time.
-  void set_stream(std::vector<JointSample> stream) { stream_ = std::move(stream); }
+  void set_stream(std::vector<JointSample> stream);
   bool set_search(double search_px, std::size_t every = 1) override {
     search_px_ = search_px;
     every_ = every;

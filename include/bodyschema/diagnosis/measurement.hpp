@@ -100,7 +100,11 @@ class ViewCompressor {
 struct ViewInput {
   JointSample joints;
   std::size_t camera = 0;
+  Eigen::VectorXd qddot;  ///< rad/s^2
 };
+
+/// Velocity and acceleration of every view, from the positions of the encoder log (joint_motion).
+void set_motion(std::span<ViewInput> views, std::span<const JointSample> stream);
 
 /// Where residuals come from: pictures of a log, or a synthetic outline for seeded trials.
 class MeasurementSource {
@@ -113,7 +117,7 @@ class MeasurementSource {
   [[nodiscard]] virtual std::span<const JointSample> stream() const = 0;
   /// Torques of an exposure; `offsets` as InstantBuilder::build.
   virtual void instant(std::size_t view, const Eigen::VectorXd& offsets, Instant& out) = 0;
-  /// How far from the prediction the observed outline is looked for, px, and at every so-manieth
+  /// How far from the prediction the observed outline is looked for, px, and at every n-th
   /// instant only; the others then count as unseen. False where the source knows which point
   /// belongs to which: then all of it is always compressed.
   virtual bool set_search(double search_px, std::size_t every = 1) {

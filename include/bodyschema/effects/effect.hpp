@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/observation/corrections.hpp"
 #include "bodyschema/effects/instant.hpp"
 #include "bodyschema/observation/observation.hpp"
@@ -37,12 +38,18 @@ struct EffectTarget {
 struct JointRoles {
   std::vector<std::string> names;     ///< every joint of the model
   std::vector<Eigen::Index> arm;      ///< shoulder to wrist, the joints whose offsets are estimated
-  std::vector<Eigen::Index> head;     ///< neck pitch, roll, yaw, eyes tilt, left pan, right pan
+  std::vector<Eigen::Index> head;     ///< every joint of neck and eyes, as configured
+  std::vector<Eigen::Index> neck;     ///< those of the head that move every camera (eyes' tilt too)
+  Eigen::Index left_pan = -1;         ///< moves the left camera alone; -1: none
+  Eigen::Index right_pan = -1;        ///< moves the right camera alone; -1: none
   std::vector<Eigen::Index> fingers;  ///< joints that curl a finger when they grow
-  /// The roles that a configuration gives: arm and head as named there; fingers are the joints that
-  /// move a rendered link but not the hand's frame, without those that spread or oppose.
+  /// The roles that a configuration gives: arm and head as named there, neck and pans by what they move.
+  /// Fingers are the joints that turn a rendered link but not the hand's frame, about an axis within 45
+  /// deg of their finger's last one: joints that spread the fingers, oppose the thumb or slide are none.
   /// Throws ConfigurationError naming the nearest joint.
-  static JointRoles of(std::shared_ptr<const RobotModel> model, const RobotSetup& setup);
+  static JointRoles of(std::shared_ptr<const RobotModel> model, const RobotSetup& setup,
+                       const StereoRig& rig);
+  [[nodiscard]] bool has_pans() const { return left_pan >= 0 && right_pan >= 0; }
   /// Throws ConfigurationError naming the nearest joint.
   [[nodiscard]] Eigen::Index index(const std::string& name) const;
 };

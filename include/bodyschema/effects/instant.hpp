@@ -18,6 +18,7 @@ struct Instant {
   Eigen::VectorXd encoder;  ///< as read, radians, RobotModel order
   Eigen::VectorXd q;        ///< encoder minus the offsets believed at present, radians
   Eigen::VectorXd qdot;     ///< rad/s
+  Eigen::VectorXd qddot;    ///< rad/s^2
   /// Torque of gravity on each joint at `q`, Nm. Empty when the URDF has no masses.
   Eigen::VectorXd gravity_torque;
   /// Torque on each joint of one kilogram at the hand's frame, Nm/kg. Empty without a hand link.
@@ -32,6 +33,7 @@ class InstantBuilder {
   InstantBuilder(std::shared_ptr<const RobotModel> model, const std::string& hand_link,
                  const Eigen::Vector3d& gravity_W);
 
+  /// Sets the acceleration to zero; who knows it fills it in.
   /// @param offsets  believed joint offsets (encoder = true + offset), radians, RobotModel order
   void build(const JointSample& sample, std::size_t camera,
              const Eigen::Ref<const Eigen::VectorXd>& offsets, Instant& out);

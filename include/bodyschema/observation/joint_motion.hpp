@@ -1,0 +1,24 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+#include "bodyschema/observation/observation.hpp"
+
+namespace bodyschema {
+
+/// Velocity and acceleration of the joints at an instant, from positions alone: publishers differ in what
+/// they call velocity (zeros, lagging averages, single steps of a coarse encoder).
+///
+/// A parabola through the positions within 60 ms on both sides (least squares); where few samples follow the
+/// instant, as beside a running robot, further back instead. Encoders slower than some 40 Hz get up to
+/// 250 ms. A joint that jumps within the window, as from one hold of a recording to the next, counts as
+/// still, and so does everything where fewer than two samples are near. No throw, no allocation once the
+/// results have their size.
+/// @param ordered  samples in order of time
+/// @param qdot     out: rad/s, RobotModel order
+/// @param qddot    out: rad/s^2; zero where fewer than five samples are near
+void joint_motion(std::span<const JointSample> ordered, Microseconds utime, Eigen::VectorXd& qdot,
+                  Eigen::VectorXd& qddot);
+
+}  // namespace bodyschema

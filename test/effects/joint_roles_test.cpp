@@ -1,0 +1,76 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "bodyschema/effects/effect.hpp"
+
+namespace bodyschema {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Names = std::vector<std::string>;
+
+struct Robot {
+  JointRoles roles;
+  [[nodiscard]] Names names(const std::vector<Eigen::Index>& joints) const {
+    Names list;
+    for (const auto joint : joints) list.push_back(roles.names[static_cast<std::size_t>(joint)]);
+    std::sort(list.begin(), list.end());
+    return list;
+  }
+};
+
+Robot robot(const std::string& file, const std::vector<std::string>& overrides = {}) {
+  const auto configuration =
+      Configuration::load(std::string(BODYSCHEMA_SOURCE_DIR) + "/config/" + file, overrides);
+  const auto setup = RobotSetup::from(configuration.section("robot"));
+  const auto rig = StereoRig::from(configuration.section("cameras"));
+  return {JointRoles::of(setup.load(), setup, rig)};
+}
+
+std::string name_of(const Robot& robot, Eigen::Index joint) {
+  return joint < 0 ? "none" : robot.roles.names[static_cast<std::size_t>(joint)];
+}
+
+const Names kCurl = {"r_index_distal", "r_index_proximal", "r_middle_distal", "r_middle_proximal",
+                     "r_pinky",        "r_thumb_distal",   "r_thumb_proximal"};
+
+TEST(JointRoles, OfOurOwnRobot) {
+  const auto r = robot("icub_right/robot.yaml");
+  EXPECT_EQ(r.names(r.roles.fingers), kCurl);  // the thumb's opposition turns it sideways
+  EXPECT_EQ(r.names(r.roles.neck), (Names{"eyes_tilt", "neck_pitch", "neck_roll", "neck_yaw"}));
+  EXPECT_EQ(name_of(r, r.roles.left_pan), "l_eye_pan");
+  EXPECT_EQ(name_of(r, r.roles.right_pan), "r_eye_pan");
+}
+
+TEST(JointRoles, DoNotDependOnTheOrderInWhichTheHeadIsListed) {
+  const auto r = robot("icub_right/robot.yaml",
+                       {"robot.head_joints=[r_eye_pan, l_eye_pan, eyes_tilt, neck_yaw, neck_roll, neck_pitch]"});
+  EXPECT_EQ(r.names(r.roles.neck), (Names{"eyes_tilt", "neck_pitch", "neck_roll", "neck_yaw"}));
+  EXPECT_EQ(name_of(r, r.roles.left_pan), "l_eye_pan");
+  EXPECT_EQ(name_of(r, r.roles.right_pan), "r_eye_pan");
+}
+
+TEST(JointRoles, OfARobotWithoutHeadOrFingers) {
+  const auto r = robot("arm7/robot.yaml");
+  EXPECT_TRUE(r.roles.fingers.empty()) << r.names(r.roles.fingers).front();
+  EXPECT_FALSE(r.roles.has_pans());
+}
+
+/// The official iCub names its joints otherwise: ..._0_joint opposes the thumb and spreads the fingers.
+TEST(JointRoles, OfTheOfficialIcub) {
+  const char* data = std::getenv("BODYSCHEMA_DATA");
+  const fs::path root = data != nullptr ? fs::path(data) : fs::path(BODYSCHEMA_SOURCE_DIR) / "../shared/data";
+  if (!fs::is_directory(root / "icub-models")) GTEST_SKIP() << "no icub-models under " << root;
+  const auto r = robot("icub_v2_5/robot.yaml");
+  const auto fingers = r.names(r.roles.fingers);
+  EXPECT_GE(fingers.size(), 11u);
+  for (const auto& name : fingers) EXPECT_EQ(name.find("_0_joint"), std::string::npos) << name;
+  EXPECT_EQ(r.roles.neck.size(), 4u);
+  EXPECT_TRUE(r.roles.has_pans());
+}
+
+}  // namespace
+}  // namespace bodyschema
