@@ -253,7 +253,6 @@ Model::Model(const SilhouetteModel& model) : culling_(model.culling) {
     parts_.push_back(prepare(mesh, model.culling));
     max_edges_ = std::max(max_edges_, parts_.back().ends.size());
     max_vertices_ = std::max(max_vertices_, parts_.back().vertices.size());
-    triangle_count_ += parts_.back().triangles.size();
   }
 }
 

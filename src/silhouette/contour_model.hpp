@@ -42,14 +42,12 @@ class Model {
   [[nodiscard]] FaceCulling culling() const { return culling_; }
   [[nodiscard]] std::size_t max_edges() const { return max_edges_; }
   [[nodiscard]] std::size_t max_vertices() const { return max_vertices_; }
-  [[nodiscard]] std::size_t triangle_count() const { return triangle_count_; }
 
  private:
   std::vector<Part> parts_;
   FaceCulling culling_;
   std::size_t max_edges_ = 0;
   std::size_t max_vertices_ = 0;
-  std::size_t triangle_count_ = 0;
 };
 
 /// A part as one camera sees it.
