@@ -42,6 +42,7 @@ void add_diagnose(CLI::App& app) {
     options.out = a->out;
     options.picture_rate_hz = a->rate_hz;
     options.threads = a->threads;
+    DiagnosisReport::prepare(options.out);
     const auto report = diagnose_log(configuration, options);
     std::printf("%s\n", report.sentence.c_str());
     for (const auto& warning : report.warnings) std::printf("note: %s\n", warning.c_str());

@@ -154,18 +154,6 @@ Eigen::VectorXd BlockStatistics::heldout_with_prior(const Columns& columns,
   return loss;
 }
 
-Eigen::VectorXd BlockStatistics::loss(const Columns& columns,
-                                      const Eigen::Ref<const Eigen::VectorXd>& values) const {
-  Eigen::VectorXd loss(static_cast<Eigen::Index>(blocks_.size()));
-  Normal part;
-  for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    gather(blocks_[b], b, columns, part);
-    loss[static_cast<Eigen::Index>(b)] =
-        part.s - 2.0 * values.dot(part.g) + values.dot(part.H * values);
-  }
-  return loss;
-}
-
 NestedFits::NestedFits(const BlockStatistics& statistics, const Columns& base, std::size_t group)
     : statistics_(statistics), base_(base), group_(group), base_fit_(statistics.fit(base, group)) {
   if (!base_fit_.usable || base.empty()) return;

@@ -45,9 +45,10 @@ class Diagnoser {
       found = nearer ? search(nearer->first, nearer->second) : search(before_.at, baseline_);
     }
     if (searches() && found.after.at.rms_px() > options_.noise_rms_px) look_nearer(found);
+    leave_out_causes(found);
     auto report = findings(source_, options_.selection, layout_, fitter_.plan(), found, baseline_, before_, excluded_,
                            options_.systematic_share);
-    word_verdict(report, options_, found.selection.crowded);
+    word_verdict(report, options_);
     progress(1.0);
     return report;
   }
@@ -74,8 +75,29 @@ class Diagnoser {
     // Once, on the residuals of the fitted baseline.
     fitter_.set_plan(plan_blocks(source_, before_.at.views, options_.block_s));
     fitter_.accumulate_on({}, before_);
-    excluded_ = options_.excluded;
-    for (auto& item : untestable(source_, before_.at)) excluded_.push_back(std::move(item));
+    excluded_ = untestable(source_, before_.at);
+  }
+
+  /// What a cause is worth shows against a model without it: nuisances that are causes go back to zero.
+  void leave_out_causes(const Found& found) {
+    bool changed = false;
+    for (const auto& cause : found.selection.causes) {
+      auto ids = cause.same;
+      ids.push_back(cause.candidate);
+      for (const auto c : ids) {
+        const auto& candidate = found.set.candidates[c];
+        if (!candidate.nuisance) continue;
+        baseline_.remove(candidate.name, candidate.target);
+        changed = true;
+      }
+    }
+    for (const auto& cause : options_.fixed_causes.value_or(std::vector<CauseName>{})) {
+      const EffectTarget target{cause.joint, cause.source};
+      if (!contains(options_.nuisances, cause) || baseline_.find(cause.name, target) == nullptr) continue;
+      baseline_.remove(cause.name, target);
+      changed = true;
+    }
+    if (changed) before_ = fitter_.fit(baseline_, {}, {.iterations = options_.refit_iterations, .from_afar = false});
   }
 
   /// Much is wrong at once: causes that were tried for real, if they are plausible and leave less.

@@ -198,7 +198,7 @@ class Page {
       return std::vector<std::string>{name, fmt::format("{:.3f} {}", before, unit),
                                       fmt::format("{:.3f} {}", after, unit)};
     };
-    page_.table({"on parts of the log that the fit has not seen", "offsets and usual nuisances", "extended model"},
+    page_.table({"on parts of the log that the fit has not seen", "without the causes", "extended model"},
                 {row("outline residual, rms", d_.before.rms_px, d_.after.rms_px, "px"),
                  row("motion of the hand it asks for", d_.before.hand_mm, d_.after.hand_mm, "mm"),
                  row("turn of the hand it asks for", d_.before.hand_deg, d_.after.hand_deg, "deg")});
@@ -235,7 +235,7 @@ class Page {
         fmt::format("How much of the residual of held-out blocks each cause of the catalogue takes away when it alone is "
                     "added to the model: before, to the model of offsets and usual nuisances; after, to the extended "
                     "one. A cause must take away {:.1f} %, stand out of the noise by z = {:.1f} (given with its name), "
-                    "and beat the others. Generic features (unexplained) compete on equal terms.",
+                    "and beat the others. Free curves (unexplained) must take away 1.5 % and beat every named cause clearly.",
                     100.0 * d_.gain_threshold, d_.z_threshold));
     std::stable_sort(bars.begin(), bars.end(),
                      [](const auto& a, const auto& b) { return a.gain_before > b.gain_before; });

@@ -17,7 +17,8 @@ Json number(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
 Json optional_text(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
 Json json_of(const HeldoutError& e) {
-  return {{"rms_px", number(e.rms_px)}, {"hand_mm", number(e.hand_mm)}, {"hand_deg", number(e.hand_deg)}};
+  return {{"rms_px", number(e.rms_px)}, {"hand_mm", number(e.hand_mm)}, {"hand_deg", number(e.hand_deg)},
+          {"outline_found", number(e.outline_found)}};
 }
 
 Json json_of(const CauseName& c) {
@@ -65,6 +66,7 @@ std::string DiagnosisReport::to_json() const {
   Json j;
   j["verdict"] = verdict;
   j["sentence"] = sentence;
+  j["crowded"] = crowded;
   j["causes"] = Json::array();
   for (const auto& c : causes) j["causes"].push_back(json_of(c));
   j["not_testable"] = Json::array();
@@ -95,9 +97,19 @@ std::string DiagnosisReport::to_json() const {
   return j.dump(2) + "\n";
 }
 
-void DiagnosisReport::write(const std::filesystem::path& directory) const {
+void DiagnosisReport::prepare(const std::filesystem::path& directory) {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
+  if (error) throw FileError(directory.string() + ": cannot be made: " + error.message());
+  const auto probe = directory / "report.json.part";
+  std::ofstream out(probe);
+  out.close();
+  if (!out) throw FileError(directory.string() + ": nothing can be written there");
+  std::filesystem::remove(probe, error);
+}
+
+void DiagnosisReport::write(const std::filesystem::path& directory) const {
+  prepare(directory);
   const auto file = directory / "report.json";
   std::ofstream out(file);
   out << to_json();

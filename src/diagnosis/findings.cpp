@@ -4,10 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <map>
+#include <set>
+#include <span>
 #include <utility>
+#include <vector>
 
-#include "bodyschema/effects/catalogue.hpp"
+#include "exclusion.hpp"
+#include "interval.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
@@ -18,22 +22,34 @@ CauseName cause_of(const Effect& effect) {
   return {effect.name(), effect.target().joint, effect.target().source};
 }
 
-/// Two-sided 95 % point of Student's t.
-double student95(double dof) {
-  const double n = std::max(1.0, dof);
-  return 1.96 + 2.37 / n + 2.8 / (n * n) + (n < 3.0 ? 5.0 / (n * n * n) : 0.0);
-}
-
-/// Median over the parameters of how much wider a fit's errors are than white noise would make them.
-double inflation(const BlockFit& fit) {
-  if (!fit.usable) return 1.0;
-  std::vector<double> dispersion;
-  for (Eigen::Index i = 0; i < fit.estimate.size(); ++i) {
-    dispersion.push_back(fit.covariance(i, i) / fit.model_variance[i]);
+/// Views [first, last) of one instant, one a camera, in whatever order they are stamped: nearer to each
+/// other than half the time to a camera's next picture.
+std::vector<std::pair<std::size_t, std::size_t>> instants_of(std::span<const ViewInput> views) {
+  constexpr Microseconds kFurthest = 50'000, kRepeated = 5'000;
+  std::map<std::size_t, Microseconds> last_of;
+  std::vector<Microseconds> periods;
+  for (const auto& view : views) {
+    const auto last = last_of.find(view.camera);
+    const auto period = last != last_of.end() ? view.joints.utime - last->second : 0;
+    if (period > kRepeated) periods.push_back(period);
+    last_of[view.camera] = view.joints.utime;
   }
-  const auto middle = dispersion.begin() + static_cast<std::ptrdiff_t>(dispersion.size() / 2);
-  std::nth_element(dispersion.begin(), middle, dispersion.end());
-  return *middle;
+  Microseconds apart = kFurthest;
+  if (!periods.empty()) {
+    const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
+    std::nth_element(periods.begin(), middle, periods.end());
+    apart = std::min(apart, *middle / 2);
+  }
+  std::vector<std::pair<std::size_t, std::size_t>> instants;
+  for (std::size_t first = 0, v = 0; v < views.size(); first = v) {
+    std::set<std::size_t> cameras;
+    while (v < views.size() && views[v].joints.utime - views[first].joints.utime <= apart &&
+           cameras.insert(views[v].camera).second) {
+      ++v;
+    }
+    instants.emplace_back(first, v);
+  }
+  return instants;
 }
 
 class Findings {
@@ -42,16 +58,17 @@ class Findings {
            const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before,
            double systematic_share)
       : source_(source), rules_(rules), layout_(layout), plan_(plan), found_(found),
-        systematic_share_(systematic_share), baseline_(baseline),
-        before_(before), inflation_(inflation(found.after.fit)), jacobians_(source.views().size()) {}
+        baseline_(baseline), before_(before),
+        rule_(found.after.fit, plan.block_count(), systematic_share), jacobians_(source.views().size()) {}
 
   DiagnosisReport report(const std::vector<NotTestable>& excluded) {
     DiagnosisReport report;
     add_facts(report);
     report.not_testable = excluded;
     add_uninformed(report);
+    report.crowded = found_.selection.crowded;
     add_causes(report);
-    add_limits(report);
+    add_exclusion_limits(source_, layout_, plan_, found_, rule_, report);
     add_bars(report);
     add_offsets(report);
     report.before = heldout(before_, report, true);
@@ -65,18 +82,10 @@ class Findings {
   }
 
  private:
-  /// @param systematic  standard deviation that comes on top of what differs between blocks
-  [[nodiscard]] std::array<double, 2> interval(Eigen::Index column, double value, double typical,
-                                               double systematic = 0.0) const {
-    const auto& fit = found_.after.fit;
-    if (!fit.usable) {
-      const double inf = std::numeric_limits<double>::infinity();
-      return {-inf, inf};
-    }
-    const double floor = 0.7 * inflation_ * fit.model_variance[column];
-    const double sd = std::sqrt(std::max(fit.covariance(column, column), floor)) * typical;
-    const double half = std::hypot(student95(static_cast<double>(plan_.block_count()) - 1.0) * sd, 1.96 * systematic);
-    return {value - half, value + half};
+  /// @param common  of the value, what all blocks err in alike
+  [[nodiscard]] std::array<double, 2> interval(Eigen::Index column, const EffectParameter& p, double common) const {
+    const double half = rule_.half(found_.after.fit, column, common / p.typical) * p.typical;
+    return {p.value - half, p.value + half};
   }
 
   void add_facts(DiagnosisReport& report) const {
@@ -92,8 +101,6 @@ class Findings {
     for (const auto joint : roles.arm) {
       report.arm_joints.push_back(roles.names[static_cast<std::size_t>(joint)]);
     }
-    report.rest_gain = found_.selection.rest_gain;
-    report.rest_t = found_.selection.rest_t;
   }
 
   void add_uninformed(DiagnosisReport& report) const {
@@ -125,7 +132,7 @@ class Findings {
         const auto& ref = found_.after.parameters[c];
         if (cause_of(found_.extended[ref.effect]) != cause.cause) continue;
         const auto& p = found_.extended[ref.effect].parameters()[ref.parameter];
-        const auto ci = interval(static_cast<Eigen::Index>(c), p.value, p.typical, systematic_share_ * std::abs(p.value));
+        const auto ci = interval(static_cast<Eigen::Index>(c), p, std::abs(p.value));
         cause.parameters.push_back({p.name, p.unit, p.in_unit(),
                                     {ci[0] / p.si_per_unit, ci[1] / p.si_per_unit}});
       }
@@ -133,23 +140,6 @@ class Findings {
         return c.cause == cause.cause && c.variable == cause.variable;
       });
       if (!listed) report.causes.push_back(std::move(cause));
-    }
-  }
-
-  void add_limits(DiagnosisReport& report) const {
-    for (const auto& limit : found_.selection.limits) {
-      const auto& candidate = found_.set.candidates[limit.candidate];
-      if (candidate.generic() || candidate.slip) continue;
-      const auto effect = make_effect(candidate.name, candidate.target, source_.roles());
-      std::size_t i = 0;
-      std::size_t next = 0;
-      for (const auto& p : std::as_const(*effect).parameters()) {
-        if (!p.fitted) continue;
-        const auto& kept = candidate.parameters;
-        if (std::find(kept.begin(), kept.end(), next++) == kept.end()) continue;
-        report.exclusion_limits.push_back({name_of(candidate), p.name, p.unit,
-                                           limit.limit[i++] * p.typical / p.si_per_unit});
-      }
     }
   }
 
@@ -168,7 +158,10 @@ class Findings {
       }
       // Slips at other times and other shapes of a generic variable share a bar: the best counts.
       bar->z_before = std::max(bar->z_before, first.z);
-      bar->gain_before = std::max(bar->gain_before, first.gain);
+      // A nuisance is part of the first model: its gain is a share of the loss without it.
+      const double gain = found_.set.candidates[c].nuisance && first.gain > 0.0 ? first.gain / (1.0 + first.gain)
+                                                                               : first.gain;
+      bar->gain_before = std::max(bar->gain_before, gain);
       bar->z_after = std::max(bar->z_after, last.z);
       bar->gain_after = std::max(bar->gain_after, last.gain);
     }
@@ -186,7 +179,7 @@ class Findings {
       const auto& effect = found_.extended[ref.effect];
       if (effect.name() != "joint_offset") continue;
       const auto& p = effect.parameters()[ref.parameter];
-      const auto ci = interval(static_cast<Eigen::Index>(c), p.value, p.typical);
+      const auto ci = interval(static_cast<Eigen::Index>(c), p, 0.0);
       report.offsets_ci95_deg[effect.target().joint] = {degrees(ci[0]), degrees(ci[1])};
     }
   }
@@ -222,79 +215,87 @@ class Findings {
     return result;
   }
 
+  /// What a fit without its block leaves of a view, by coordinate, and its loss.
+  struct Rest {
+    Eigen::VectorXd vector;
+    double loss;
+  };
+  [[nodiscard]] Rest held_out(const ModelFit& fit, std::size_t v) const {
+    const auto& view = fit.at.views[v];
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(layout_.size());
+    if (fit.fit.usable) {
+      const auto replica = fit.fit.replicas.col(static_cast<Eigen::Index>(plan_.block_of_view[v]));
+      for (std::size_t c = 0; c < fit.columns.size(); ++c) {
+        for (const auto& e : fit.columns[c].views[v]) {
+          x[static_cast<Eigen::Index>(e.coordinate)] +=
+              static_cast<double>(e.value) * replica[static_cast<Eigen::Index>(c)];
+        }
+      }
+    }
+    Rest rest{view.vector - view.information * x, 0.0};
+    rest.loss = view.square - x.dot(view.vector) - x.dot(rest.vector);
+    return rest;
+  }
+
+  void describe_view(const ModelFit& fit, std::size_t v, ResidualSample& sample) const {
+    const auto views = source_.views();
+    sample.time_s = seconds(views[v].joints.utime - views.front().joints.utime);
+    sample.camera = views[v].camera;
+    for (const auto joint : source_.roles().arm) {
+      sample.angle_deg.push_back(degrees(fit.at.instants[v].q[joint]));
+      sample.velocity_deg_s.push_back(degrees(fit.at.instants[v].qdot[joint]));
+      sample.torque_nm.push_back(fit.at.instants[v].gravity_torque.size() > 0
+                                     ? fit.at.instants[v].gravity_torque[joint] : 0.0);
+    }
+  }
+
   /// Held-out residuals, and the motion of the hand that they ask for.
   HeldoutError heldout(const ModelFit& fit, DiagnosisReport& report, bool before) {
     HeldoutError error;
-    const auto& roles = source_.roles();
-    const auto& plan = plan_;
     const auto views = source_.views();
-    const auto arm = static_cast<Eigen::Index>(roles.arm.size());
-    double square = 0.0, weight = 0.0, mm2 = 0.0, deg2 = 0.0;
+    const auto arm = static_cast<Eigen::Index>(source_.roles().arm.size());
+    double square = 0.0, weight = 0.0, mm2 = 0.0, deg2 = 0.0, outline = 0.0, matched = 0.0;
     std::size_t hands = 0;
     if (before) report.samples.resize(views.size());
-    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(arm, arm);
-    Eigen::VectorXd b = Eigen::VectorXd::Zero(arm);
-    Eigen::VectorXd x(layout_.size());
-    for (std::size_t v = 0; v < views.size(); ++v) {
-      const auto& view = fit.at.views[v];
-      auto& sample = report.samples[v];
-      if (before) {
-        sample.time_s = seconds(views[v].joints.utime - views.front().joints.utime);
-        sample.camera = views[v].camera;
-        for (const auto joint : roles.arm) {
-          sample.angle_deg.push_back(degrees(fit.at.instants[v].q[joint]));
-          sample.velocity_deg_s.push_back(degrees(fit.at.instants[v].qdot[joint]));
-          sample.torque_nm.push_back(fit.at.instants[v].gravity_torque.size() > 0
-                                         ? fit.at.instants[v].gravity_torque[joint] : 0.0);
+    Eigen::MatrixXd A(arm, arm);
+    Eigen::VectorXd b(arm);
+    for (const auto& [first, last] : instants_of(views)) {
+      A.setZero();
+      b.setZero();
+      std::size_t seen = last;
+      for (auto v = first; v < last; ++v) {
+        const auto& view = fit.at.views[v];
+        auto& sample = report.samples[v];
+        if (before) describe_view(fit, v, sample);
+        auto& apparent = before ? sample.apparent_deg_before : sample.apparent_deg_after;
+        apparent.assign(static_cast<std::size_t>(arm), 0.0);
+        outline += view.outline;
+        matched += view.matched;
+        if (view.weight <= 0.0) continue;
+        seen = v;
+        const auto rest = held_out(fit, v);
+        square += plan_.weight_of_view[v] * rest.loss;
+        weight += plan_.weight_of_view[v] * view.weight;
+        (before ? sample.rms_px_before : sample.rms_px_after) = std::sqrt(std::max(0.0, rest.loss / view.weight));
+        (before ? sample.mean_px_before : sample.mean_px_after) = rest.vector[layout_.size() - 1] / view.weight;
+        for (Eigen::Index j = 0; j < arm; ++j) {
+          const double information = view.information(j, j);
+          if (information > 0.0) apparent[static_cast<std::size_t>(j)] = degrees(rest.vector[j] / information);
         }
+        A += view.information.topLeftCorner(arm, arm);
+        b += rest.vector.head(arm);
       }
-      auto& apparent = before ? sample.apparent_deg_before : sample.apparent_deg_after;
-      apparent.assign(static_cast<std::size_t>(arm), 0.0);
-      if (view.weight <= 0.0) continue;
-      x.setZero();
-      if (fit.fit.usable) {
-        const auto replica = fit.fit.replicas.col(static_cast<Eigen::Index>(plan.block_of_view[v]));
-        for (std::size_t c = 0; c < fit.columns.size(); ++c) {
-          for (const auto& e : fit.columns[c].views[v]) {
-            x[static_cast<Eigen::Index>(e.coordinate)] +=
-                static_cast<double>(e.value) * replica[static_cast<Eigen::Index>(c)];
-          }
-        }
-      }
-      const Eigen::VectorXd rest = view.vector - view.information * x;
-      const double loss = view.square - x.dot(view.vector) - x.dot(rest);
-      square += plan.weight_of_view[v] * loss;
-      weight += plan.weight_of_view[v] * view.weight;
-      (before ? sample.rms_px_before : sample.rms_px_after) =
-          std::sqrt(std::max(0.0, loss / view.weight));
-      (before ? sample.mean_px_before : sample.mean_px_after) = rest[layout_.size() - 1] / view.weight;
-      for (Eigen::Index j = 0; j < arm; ++j) {
-        const double information = view.information(j, j);
-        if (information > 0.0) {
-          apparent[static_cast<std::size_t>(j)] = degrees(rest[j] / information);
-        }
-      }
-      // Both eyes of one instant together: the correction of all arm joints, held by a weak prior.
-      const bool same = v > 0 && views[v].joints.utime - views[v - 1].joints.utime < 50'000 &&
-                        views[v].camera != views[v - 1].camera && views[v].camera > 0;
-      if (!same) {
-        A.setZero();
-        b.setZero();
-      }
-      A += view.information.topLeftCorner(arm, arm);
-      b += rest.head(arm);
-      const bool last_of_instant = v + 1 == views.size() || views[v + 1].camera == 0 || same;
-      if (!last_of_instant) continue;
-      Eigen::MatrixXd regular = A;
-      regular.diagonal().array() += 0.25 / (1.0 * kDeg * 1.0 * kDeg);  // (0.5 px)^2 against 1 deg
-      const Eigen::VectorXd dq = regular.ldlt().solve(b);
-      const auto& jacobian = jacobian_at(v, fit.at.corrections[v]);
-      const Eigen::VectorXd motion = jacobian.leftCols(arm) * dq;
+      if (seen == last) continue;
+      // The correction of all arm joints, held by a weak prior.
+      A.diagonal().array() += 0.25 / (1.0 * kDeg * 1.0 * kDeg);  // (0.5 px)^2 against 1 deg
+      const auto& jacobian = jacobian_at(seen, fit.at.corrections[seen]);
+      const Eigen::VectorXd motion = jacobian.leftCols(arm) * A.ldlt().solve(b);
       mm2 += motion.head<3>().squaredNorm() * 1e6;
       deg2 += motion.tail<3>().squaredNorm() / (kDeg * kDeg);
       ++hands;
     }
     error.rms_px = weight > 0.0 ? std::sqrt(std::max(0.0, square / weight)) : 0.0;
+    if (outline > 0.0) error.outline_found = matched / outline;
     if (hands > 0) {
       error.hand_mm = std::sqrt(mm2 / static_cast<double>(hands));
       error.hand_deg = std::sqrt(deg2 / static_cast<double>(hands));
@@ -312,10 +313,9 @@ class Findings {
   const CoordinateLayout& layout_;
   const BlockPlan& plan_;
   const Found& found_;
-  double systematic_share_;
   const ErrorModel& baseline_;
   const ModelFit& before_;
-  double inflation_;
+  IntervalRule rule_;
   std::vector<Eigen::MatrixXd> jacobians_;
 };
 

@@ -145,6 +145,7 @@ struct ImageMeasurement::Worker {
       leave_out(out);
     } else {
       compressor.compress(points, corrected, out);
+      out.matched = static_cast<double>(points.size());
     }
     out.misfit = misfit;
     out.outline = static_cast<double>(outline.size());
@@ -154,7 +155,7 @@ struct ImageMeasurement::Worker {
     const auto n = compressor.layout().size();
     out.information.setZero(n, n);
     out.vector.setZero(n);
-    out.square = out.weight = out.misfit = out.outline = 0.0;
+    out.square = out.weight = out.misfit = out.outline = out.matched = 0.0;
   }
 
   ViewCompressor compressor;

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
+
+#include "bodyschema/core/error.hpp"
 
 namespace bodyschema {
 namespace {
@@ -43,8 +46,8 @@ class Selector {
     Selection result;
     drop_dependent_nuisances(result);
     refit();
+    refuse_unusable();
     baseline_ = current_.heldout();
-    result.baseline_heldout = baseline_;
     result.first_scores = score_all();
     for (std::size_t c = 0; c < candidates_.size(); ++c) {
       if (!result.first_scores[c].testable && !contains(result.not_testable, c)) {
@@ -60,12 +63,11 @@ class Selector {
       if (options_.given.empty()) stand_out(result);
     }
     for (const auto c : reported()) result.causes.push_back(describe(c));
+    weigh_against_no_cause(result.causes);
     std::stable_sort(result.causes.begin(), result.causes.end(),
                      [](const auto& a, const auto& b) { return a.score.gain > b.score.gain; });
     result.model = model_;
     result.last_scores = score_all();
-    find_limits(result);
-    result.final_heldout = current_.heldout();
     return result;
   }
 
@@ -201,6 +203,20 @@ class Selector {
       }
     }
     model_ = kept;
+  }
+
+  /// Without blocks to hold out, or with offsets that the log cannot tell from each other, nothing that
+  /// follows means anything; least of all that nothing was found.
+  void refuse_unusable() const {
+    constexpr std::ptrdiff_t kFewestBlocks = 4;
+    const auto blocks = statistics_.blocks();
+    const auto seen = std::count_if(blocks.begin(), blocks.end(), [](const auto& b) { return b.weight > 0.0; });
+    if (current_.usable && seen >= kFewestBlocks) return;
+    throw DataError(std::string("the log cannot be diagnosed: ") +
+                    (seen < kFewestBlocks ? "the arm stands still in nearly all of it"
+                                          : "the arm moves too little to tell the offsets of its joints apart") +
+                    "; record 60 to 120 s in which every joint of the arm moves, slow and fast, the same "
+                    "postures in both directions");
   }
 
   /// The catalogue's median dispersion against the present model: what the causes found so far left
@@ -413,8 +429,34 @@ class Selector {
     }
     if (!same.empty() && same.front().first < current_.heldout()) {
       std::swap(result.candidate, result.same.front());
+      result.score = score_instead(result.candidate, cause, rest);
     }
     return result;
+  }
+
+  /// How a candidate fares in the place of a cause.
+  /// @param rest  the model without the cause
+  [[nodiscard]] CandidateScore score_instead(std::size_t candidate, std::size_t cause,
+                                             const NestedFits& rest) const {
+    const auto fit = rest.with(candidates_[candidate].columns);
+    return {wald_z(fit, with(without(model_, cause), candidate), candidate),
+            (rest.base().heldout() - fit.heldout()) / baseline_,
+            advantage(candidate, rest.base().heldout_loss, fit.heldout_loss), true};
+  }
+
+  /// Gains as shares of the loss of offsets and those nuisances that are not causes themselves: a
+  /// nuisance that is one is otherwise judged by the loss it has already taken away.
+  void weigh_against_no_cause(std::vector<SelectedCause>& causes) const {
+    Ids rest;
+    for (const auto c : model_) {
+      const bool found = std::any_of(causes.begin(), causes.end(), [&](const auto& cause) {
+        return cause.candidate == c || contains(cause.same, c);
+      });
+      if (!found) rest.push_back(c);
+    }
+    const auto plain = fit(rest);
+    if (!plain.usable || plain.heldout() <= 0.0) return;
+    for (auto& cause : causes) cause.score.gain *= baseline_ / plain.heldout();
   }
 
   /// Whether a free curve in time of the joint takes something away that slip or drift leaves.
@@ -426,24 +468,6 @@ class Selector {
       if (score.testable && score.z > options_.z_wander && score.gain > options_.gain_floor) return true;
     }
     return false;
-  }
-
-  void find_limits(Selection& result) const {
-    for (std::size_t c = 0; c < candidates_.size(); ++c) {
-      if (candidates_[c].generic() || candidates_[c].slip || contains(causes_, c)) continue;
-      const bool inside = contains(model_, c);
-      const auto ids = inside ? model_ : with(model_, c);
-      const auto f = inside ? current_ : extended_by(c);
-      if (!f.usable) continue;
-      const auto at = position(ids, c);
-      Limit limit{c, {}};
-      for (std::size_t i = 0; i < candidates_[c].columns.size(); ++i) {
-        const auto k = at + static_cast<Eigen::Index>(i);
-        const double variance = std::max(f.covariance(k, k), floor_ * f.model_variance[k]);
-        limit.limit.push_back(std::abs(f.estimate[k]) + 1.96 * std::sqrt(variance));
-      }
-      result.limits.push_back(std::move(limit));
-    }
   }
 
   /// What all other causes of the catalogue would explain together if each were small.

@@ -9,7 +9,7 @@
 namespace bodyschema {
 namespace {
 
-/// Smallest sizes found 90 % of the time in a 50 s log, from the design, shoulder to wrist; 0: not
+/// Smallest sizes to be found 90 % of the time in a log of 50 s, shoulder to wrist; 0: not
 /// visible there.
 std::array<double, 7> detectable_by_joint(const std::string& name) {
   if (name == "compliance") return {0.1, 0.1, 0.3, 0.6, 0, 0, 0};

@@ -54,15 +54,16 @@ class Scores {
  public:
   void add(const TrialOutcome& o) {
     ++rates_.trials[static_cast<std::size_t>(o.row)];
+    rates_.refused[static_cast<std::size_t>(o.row)] += o.refused;
     const auto& causes = o.report.causes;
     switch (o.row) {
-      case TrialRow::kNull: alarm_.add(!causes.empty()); break;
+      case TrialRow::kNull: alarm_.add(o.refused || !causes.empty()); break;
       case TrialRow::kBackground:
-        named_.add(std::any_of(causes.begin(), causes.end(),
+        named_.add(o.refused || std::any_of(causes.begin(), causes.end(),
                                [](const auto& c) { return c.heldout_gain > 0.05; }));
         break;
       case TrialRow::kSingle: add_single(o); break;
-      case TrialRow::kLimit: limit_wrong_.add(wrong_name(o.report, o.truth.front())); break;
+      case TrialRow::kLimit: limit_wrong_.add(o.refused || wrong_name(o.report, o.truth.front())); break;
       case TrialRow::kTwo: add_two(o); break;
       case TrialRow::kOutside: unexplained_.add(says_unexplained(o)); break;
       case TrialRow::kOutsideHard: add_hard(o); break;
@@ -88,6 +89,7 @@ class Scores {
     r.error_median = quantile(errors_, 0.5);
     r.error_p90 = quantile(errors_, 0.9);
     r.coverage95 = covered_.value();
+    r.gains = excess_.size();
     r.removable_excess_median = quantile(excess_, 0.5);
     r.offset_improvement_median = quantile(improvement_, 0.5);
     return r;
@@ -113,7 +115,7 @@ class Scores {
     }
     add_parameters(o, truth);
     if (!found) return;
-    if (o.removable_excess != 0.0) excess_.push_back(o.removable_excess);
+    if (o.removed_share) excess_.push_back(*o.removed_share);
     if (o.offset_error_after_deg > 0.0) {
       improvement_.push_back(o.offset_error_before_deg / o.offset_error_after_deg);
     }

@@ -42,10 +42,10 @@ double rms(const Eigen::MatrixXd& m) {
 }
 
 /// How much of what the true cause can explain the extension did explain, on held-out blocks.
-double removed_share(const DiagnosisReport& report, const DiagnosisReport& ideal) {
-  const double before = std::pow(report.before.rms_px, 2);
+std::optional<double> removed_share(const DiagnosisReport& report, const DiagnosisReport& ideal) {
+  const double before = std::pow(ideal.before.rms_px, 2);
   const double removable = before - std::pow(ideal.after.rms_px, 2);
-  if (removable <= 1e-4 * before) return 0.0;
+  if (removable <= 1e-4 * before) return std::nullopt;
   return (before - std::pow(report.after.rms_px, 2)) / removable;
 }
 
@@ -61,7 +61,8 @@ TrialOutcome run_trial(const TrialRobot& robot, const TrialLogMaker& make_log, T
   auto& report = outcome.report;
   try {
     report = log->diagnose(std::nullopt);
-  } catch (const DataError& error) {  // a refusal is no answer, and counts as one that found nothing
+  } catch (const DataError& error) {
+    outcome.refused = true;
     report.verdict = "refused";
     report.sentence = error.what();
     return outcome;
@@ -72,7 +73,7 @@ TrialOutcome run_trial(const TrialRobot& robot, const TrialLogMaker& make_log, T
   }
   // A slip's time is no parameter of a linear fit, so there is no ideal to compare it with.
   if (row == TrialRow::kSingle && options.faults[0].cause.name != "slip") {
-    outcome.removable_excess = removed_share(report, log->diagnose({{options.faults[0].cause}}));
+    outcome.removed_share = removed_share(report, log->diagnose({{options.faults[0].cause}}));
   }
   outcome.report.samples = {};  // not kept for a thousand trials
   outcome.seconds =

@@ -3,12 +3,16 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 namespace bodyschema::diagnosis {
 namespace {
 
+bool is_known(const EstimatedParameter& p) { return std::isfinite(p.ci95[0]) && std::isfinite(p.ci95[1]); }
+
 std::string text_of(const EstimatedParameter& p) {
+  if (!is_known(p)) return fmt::format(" {} of a size that this log does not tell", p.parameter);
   return fmt::format(" {} {:.3g}{} [{:.3g}, {:.3g}]", p.parameter, p.estimate,
                      p.unit == "1" ? "" : " " + p.unit, p.ci95[0], p.ci95[1]);
 }
@@ -30,7 +34,7 @@ std::string text_of(const DiagnosedCause& cause) {
 
 }  // namespace
 
-void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options, bool crowded) {
+void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options) {
   const auto is_unexplained = [](const DiagnosedCause& c) { return c.cause.name == "unexplained"; };
   const auto& causes = report.causes;
   std::string list;
@@ -48,7 +52,10 @@ void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options, bool
   if (!causes.empty()) {
     const bool unexplained = std::any_of(causes.begin(), causes.end(), is_unexplained);
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });
-    report.verdict = unexplained ? "unexplained" : several ? "class" : "named";
+    const bool sized = std::all_of(causes.begin(), causes.end(), [](const auto& c) {
+      return std::all_of(c.parameters.begin(), c.parameters.end(), is_known);
+    });
+    report.verdict = unexplained || !sized ? "unexplained" : several ? "class" : "named";
     report.sentence = "The log asks for: " + list + ".";
     if (left > options.noise_rms_px) {
       report.sentence += fmt::format(" With it {:.2f} px are left, more than noise: something else is wrong too.", left);
@@ -56,10 +63,13 @@ void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options, bool
     return;
   }
   report.verdict = "none";
-  if (crowded) {
+  if (report.crowded) {
     report.sentence = "No single cause stands out; several small errors share what the joint offsets leave.";
   } else if (left > options.noise_rms_px) {
-    report.sentence = fmt::format("Nothing but joint offsets was found, but {:.2f} px (rms) are left, more than noise.", left);
+    report.verdict = "unexplained";
+    report.sentence = fmt::format(
+        "No cause of the catalogue explains what is left: {:.2f} px (rms), more than noise, whatever the joint offsets.",
+        left);
   } else {
     report.sentence = "The model explains the log to its noise: nothing but joint offsets was found.";
   }

@@ -141,13 +141,17 @@ std::size_t trials_of(const Figure& f, const TrialRates& r) {
   for (std::size_t s = 0; s < kTrialRows; ++s) {
     if (std::string(kTrialRowNames[s]) == f.row) return r.trials[s];
   }
-  return std::string(f.row) == "parameters" ? r.parameters
-                                            : r.trials[static_cast<std::size_t>(TrialRow::kSingle)];
+  return std::string(f.row) == "parameters" ? r.parameters : r.gains;
 }
 
 void add_table(ExperimentContext& context, const std::string& title, const TrialRates& r,
                Json& summary, double slack) {
   context.table += fmt::format("\n{:<44} {:>6} {:>9}   {}\n", title, "trials", "measured", "demand");
+  for (std::size_t s = 0; s < kTrialRows; ++s) {
+    summary[kTrialRowNames[s]]["trials"] = r.trials[s];
+    summary[kTrialRowNames[s]]["refused"] = r.refused[s];
+    if (r.refused[s] > 0) context.table += fmt::format("{}: {} logs refused\n", kTrialRowNames[s], r.refused[s]);
+  }
   for (const auto& f : figures(r)) {
     const bool known = std::isfinite(f.value);
     summary[f.row][f.name] = known ? Json(f.value) : Json(nullptr);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -22,6 +23,8 @@ class EditedLog final : public MeasurementSource {
   }
   std::vector<JointSample>& stream_for_editing() { return stream_; }
   std::vector<ViewInput>& views_for_editing() { return views_; }
+  /// The robot is not seen in this picture.
+  void hide(std::size_t view) { hidden_.insert(view); }
 
   const JointRoles& roles() const override { return log_.roles(); }
   std::span<const ViewInput> views() const override { return views_; }
@@ -36,6 +39,11 @@ class EditedLog final : public MeasurementSource {
     log_.compress(all, whole);
     out.clear();
     for (const auto v : which_) out.push_back(whole[v]);
+    for (const auto v : hidden_) {
+      out[v].information.setZero();
+      out[v].vector.setZero();
+      out[v].square = out[v].weight = 0.0;
+    }
   }
   Eigen::MatrixXd hand_jacobian(std::size_t view, const Corrections& c) override {
     return log_.hand_jacobian(which_[view], c);
@@ -44,6 +52,7 @@ class EditedLog final : public MeasurementSource {
  private:
   MeasurementSource& log_;
   std::vector<std::size_t> which_;
+  std::set<std::size_t> hidden_;
   std::vector<ViewInput> views_;
   std::vector<JointSample> stream_;
 };

@@ -55,6 +55,26 @@ TEST(TrialRates, CountWhatTheTableCounts) {
   EXPECT_TRUE(std::isnan(r.limit_wrong));
 }
 
+TEST(TrialRates, ARefusalIsAFailureInEveryRow) {
+  std::vector<TrialOutcome> outcomes;
+  const TrialFault gain{kGain, 4.0, 0.0, 1.0}, wobble{{"wobble", "r_elbow", ""}, 1.0, 2.0, 0.0};
+  for (std::size_t row = 0; row < kTrialRows; ++row) {
+    std::vector<TrialFault> truth = {row >= static_cast<std::size_t>(TrialRow::kOutside) ? wobble : gain};
+    if (static_cast<TrialRow>(row) == TrialRow::kTwo) truth.push_back({kLatency, 30.0, 0.0, 5.0});
+    outcomes.push_back(outcome(static_cast<TrialRow>(row), truth, {}));
+    outcomes.back().refused = true;
+  }
+  const auto r = rates(outcomes);
+  for (const auto refused : r.refused) EXPECT_EQ(refused, 1u);
+  EXPECT_DOUBLE_EQ(r.null_false_alarm, 1.0);
+  EXPECT_DOUBLE_EQ(r.background_named, 1.0);
+  EXPECT_DOUBLE_EQ(r.single_in_class, 0.0);
+  EXPECT_DOUBLE_EQ(r.limit_wrong, 1.0);
+  EXPECT_DOUBLE_EQ(r.two_both, 0.0);
+  EXPECT_DOUBLE_EQ(r.outside_unexplained, 0.0);
+  EXPECT_DOUBLE_EQ(r.outside_hard_class_or_unexplained, 0.0);
+}
+
 TEST(TrialRates, OutsideTheCatalogueUnexplainedIsRight) {
   DiagnosedCause unexplained;
   unexplained.cause = {"unexplained", "r_elbow", ""};

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace bodyschema::diagnosis {
 namespace {
 
@@ -33,7 +35,7 @@ DiagnosisOptions picture_options() {
 
 TEST(Verdict, NamesACauseWithItsInterval) {
   auto report = report_of(0.3, {gain_of_elbow()});
-  word_verdict(report, picture_options(), false);
+  word_verdict(report, picture_options());
   EXPECT_EQ(report.verdict, "named");
   EXPECT_EQ(report.sentence, "The log asks for: encoder_gain of r_elbow gain 4 % [3.5, 4.5].");
 }
@@ -42,14 +44,14 @@ TEST(Verdict, SaysAClassWhereSeveralFit) {
   auto cause = gain_of_elbow();
   cause.same.push_back({"eccentricity", "r_elbow", ""});
   auto report = report_of(0.3, {cause});
-  word_verdict(report, picture_options(), false);
+  word_verdict(report, picture_options());
   EXPECT_EQ(report.verdict, "class");
   EXPECT_THAT(report.sentence, HasSubstr("(or eccentricity of r_elbow, which this log cannot tell from it)"));
 }
 
 TEST(Verdict, TrustsNoNameWhereTheFitStillMissesTheOutlines) {
   auto report = report_of(1.3, {gain_of_elbow()});
-  word_verdict(report, picture_options(), false);
+  word_verdict(report, picture_options());
   EXPECT_EQ(report.verdict, "unexplained");
   EXPECT_THAT(report.sentence, HasSubstr("1.3 px"));
   EXPECT_THAT(report.sentence, HasSubstr("encoder_gain of r_elbow"));
@@ -57,25 +59,40 @@ TEST(Verdict, TrustsNoNameWhereTheFitStillMissesTheOutlines) {
 
 TEST(Verdict, SaysNoiseOnlyWhereNoiseIsAllThatIsLeft) {
   auto good = report_of(0.3, {});
-  word_verdict(good, picture_options(), false);
+  word_verdict(good, picture_options());
   EXPECT_EQ(good.verdict, "none");
   EXPECT_THAT(good.sentence, HasSubstr("to its noise"));
 
   auto more = report_of(0.65, {});
-  word_verdict(more, picture_options(), false);
-  EXPECT_EQ(more.verdict, "none");
+  word_verdict(more, picture_options());
+  EXPECT_EQ(more.verdict, "unexplained");
   EXPECT_THAT(more.sentence, Not(HasSubstr("to its noise")));
   EXPECT_THAT(more.sentence, HasSubstr("0.65 px"));
 
-  auto crowd = report_of(0.3, {});
-  word_verdict(crowd, picture_options(), true);
-  EXPECT_EQ(crowd.verdict, "none");
-  EXPECT_THAT(crowd.sentence, HasSubstr("several small errors"));
+  for (const double left_px : {0.3, 0.65}) {
+    auto crowd = report_of(left_px, {});
+    crowd.crowded = true;
+    word_verdict(crowd, picture_options());
+    EXPECT_EQ(crowd.verdict, "none");
+    EXPECT_THAT(crowd.sentence, HasSubstr("several small errors"));
+    EXPECT_THAT(crowd.to_json(), HasSubstr("\"crowded\": true"));
+  }
 
   auto named = report_of(0.65, {gain_of_elbow()});
-  word_verdict(named, picture_options(), false);
+  word_verdict(named, picture_options());
   EXPECT_EQ(named.verdict, "named");
   EXPECT_THAT(named.sentence, HasSubstr("something else is wrong too"));
+}
+
+TEST(Verdict, NamesNoCauseOfWhichTheSizeIsNotKnown) {
+  auto cause = gain_of_elbow();
+  const double inf = std::numeric_limits<double>::infinity();
+  cause.parameters[0].ci95 = {-inf, inf};
+  auto report = report_of(0.3, {cause});
+  word_verdict(report, picture_options());
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, HasSubstr("of a size that this log does not tell"));
+  EXPECT_THAT(report.sentence, Not(HasSubstr("inf")));
 }
 
 TEST(Verdict, SaysWhatAnUnknownStructureFollows) {
@@ -84,7 +101,7 @@ TEST(Verdict, SaysWhatAnUnknownStructureFollows) {
   cause.variable = "velocity";
   cause.same = {cause.cause};
   auto report = report_of(0.3, {cause});
-  word_verdict(report, picture_options(), false);
+  word_verdict(report, picture_options());
   EXPECT_EQ(report.verdict, "unexplained");
   EXPECT_THAT(report.sentence, HasSubstr("follows the velocity of r_elbow"));
 }

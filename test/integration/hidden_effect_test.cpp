@@ -14,6 +14,7 @@
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/bus/messages.hpp"
+#include "diagnosis/binomial.hpp"
 #include "integration/harness.hpp"
 
 /// The simulator hides an effect in a log; `bodyschema diagnose`, another process, gets log and
@@ -22,6 +23,8 @@ namespace bodyschema::integration {
 namespace {
 
 using Json = nlohmann::json;
+using test::attempts_at;
+using test::fewest_right;
 constexpr double kLog_s = 60.0;
 constexpr int kAtOnce = 2;
 
@@ -121,6 +124,11 @@ const Json* cause_of(const Json& report, const Json& fault) {
   return nullptr;
 }
 
+/// The fault itself, not only its like.
+bool is_exactly(const Json& cause, const Json& fault) {
+  return text_of(cause, "name") == text_of(fault, "name") && same_cause(cause, fault);
+}
+
 /// The parameter of a report that the fault's value is.
 const Json* parameter_of(const Json& cause, const Json& fault) {
   std::string wanted;
@@ -134,18 +142,42 @@ const Json* parameter_of(const Json& cause, const Json& fault) {
   return nullptr;
 }
 
-/// In the class; where it is named itself, with the right sign and within twice its 95 % interval
-/// or 15 % of its size; and better on blocks that the fit had not seen.
+/// In the class, and better on blocks that the fit had not seen; where it is named itself, with the
+/// right sign.
 bool found(const Json& report, const Json& fault) {
   const Json* cause = cause_of(report, fault);
-  if (cause == nullptr || !((*cause)["heldout_gain"].get<double>() > 0.0)) return false;
-  if (text_of(*cause, "name") != text_of(fault, "name") || !same_cause(*cause, fault)) return true;
+  if (cause == nullptr || !(*cause)["heldout_gain"].is_number()) return false;
+  if (!((*cause)["heldout_gain"].get<double>() > 0.0)) return false;
+  if (!is_exactly(*cause, fault)) return true;
   const Json* p = parameter_of(*cause, fault);
-  if (p == nullptr || !(*p)["estimate"].is_number()) return false;
-  const double value = fault["value"].get<double>(), estimate = (*p)["estimate"].get<double>();
-  const double half = (*p)["ci95"][1].get<double>() - estimate;
-  return value * estimate > 0.0 && std::abs(value - estimate) <= std::max(2.0 * half, 0.15 * std::abs(value));
+  return p != nullptr && (*p)["estimate"].is_number() &&
+         fault["value"].get<double>() * (*p)["estimate"].get<double>() > 0.0;
 }
+
+/// How the parameters of causes that were named rightly compare with the truth.
+struct Parameters {
+  int known = 0, near = 0, held = 0;
+
+  void add(const Answer& answer) {
+    constexpr double kNear = 0.15;
+    if (!answer.truth.contains("faults") || !answer.report.contains("causes")) return;
+    for (const auto& fault : answer.truth["faults"]) {
+      for (const auto& cause : answer.report["causes"]) {
+        if (!is_exactly(cause, fault)) continue;
+        const Json* p = parameter_of(cause, fault);
+        if (p == nullptr) continue;
+        const double value = fault["value"].get<double>();
+        const auto number = [&](const Json& j) { return j.is_number() ? j.get<double>() : std::nan(""); };
+        const double low = number((*p)["ci95"][0]), high = number((*p)["ci95"][1]);
+        ++known;
+        near += std::abs(number((*p)["estimate"]) - value) <= kNear * std::abs(value);
+        held += low <= value && value <= high;
+        std::cout << fault["name"] << " " << value << ", estimated " << (*p)["estimate"] << " " << (*p)["ci95"]
+                  << (low <= value && value <= high ? "" : ": outside the interval") << std::endl;
+      }
+    }
+  }
+};
 
 std::string sentence_of(const Answer& answer) {
   std::string faults;
@@ -155,26 +187,6 @@ std::string sentence_of(const Answer& answer) {
     }
   }
   return faults + "-> " + (answer.error.empty() ? text_of(answer.report, "sentence") : answer.error);
-}
-
-/// Fewest right answers that a tool which is right with these probabilities falls short of less than
-/// once in a thousand runs.
-int fewest_right(const std::vector<double>& rates) {
-  std::vector<double> chance = {1.0};  // of 0, 1, 2.. right answers
-  for (const double rate : rates) {
-    chance.push_back(0.0);
-    for (std::size_t k = chance.size() - 1; k > 0; --k) {
-      chance[k] = chance[k] * (1.0 - rate) + chance[k - 1] * rate;
-    }
-    chance[0] *= 1.0 - rate;
-  }
-  double at_most = 0.0;
-  int k = 0;
-  for (; k < static_cast<int>(rates.size()); ++k) {
-    at_most += chance[static_cast<std::size_t>(k)];
-    if (at_most > 1e-3) break;
-  }
-  return k;
 }
 
 struct Task {
@@ -201,7 +213,44 @@ std::vector<Answer> ask_all(const Scratch& scratch, const std::vector<Task>& tas
 
 bool all_found(const Answer& answer) {
   const auto& faults = answer.truth["faults"];
-  return std::all_of(faults.begin(), faults.end(), [&](const Json& f) { return found(answer.report, f); });
+  return !faults.empty() &&
+         std::all_of(faults.begin(), faults.end(), [&](const Json& f) { return found(answer.report, f); });
+}
+
+/// Causes in whose class no fault is.
+int spurious(const Answer& answer) {
+  int count = 0;
+  for (const auto& cause : answer.report["causes"]) {
+    count += std::none_of(answer.truth["faults"].begin(), answer.truth["faults"].end(), [&](const Json& fault) {
+      return std::any_of(cause["class"].begin(), cause["class"].end(),
+                         [&](const Json& member) { return same_cause(member, fault); });
+    });
+  }
+  return count;
+}
+
+/// Outside the catalogue: said to be unexplained, or at least a class on the right joint.
+bool not_taken_for_another(const Answer& answer) {
+  const auto verdict = text_of(answer.report, "verdict");
+  if (verdict != "class") return verdict == "unexplained";
+  return std::any_of(answer.report["causes"].begin(), answer.report["causes"].end(), [&](const Json& cause) {
+    return std::any_of(answer.truth["faults"].begin(), answer.truth["faults"].end(), [&](const Json& fault) {
+      return text_of(cause, "joint") == text_of(fault, "joint");
+    });
+  });
+}
+
+/// Runs an experiment on fresh seeds until it goes well, at most so often that one which goes well at
+/// this rate fails less than once in a thousand runs. Empty, or what went wrong each time.
+std::string once_right(double rate, const std::function<std::string(const std::string& seed)>& experiment) {
+  std::string all;
+  for (int i = 0; i < attempts_at(rate); ++i) {
+    const auto wrong = experiment(std::to_string((seed() + static_cast<std::uint64_t>(i)) % 1'000'000'000));
+    if (wrong.empty()) return "";
+    std::cout << "attempt " << i << ": " << wrong << std::endl;
+    all += wrong + "\n";
+  }
+  return all;
 }
 
 TEST(HiddenEffect, IsFoundBehindFreshSeeds) {
@@ -222,13 +271,11 @@ TEST(HiddenEffect, IsFoundBehindFreshSeeds) {
     const auto n = std::to_string(i);
     tasks.push_back({"nothing" + n, babble({}), 0.93,
                      [](const Answer& a) { return text_of(a.report, "verdict") == "none"; }});
-    tasks.push_back({"two" + n, babble({"--hidden-fault", number(), "--hidden-fault", number()}), 0.80,
-                     all_found});
+    // Both in 80 %, and something else besides in at most 10 %.
+    tasks.push_back({"two" + n, babble({"--hidden-fault", number(), "--hidden-fault", number()}), 0.70,
+                     [](const Answer& a) { return all_found(a) && spurious(a) == 0; }});
     tasks.push_back({"outside" + n, babble({"--hidden-fault", number(), "--hidden-outside"}), 0.80,
-                     [](const Answer& a) {
-                       const auto verdict = text_of(a.report, "verdict");
-                       return verdict == "unexplained" || verdict == "class";
-                     }});
+                     not_taken_for_another});
   }
   const auto answers = ask_all(scratch, tasks);
   int right = 0;
@@ -237,10 +284,16 @@ TEST(HiddenEffect, IsFoundBehindFreshSeeds) {
     right += good;
     std::cout << tasks[i].name << (good ? ": right: " : ": WRONG: ") << sentence_of(answers[i]) << std::endl;
   }
+  Parameters parameters;
+  for (const auto& answer : answers) parameters.add(answer);
   std::vector<double> rates;
   for (const auto& task : tasks) rates.push_back(task.demanded_rate);
   EXPECT_GE(right, fewest_right(rates))
       << "of " << tasks.size() << "; repeat with BODYSCHEMA_SEED=" << seed();
+  // Through pictures: nine errors of ten below 15 %, intervals that hold 90 %, each five points worse.
+  const auto least = fewest_right(std::vector<double>(static_cast<std::size_t>(parameters.known), 0.85));
+  EXPECT_GE(parameters.near, least) << "of " << parameters.known << "; repeat with BODYSCHEMA_SEED=" << seed();
+  EXPECT_GE(parameters.held, least) << "of " << parameters.known << "; repeat with BODYSCHEMA_SEED=" << seed();
 }
 
 bool not_testable(const Json& report, const std::string& name, const std::string& joint) {
@@ -249,22 +302,27 @@ bool not_testable(const Json& report, const std::string& name, const std::string
   });
 }
 
-TEST(HiddenEffect, AFrozenJointLeavesTheRestTestableAndOneWayMotionShowsNoBacklash) {
+TEST(HiddenEffect, AFrozenJointLeavesTheRestTestable) {
   const Scratch scratch;
-  const std::string at = std::to_string(seed() % 1'000'000'000);
-  const auto answers = ask_all(
-      scratch,
-      {{"frozen", {"--babble", "60", "--seed", at, "--freeze", "r_wrist_pitch",
-                   "--fault", "encoder_gain:joint=r_elbow,value=4"}},
-       {"one_way", {"--one-way", "40", "--seed", at, "--fault", "backlash:joint=r_elbow,value=1"}}});
-  const auto& frozen = answers[0];
-  ASSERT_TRUE(frozen.error.empty()) << frozen.error;
-  EXPECT_TRUE(all_found(frozen)) << sentence_of(frozen);
-  EXPECT_TRUE(not_testable(frozen.report, "encoder_gain", "r_wrist_pitch"));
-  const auto& one_way = answers[1];
-  ASSERT_TRUE(one_way.error.empty()) << one_way.error;
-  EXPECT_EQ(cause_of(one_way.report, one_way.truth["faults"][0]), nullptr) << sentence_of(one_way);
-  EXPECT_TRUE(not_testable(one_way.report, "backlash", "r_elbow"));
+  EXPECT_EQ(once_right(0.90, [&](const std::string& at) -> std::string {
+              const auto answer = ask(scratch, "frozen" + at, {"--babble", "60", "--seed", at, "--freeze", "r_wrist_pitch",
+                                                               "--fault", "encoder_gain:joint=r_elbow,value=4"});
+              if (!answer.error.empty()) return answer.error;
+              EXPECT_TRUE(not_testable(answer.report, "encoder_gain", "r_wrist_pitch"));
+              return all_found(answer) ? "" : sentence_of(answer);
+            }), "") << "repeat with BODYSCHEMA_SEED=" << seed();
+}
+
+TEST(HiddenEffect, OneWayMotionShowsNoBacklashAndNothingInItsPlace) {
+  const Scratch scratch;
+  EXPECT_EQ(once_right(0.93, [&](const std::string& at) -> std::string {
+              const auto answer = ask(scratch, "one_way" + at, {"--one-way", "40", "--seed", at,
+                                                                "--fault", "backlash:joint=r_elbow,value=1"});
+              if (!answer.error.empty()) return answer.error;
+              EXPECT_EQ(cause_of(answer.report, answer.truth["faults"][0]), nullptr) << sentence_of(answer);
+              EXPECT_TRUE(not_testable(answer.report, "backlash", "r_elbow"));
+              return answer.report["causes"].empty() ? "" : sentence_of(answer);
+            }), "") << "repeat with BODYSCHEMA_SEED=" << seed();
 }
 
 /// Every event of a log in order of its time stamp, to be edited.
@@ -337,44 +395,60 @@ std::vector<LogEvent> with_random_directions(std::vector<LogEvent> events, std::
   return events;
 }
 
-TEST(HiddenEffect, DuplicatedFramesSharpenNothingAndShuffledDirectionsShowNoBacklash) {
-  const Scratch scratch;
-  const std::string at = std::to_string(seed() % 1'000'000'000);
-  const auto written = simulate(scratch, "plain", {"--babble", "40", "--seed", at, "--set", "simulator.cameras.rate_hz=5",
-                                                   "--fault", "backlash:joint=r_elbow,value=1.5"});
-  ASSERT_EQ(written.error, "");
+/// Empty, or what a tool does wrong with a log of backlash whose frames come twice and whose directions
+/// of motion are shuffled.
+std::string wrong_with_copies(const Scratch& scratch, const std::string& at) {
+  const auto written = simulate(scratch, "plain" + at, {"--babble", "40", "--seed", at, "--set",
+                                                        "simulator.cameras.rate_hz=5", "--fault",
+                                                        "backlash:joint=r_elbow,value=1.5"});
+  if (!written.error.empty()) return written.error;
   const auto events = events_of(written.log);
   auto twice = written, shuffled = written;
-  twice.log = scratch / "twice.log";
-  shuffled.log = scratch / "shuffled.log";
+  twice.log = scratch / ("twice" + at + ".log");
+  shuffled.log = scratch / ("shuffled" + at + ".log");
   write_events(twice.log, doubled(events));
   write_events(shuffled.log, with_random_directions(events, seed()));
   const std::vector<std::string> every = {"--picture-rate", "100"};
   std::vector<Answer> answers(3);
   {
-    std::jthread other([&] { answers[1] = diagnose(scratch, "twice", twice, every); });
-    answers[0] = diagnose(scratch, "plain", written, every);
-    answers[2] = diagnose(scratch, "shuffled", shuffled, every);
+    std::jthread other([&] { answers[1] = diagnose(scratch, "twice" + at, twice, every); });
+    answers[0] = diagnose(scratch, "plain" + at, written, every);
+    answers[2] = diagnose(scratch, "shuffled" + at, shuffled, every);
   }
-  for (const auto& answer : answers) ASSERT_EQ(answer.error, "");
+  for (const auto& answer : answers) {
+    if (!answer.error.empty()) return answer.error;
+  }
   const auto& fault = answers[0].truth["faults"][0];
   const Json* one = cause_of(answers[0].report, fault);
   const Json* two = cause_of(answers[1].report, fault);
-  ASSERT_NE(one, nullptr) << sentence_of(answers[0]);
-  ASSERT_NE(two, nullptr) << sentence_of(answers[1]);
-  EXPECT_EQ(answers[1].report["causes"].size(), answers[0].report["causes"].size()) << sentence_of(answers[1]);
+  if (one == nullptr) return "plain: " + sentence_of(answers[0]);
+  if (two == nullptr || answers[1].report["causes"].size() != answers[0].report["causes"].size()) {
+    return "twice: " + sentence_of(answers[1]);
+  }
   const auto width = [](const Json& cause) {
     const auto& ci = cause["parameters"][0]["ci95"];
-    return ci[1].get<double>() - ci[0].get<double>();
+    return ci[0].is_number() && ci[1].is_number() ? ci[1].get<double>() - ci[0].get<double>() : std::nan("");
   };
-  EXPECT_NEAR(width(*two), width(*one), 0.15 * width(*one));  // twice the frames would make it 0.71
-  EXPECT_LT((*two)["z"].get<double>(), 1.2 * (*one)["z"].get<double>());
-  EXPECT_EQ(cause_of(answers[2].report, fault), nullptr) << sentence_of(answers[2]);
+  // Twice the frames would make the interval 0.71 as wide.
+  if (!(std::abs(width(*two) - width(*one)) <= 0.15 * width(*one))) {
+    return "intervals " + one->dump() + " and, with all frames twice, " + two->dump();
+  }
+  if (!((*two)["z"].get<double>() < 1.2 * (*one)["z"].get<double>())) return "z of twice the frames: " + two->dump();
+  if (cause_of(answers[2].report, fault) != nullptr) return "shuffled: " + sentence_of(answers[2]);
+  return "";
+}
+
+TEST(HiddenEffect, DuplicatedFramesSharpenNothingAndShuffledDirectionsShowNoBacklash) {
+  const Scratch scratch;
+  EXPECT_EQ(once_right(0.90, [&](const std::string& at) { return wrong_with_copies(scratch, at); }), "")
+      << "repeat with BODYSCHEMA_SEED=" << seed();
 }
 
 TEST(BinomialBound, IsThatOfTables) {
   EXPECT_EQ(fewest_right(std::vector<double>(8, 0.8)), 2);   // at most 1 of 8: 0.00008, 2: 0.0012
   EXPECT_EQ(fewest_right(std::vector<double>(20, 0.9)), 13); // at most 12 of 20: 0.0004, 13: 0.0024
+  EXPECT_EQ(attempts_at(0.93), 3);  // 0.07^3 = 0.0003
+  EXPECT_EQ(attempts_at(0.5), 10);
 }
 
 }  // namespace

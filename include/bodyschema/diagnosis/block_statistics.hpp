@@ -59,9 +59,6 @@ class BlockStatistics {
   /// With precisions above zero columns need not be independent.
   [[nodiscard]] Eigen::VectorXd heldout_with_prior(const Columns& columns,
                                                    const Eigen::VectorXd& precision) const;
-  /// r'Wr per block with given values of the columns.
-  [[nodiscard]] Eigen::VectorXd loss(const Columns& columns,
-                                     const Eigen::Ref<const Eigen::VectorXd>& values) const;
 
  private:
   std::vector<Block> blocks_;

@@ -18,16 +18,13 @@ struct DiagnosisOptions {
   SelectionOptions selection;
   int baseline_iterations = 8;
   int refit_iterations = 4;
-  /// Effects that every real robot has and that the baseline fits beside the offsets. A joint or
-  /// source after a colon.
+  /// Effects that every real robot has and that the baseline fits beside the offsets.
   std::vector<CauseName> nuisances;
   /// Sizes of nuisances, by effect name in the unit of its parameter, that are put up with: a
   /// picture's blur and threshold alone make a mask 0.1 px fatter, and not everywhere alike. The same
   /// 0.1 px at the fingertips, a hand's length from the origin of their link at 0.3 m, is 0.1 % of the
   /// mesh, at a forearm's flanks 0.4 %. (Detectable is 0.6 %.)
   std::map<std::string, double> tolerances = {{"silhouette_bias", 0.1}, {"mesh_scale", 0.2}};
-  /// Causes that are not in this log whatever the data say, with the reason.
-  std::vector<NotTestable> excluded;
   /// Instead of searching: exactly these causes are fitted (to measure what a known one is worth).
   std::optional<std::vector<CauseName>> fixed_causes;
   /// Where the fit of the offsets starts, rad by joint (encoder = true + offset); others at zero.

@@ -35,7 +35,9 @@ struct DiagnosedCause {
   std::vector<CauseName> same;
   std::string advice;  ///< the motion that would tell them apart; empty for a class of one
   double z = 0.0;
-  double heldout_gain = 0.0;  ///< share of the baseline's held-out loss
+  /// Share that it takes away of the held-out loss of the model `before`: without any cause that the
+  /// selection found.
+  double heldout_gain = 0.0;
 };
 
 struct NotTestable {
@@ -55,6 +57,9 @@ struct HeldoutError {
   double rms_px = 0.0;    ///< along the outline's normals
   double hand_mm = 0.0;   ///< rms of the hand's displacement that the residuals ask for
   double hand_deg = 0.0;
+  /// Share of the predicted outline that has a counterpart in the pictures; `rms_px` speaks of that
+  /// part alone. 1 where the source knows which point belongs to which.
+  double outline_found = 1.0;
 };
 
 /// One bar of the chart of all candidates.
@@ -88,6 +93,8 @@ struct DiagnosisReport {
   std::vector<DiagnosedCause> causes;
   std::vector<NotTestable> not_testable;
   std::vector<ExclusionLimit> exclusion_limits;
+  bool crowded = false;  ///< several small errors share what is left, none of them a cause by itself
+  /// Before: offsets and those nuisances that are not themselves found to be causes.
   HeldoutError before, after;
   std::map<std::string, double> offsets_deg_before, offsets_deg_after;
   std::map<std::string, std::array<double, 2>> offsets_ci95_deg;
@@ -98,7 +105,6 @@ struct DiagnosisReport {
   std::vector<CandidateBar> bars;
   double z_threshold = 0.0, gain_threshold = 0.0;
   std::vector<ResidualSample> samples;
-  double rest_gain = 0.0, rest_t = 0.0;
   Microseconds begin_utime = 0;
   double duration_s = 0.0, block_s = 0.0, noise_correlation_s = 0.0;
   std::size_t views = 0, blocks = 0;
@@ -113,6 +119,8 @@ struct DiagnosisReport {
 
   /// The keys of report.json.
   [[nodiscard]] std::string to_json() const;
+  /// Makes the folder for a report before the long work; throws FileError where nothing can be written.
+  static void prepare(const std::filesystem::path& directory);
   /// Writes report.json and extended_model.yaml; throws FileError.
   void write(const std::filesystem::path& directory) const;
 };

@@ -56,6 +56,7 @@ struct CompressedView {
   /// however far apart they are.
   double misfit = 0.0;
   double outline = 0.0;
+  double matched = 0.0;  ///< ... and how many of them `vector` and `square` hold
 };
 
 /// One outline point with its residual.

@@ -61,7 +61,9 @@ struct SelectionOptions {
 /// How a candidate fared when tested against the model so far.
 struct CandidateScore {
   double z = 0.0;
-  double gain = 0.0;  ///< held-out loss it takes away, as a share of the baseline's
+  /// Held-out loss it takes away, as a share of the baseline's; of a selected cause, of the loss of the
+  /// baseline without nuisances that are selected.
+  double gain = 0.0;
   double t = 0.0;     ///< the same over its standard error between blocks
   bool testable = true;
 };
@@ -73,30 +75,22 @@ struct SelectedCause {
   bool wanders = false;  ///< a slip or drift whose joint also moves otherwise over time
 };
 
-/// How large a cause could be without the data showing it.
-struct Limit {
-  std::size_t candidate = 0;
-  std::vector<double> limit;  ///< per column: excluded with 95 % confidence above this
-};
-
 struct Selection {
   std::vector<SelectedCause> causes;
   std::vector<std::size_t> model;  ///< candidates in the final fit: nuisances, then causes
-  std::vector<Limit> limits;       ///< of candidates that are not causes
   std::vector<CandidateScore> first_scores;  ///< all candidates against the baseline
   std::vector<CandidateScore> last_scores;   ///< all candidates against the final model
   std::vector<std::size_t> not_testable;     ///< candidates without independent information
-  double baseline_heldout = 0.0;
   /// Held-out loss, as a share of the baseline's, that all other causes together would take away,
   /// each a little: small errors that live together. With its paired t.
   double rest_gain = 0.0, rest_t = 0.0;
   bool crowded = false;            ///< many small errors live together
   std::vector<SelectedCause> set_aside;  ///< causes that did not stand out from the crowd
-  double final_heldout = 0.0;
 };
 
 /// Decides which candidates the data asks for: greedy by held-out gain, with cluster-robust Wald z,
 /// then backwards drop, then the class of each.
+/// Throws DataError saying what to record where even the baseline cannot be fitted.
 /// @param always  columns of the baseline that are not candidates (joint offsets)
 Selection select_causes(const BlockStatistics& statistics, const Columns& always,
                         const std::vector<Candidate>& candidates,

@@ -13,18 +13,17 @@
 
 namespace bodyschema {
 
-/// The rows of the design's table.
+/// The rows of the table in docs/diagnose.md.
 enum class TrialRow { kNull, kBackground, kSingle, kLimit, kTwo, kOutside, kOutsideHard };
 inline constexpr std::array<const char*, 7> kTrialRowNames = {
     "null", "background", "single", "limit", "two", "outside", "outside_hard"};
 inline constexpr std::size_t kTrialRows = kTrialRowNames.size();
 /// Logs per row.
 using TrialCounts = std::array<int, kTrialRows>;
-/// `singles` single-cause logs, other rows in proportion as in the design's table; at least one.
+/// `singles` single-cause logs, other rows in proportion as in docs/diagnose.md; at least one.
 TrialCounts trial_counts(int singles);
 
-/// Where a cause can sit on this robot and the smallest size found 90 % of the time (the design's
-/// figures), value 0.
+/// Where a cause can sit on this robot and the smallest size to be found 90 % of the time, value 0.
 std::vector<TrialFault> trial_faults(const TrialRobot& robot, bool outside_catalogue);
 /// The log of one row with hidden faults drawn from a seed. Every second null log has a burst of
 /// noise, by its `number` in the row.
@@ -53,7 +52,10 @@ struct TrialOutcome {
   std::uint64_t seed = 0;
   std::vector<TrialFault> truth;
   DiagnosisReport report;
-  double removable_excess = 0.0;  ///< share of it that the extension removed on held-out blocks
+  bool refused = false;  ///< no answer; `report.sentence` says why
+  /// Share that the extension removed, on held-out blocks, of what fitting the true cause removes; none
+  /// where that is nothing, or the cause no linear fit finds (the time of a slip).
+  std::optional<double> removed_share;
   double offset_error_before_deg = 0.0, offset_error_after_deg = 0.0;
   double seconds = 0.0;
 };
@@ -65,9 +67,10 @@ std::vector<TrialOutcome> run_diagnosis_trials(
     const TrialLogMaker& make_log,
     const std::function<void(const TrialOutcome&, std::size_t done, std::size_t total)>& each = {});
 
-/// The rates of the design's table. A rate without trials is NaN.
+/// The rates of the table in docs/diagnose.md. A rate without trials is NaN.
 struct TrialRates {
   std::array<std::size_t, kTrialRows> trials{};
+  std::array<std::size_t, kTrialRows> refused{};  ///< of them; in every row a refusal is a failure
   double null_false_alarm = 0.0;
   double background_named = 0.0;
   double single_in_class = 0.0, single_exact = 0.0, single_wrong = 0.0, single_mean_class = 0.0;
@@ -77,6 +80,7 @@ struct TrialRates {
   double outside_hard_joint = 0.0, outside_hard_class_or_unexplained = 0.0;
   std::size_t parameters = 0;  ///< how many were estimated
   double sign = 0.0, error_median = 0.0, error_p90 = 0.0, coverage95 = 0.0;
+  std::size_t gains = 0;  ///< logs of one cause of which the gain was measured
   double removable_excess_median = 0.0, offset_improvement_median = 0.0;
 };
 TrialRates rates(const std::vector<TrialOutcome>& outcomes);

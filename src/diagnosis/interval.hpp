@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+
+#include "bodyschema/diagnosis/block_statistics.hpp"
+
+namespace bodyschema::diagnosis {
+
+/// How far an estimate may be from the truth: one rule for the intervals of causes and offsets and for
+/// the limits of what was not found.
+class IntervalRule {
+ public:
+  /// @param final_fit  of the final model: how much wider its errors are than white noise would make
+  ///        them is the least that is believed of any fit
+  /// @param systematic_share  as DiagnosisOptions::systematic_share
+  IntervalRule(const BlockFit& final_fit, std::size_t blocks, double systematic_share);
+
+  /// Half of the 95 % interval of a fit's column, in units of the column; infinite where the fit is not
+  /// usable.
+  /// @param common  what the errors that all blocks have in common are a share of: the estimate
+  [[nodiscard]] double half(const BlockFit& fit, Eigen::Index column, double common) const;
+
+ private:
+  double inflation_, student_, systematic_share_;
+};
+
+}  // namespace bodyschema::diagnosis

@@ -1,0 +1,90 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <set>
+
+#include "bodyschema/effects/catalogue.hpp"
+#include "diagnosis/trial_robot.hpp"
+
+/// What a log excludes, at the level of silhouettes.
+namespace bodyschema {
+namespace {
+
+/// The limit on the parameter that a fault's value is; null where there is none.
+const ExclusionLimit* limit_of(const DiagnosisReport& report, const TrialFault& fault) {
+  const auto at = std::find_if(report.exclusion_limits.begin(), report.exclusion_limits.end(),
+                               [&](const auto& limit) { return limit.cause == fault.cause; });
+  return at == report.exclusion_limits.end() ? nullptr : &*at;
+}
+
+TEST(ExclusionLimits, HoldWhatWasTooSmallToBeFound) {
+  // Half of what can be detected, so that the limits speak of nearly all of it.
+  constexpr int kLogs = 40;
+  const auto places = trial_faults(test::robot(), false);
+  std::set<std::string> named;
+  std::mt19937_64 random(test::seed());
+  int limited = 0, held = 0;
+  double tightest = 1e9;
+  for (int i = 0; i < kLogs; ++i) {
+    auto fault = places[random() % places.size()];
+    fault.value = 0.5 * fault.detectable;
+    fault.second = fault.cause.name == "slip" ? 0.5 : 0.0;
+    TrialOptions options;
+    options.duration_s = 30.0;
+    options.faults = {fault};
+    const auto log = make_synthetic_log(test::robot(), options, random());
+    const auto report = diagnose(*log, test::usual_options(*log));
+    const auto* limit = limit_of(report, fault);
+    if (limit == nullptr) continue;
+    ++limited;
+    held += limit->limit >= std::abs(fault.value);
+    tightest = std::min(tightest, limit->limit / fault.detectable);
+    if (limit->limit < std::abs(fault.value)) {
+      std::cout << fault.cause.text() << " " << fault.value << " is above its limit " << limit->limit << std::endl;
+    }
+  }
+  std::cout << held << " of " << limited << " limits hold; the tightest is " << tightest
+            << " of what can be detected" << std::endl;
+  EXPECT_GE(limited, kLogs / 2);
+  // Of limits that hold 95 %, fewer than 32 of 40 (25 of 30) less than once in a thousand.
+  EXPECT_GE(held, static_cast<int>(std::floor(0.95 * limited - 3.3 * std::sqrt(0.95 * 0.05 * limited))));
+  EXPECT_LT(tightest, 1.0);
+}
+
+TEST(ExclusionLimits, AreOfEveryCauseThatIsNeitherNamedNorUntestable) {
+  // A nuisance, a cause of one joint, a slip, and nothing at all.
+  const std::vector<std::vector<TrialFault>> logs = {
+      {{{"finger_posture", "", ""}, 5.0, 0.0, 0.0}, {{"encoder_gain", "r_elbow", ""}, 5.0, 0.0, 0.0}},
+      {{{"slip", "r_elbow", ""}, 2.0, 0.4, 0.0}},
+      {}};
+  for (const auto& faults : logs) {
+    TrialOptions options;
+    options.duration_s = 30.0;
+    options.faults = faults;
+    const auto log = make_synthetic_log(test::robot(), options, test::log_seed());
+    const auto report = diagnose(*log, test::usual_options(*log));
+    EXPECT_EQ(report.causes.size(), faults.size()) << report.sentence;
+    for (const auto& name : effect_names()) {
+      if (name == "joint_offset") continue;
+      for (const auto& target : effect_targets(name, log->roles())) {
+        const CauseName cause{name, target.joint, target.source};
+        const auto is = [&](const auto& item) { return item.cause == cause; };
+        const auto count = [&](const auto& list) { return std::count_if(list.begin(), list.end(), is); };
+        const bool possible = std::any_of(report.causes.begin(), report.causes.end(), [&](const auto& named) {
+          return std::find(named.same.begin(), named.same.end(), cause) != named.same.end();
+        });
+        const bool limited = count(report.exclusion_limits) > 0;
+        const auto untestable = count(report.not_testable);
+        EXPECT_EQ(possible + limited + untestable, 1) << cause.text() << ": named or in a class " << possible
+                                                      << ", limited " << limited << ", not testable " << untestable
+                                                      << "; " << report.sentence;
+      }
+    }
+    for (const auto& limit : report.exclusion_limits) EXPECT_TRUE(std::isfinite(limit.limit)) << limit.cause.text();
+  }
+}
+
+}  // namespace
+}  // namespace bodyschema
