@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace bodyschema::test {
@@ -16,29 +17,59 @@ namespace bodyschema::test {
 /// Whether the client closes its side once it has sent its request.
 enum class Afterwards { kListen, kHangUp };
 
-/// Sends bytes as they are to a port of this machine and returns everything that comes back, until the
-/// other side closes or says nothing for `patience`: a client that may misbehave.
+/// A client's socket, connected to a port of this machine or not, as is_open() tells. Neither sending
+/// nor receiving waits longer than `patience`.
+class PageClient {
+ public:
+  explicit PageClient(int port, std::chrono::milliseconds patience = std::chrono::seconds(5),
+                      in_addr_t address = htonl(INADDR_LOOPBACK))
+      : descriptor_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    const timeval limit{patience.count() / 1000, patience.count() % 1000 * 1000};
+    setsockopt(descriptor_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+    setsockopt(descriptor_, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
+    sockaddr_in there{};
+    there.sin_family = AF_INET;
+    there.sin_port = htons(static_cast<std::uint16_t>(port));
+    there.sin_addr.s_addr = address;
+    open_ = connect(descriptor_, reinterpret_cast<const sockaddr*>(&there), sizeof there) == 0;
+  }
+  ~PageClient() {
+    if (descriptor_ >= 0) close(descriptor_);
+  }
+  PageClient(PageClient&& other) noexcept
+      : descriptor_(std::exchange(other.descriptor_, -1)), open_(std::exchange(other.open_, false)) {}
+  PageClient& operator=(PageClient&&) = delete;
+
+  [[nodiscard]] bool is_open() const { return open_; }
+  /// Whether the other side took them all.
+  bool send(std::string_view bytes) {
+    return ::send(descriptor_, bytes.data(), bytes.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(bytes.size());
+  }
+  void hang_up() { shutdown(descriptor_, SHUT_WR); }
+  /// Everything that comes back, until the other side closes or says nothing for `patience`.
+  std::string receive() {
+    std::string answer;
+    std::vector<char> text(65536);
+    for (ssize_t n = 0; (n = recv(descriptor_, text.data(), text.size(), 0)) > 0;) {
+      answer.append(text.data(), static_cast<std::size_t>(n));
+    }
+    return answer;
+  }
+
+ private:
+  int descriptor_;
+  bool open_ = false;
+};
+
+/// Sends bytes as they are and returns everything that comes back: a client that may misbehave.
 inline std::string talk(int port, std::string_view request,
                         std::chrono::milliseconds patience = std::chrono::seconds(5),
                         Afterwards afterwards = Afterwards::kListen) {
-  const int descriptor = socket(AF_INET, SOCK_STREAM, 0);
-  const timeval limit{patience.count() / 1000, patience.count() % 1000 * 1000};
-  setsockopt(descriptor, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(static_cast<std::uint16_t>(port));
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  std::string answer;
-  if (connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
-    (void)!send(descriptor, request.data(), request.size(), MSG_NOSIGNAL);
-    if (afterwards == Afterwards::kHangUp) shutdown(descriptor, SHUT_WR);
-    std::vector<char> text(65536);
-    for (ssize_t n = 0; (n = recv(descriptor, text.data(), text.size(), 0)) > 0;) {
-      answer.append(text.data(), static_cast<std::size_t>(n));
-    }
-  }
-  close(descriptor);
-  return answer;
+  PageClient client(port, patience);
+  if (!client.is_open()) return {};
+  client.send(request);
+  if (afterwards == Afterwards::kHangUp) client.hang_up();
+  return client.receive();
 }
 
 /// The answer, header and body, to a request for a page.

@@ -24,13 +24,15 @@ struct CameraPicture {
 ///
 /// Answers GET on 127.0.0.1 only, for a handful of fixed paths; nothing is read from disk, nothing
 /// can be changed, other hosts' pages cannot read it. The estimator hands over copies at a bounded
-/// rate, and none at all while nobody watches; drawing and encoding happen in the page's threads, which
-/// the scheduler serves after the estimator's. Any thread may call.
+/// rate, and none at all while nobody watches; drawing and encoding happen in the page's thread, which
+/// the scheduler serves after the estimator's. Any thread may call; the estimator's calls (add,
+/// wants_pictures, set_pictures) wait for nobody, they rather leave something out.
 class LivePage {
  public:
   /// Throws DeviceError when the port cannot be had or the page was not built in.
   /// @param port  0: any free one, see port()
   LivePage(int port, std::vector<std::string> camera_names);
+  /// Within a second, whatever its clients do.
   ~LivePage();
   LivePage(const LivePage&) = delete;
   LivePage& operator=(const LivePage&) = delete;
