@@ -306,6 +306,7 @@ struct Estimator::Impl {
     std::optional<Candidate> found;
     bool accepted = false;
     double gain = 0.0;
+    forget_a_stall(observation);
     reconsider(observation);
     const PullJudge usual = pulls;
     if (fusion.frames() > 0.5) {
@@ -492,13 +493,28 @@ struct Estimator::Impl {
     estimate.state = current;
   }
 
+  /// Encoders of the estimated joints at the exposure of the first camera that saw something.
+  bool read_encoders(const Observation& observation) {
+    const auto seen = std::find_if(observation.cameras.begin(), observation.cameras.end(),
+                                   [](const auto& camera) { return camera.has_value(); });
+    if (seen == observation.cameras.end()) return false;
+    for (Eigen::Index k = 0; k < joints; ++k) reading(k) = (*seen)->joints.q(joint_index[static_cast<std::size_t>(k)]);
+    return true;
+  }
+
+  /// An encoder that stalled reads on: nothing that its dead reading taught may outlive it.
+  void forget_a_stall(const Observation& observation) {
+    if (!read_encoders(observation) || !stalled.ends(reading)) return;
+    fusion.forget_all();
+    pulls.forget();
+    shelf.reset();
+    surprised_frames = 0;
+  }
+
   /// An encoder that stands while its joint moves: what the estimate lags behind is added to its
   /// uncertainty, and once it is certain, nothing is called converged.
   void look_for_stalls(const Observation& observation, Estimate& estimate) {
-    const auto seen = std::find_if(observation.cameras.begin(), observation.cameras.end(),
-                                   [](const auto& camera) { return camera.has_value(); });
-    if (particles_only() || seen == observation.cameras.end()) return;
-    for (Eigen::Index k = 0; k < joints; ++k) reading(k) = (*seen)->joints.q(joint_index[static_cast<std::size_t>(k)]);
+    if (particles_only() || !read_encoders(observation)) return;
     const bool remembers = fusion.frames() > kSettled_frames;
     const bool settled = remembers && !contradicted;
     stalled.look(reading, estimate.offset_rad, estimate.covariance_rad2.diagonal().cwiseMax(0.0).cwiseSqrt(), explained,

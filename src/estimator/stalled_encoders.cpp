@@ -14,6 +14,17 @@ constexpr int kMoves = 3;               // a slip is one, seen as two at most
 
 }  // namespace
 
+bool StalledEncoders::Track::moved_to(double reading) const { return std::abs(reading_rad - reading) > kStands_rad; }
+
+bool StalledEncoders::ends(const Eigen::VectorXd& reading_rad) const {
+  for (Eigen::Index k = 0; k < reading_rad.size(); ++k) {
+    const Track& track = tracks_[static_cast<std::size_t>(k)];
+    if (track.stood < kStanding || !track.moved_to(reading_rad(k))) continue;
+    if (track.moves > 0 || frames_since_drop_ < std::min(track.stood, kTaught)) return true;
+  }
+  return false;
+}
+
 double StalledEncoders::Track::drift_rad() const {
   if (recent == 0) return 0.0;
   const auto end = recent_rad.begin() + static_cast<std::ptrdiff_t>(std::min(recent, kRecent));
@@ -30,7 +41,7 @@ void StalledEncoders::look(const Eigen::VectorXd& reading_rad, const Eigen::Vect
   frames_since_drop_ = remembered_ && !remembers ? 0 : frames_since_drop_ + 1;
   for (Eigen::Index k = 0; k < reading_rad.size(); ++k) {
     Track& track = tracks_[static_cast<std::size_t>(k)];
-    if (std::abs(track.reading_rad - reading_rad(k)) > kStands_rad) {
+    if (track.moved_to(reading_rad(k))) {
       track = {};
       track.reading_rad = reading_rad(k);
     }

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <random>
+
 #include "estimator/own_robot.hpp"
 #include "estimator/synthetic_reach.hpp"
 
@@ -215,6 +218,49 @@ TEST_F(EstimatorOnOwnRobot, AStalledEncoderIsNamedAndNothingFalseIsCalledConverg
     EXPECT_EQ(estimate.state, EstimatorState::kConverged);
     EXPECT_LT((estimate.offset_rad - offset_rad_).cwiseAbs().maxCoeff(), radians(1.5));
   }
+}
+
+// A stall that ends is as dangerous as one that begins: what was learned under the dead reading must not
+// outlive it. A reach to and fro, a quarter of the frames shed, stalls that begin and end anywhere.
+TEST_F(EstimatorOnOwnRobot, WhatAStallTaughtDoesNotOutliveIt) {
+  const int elbow = 3;
+  const Eigen::Index index = robot_->joint_index(setup_.estimated_joints[elbow]);
+  const char* given = std::getenv("BODYSCHEMA_SEED");
+  const auto seed = given != nullptr ? static_cast<unsigned>(std::stoul(given)) : std::random_device{}();
+  std::mt19937 random(seed);
+  const auto between = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+  int converged_after = 0;
+  constexpr int kTrials = 6;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Estimator estimator(robot_, setup_, rig_, options_);
+    const int stalls = between(30, 90), lives = stalls + between(20, 200), end = lives + 60;
+    const int period = between(40, 120);
+    SCOPED_TRACE("BODYSCHEMA_SEED=" + std::to_string(seed) + ", stalls from frame " + std::to_string(stalls) + " to " +
+                 std::to_string(lives) + ", there and back in " + std::to_string(period));
+    double stalled_reading = 0.0;
+    for (int frame = 0; frame < end; ++frame) {
+      if (between(0, 3) == 0 && frame != stalls) continue;
+      const double s = 0.5 - 0.5 * std::cos(2.0 * kPi * frame / period);
+      Eigen::VectorXd q = pose(3.0 * s - 1.0);
+      Observation seen = reach_->observe(q, frame * 33'333);
+      double& reading = seen.cameras[0]->joints.q(index);
+      Eigen::VectorXd truth = offset_rad_;
+      if (frame == stalls) stalled_reading = reading;
+      if (frame >= stalls && frame < lives) {
+        truth(elbow) += stalled_reading - reading;
+        reading = seen.cameras[1]->joints.q(index) = stalled_reading;
+      }
+      const Estimate estimate = estimator.step(seen);
+      if (estimate.state != EstimatorState::kConverged) continue;
+      converged_after += frame >= lives;
+      for (Eigen::Index k = 0; k < truth.size(); ++k) {
+        const double sd = std::sqrt(estimate.covariance_rad2(k, k));
+        EXPECT_LT(std::abs(estimate.offset_rad(k) - truth(k)), std::max(5.0 * sd, radians(1.0)))
+            << "frame " << frame << ", joint " << k;
+      }
+    }
+  }
+  EXPECT_GT(converged_after, 10 * kTrials);
 }
 
 // A single frame that is wrong, as when encoders jump to and fro: what was learned before counts again

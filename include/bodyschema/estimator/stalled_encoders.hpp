@@ -22,6 +22,10 @@ class StalledEncoders {
   /// @param remembers  whether there is such a memory, be it doubted at the moment
   void look(const Eigen::VectorXd& reading_rad, const Eigen::VectorXd& offset_rad, const Eigen::VectorXd& sd_rad,
             bool fits, bool settled, bool remembers);
+  /// Whether a reading that stood under suspicion has moved again: its joint was seen to move meanwhile, or
+  /// a memory was dropped in its last ten seconds (300 frames). What has been learned since is wrong then.
+  /// Asked with a frame's readings before `look` sees the frame.
+  [[nodiscard]] bool ends(const Eigen::VectorXd& reading_rad) const;
   /// How far each offset has run in 30 frames (a second at 30 Hz) under a reading that stands, radians; zero
   /// for joints whose reading moves. A memory of frames lags behind a moving arm by about as much, which
   /// its own covariance does not tell.
@@ -42,6 +46,7 @@ class StalledEncoders {
  private:
   static constexpr std::size_t kRecent = 30;    ///< frames
   static constexpr std::size_t kStanding = 15;  ///< frames; readings of a slow joint stand for some
+  static constexpr std::size_t kTaught = 300;   ///< frames for which a dropped memory casts doubt on the next
   /// Since the reading last changed.
   struct Track {
     double reading_rad = 0.0;
@@ -55,6 +60,7 @@ class StalledEncoders {
     double moved_rad = 0.0;
     std::array<double, kRecent> recent_rad{};  ///< settled offsets, round and round
     std::size_t recent = 0;                    ///< how many there were
+    [[nodiscard]] bool moved_to(double reading_rad) const;
     [[nodiscard]] double drift_rad() const;
   };
   std::vector<Track> tracks_;
@@ -62,7 +68,7 @@ class StalledEncoders {
   bool doubtful_ = false;
   bool dropped_while_standing_ = false;
   bool remembered_ = false;                   ///< there has been a memory
-  std::size_t frames_since_drop_ = kRecent;
+  std::size_t frames_since_drop_ = kTaught;
   Eigen::Index joint_ = -1;
 };
 
