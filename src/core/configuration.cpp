@@ -172,6 +172,7 @@ class Reader {
     merged.mapping = true;
     merged.file = file;
     own = convert(root, file, 0);
+    check_version(own);
     for (auto it = own.children.begin(); it != own.children.end(); ++it) {
       if (it->name != "include") continue;
       Entry include = std::move(it->entry);
@@ -229,6 +230,17 @@ class Reader {
   }
 
  private:
+  /// Of every file by itself: the one that includes it has a version of its own.
+  static void check_version(Entry& file) {
+    const Entry* version = file.find("version");
+    if (version == nullptr || (!version->mapping && version->leaf.IsScalar() &&
+                               version->leaf.Scalar() == std::to_string(Configuration::kVersion))) {
+      return;
+    }
+    throw ConfigurationError(where(*version) + ": key 'version' is " + shown(*version) + "; expected " +
+                             std::to_string(Configuration::kVersion));
+  }
+
   void count_items(const YAML::Node& node, const fs::path& file, int depth) {
     for (const auto& item : node) {
       if (++entries_ > kMaxEntries || depth > kMaxDepth) {

@@ -139,11 +139,8 @@ std::string accessor_danger(std::string_view text) {
 }  // namespace
 
 std::string collada_danger(std::string_view text) {
+  if (std::string danger = xml_danger(text, kMaxDepth); !danger.empty()) return danger;
   if (std::string danger = accessor_danger(text); !danger.empty()) return danger;
-  if (const int depth = xml_depth(text); depth > kMaxDepth) {
-    return "elements nest " + std::to_string(depth) + " deep, at most " +
-           std::to_string(kMaxDepth) + " expected";
-  }
   Scene scene;
   std::vector<std::size_t> open;
   std::vector<std::size_t> tops;

@@ -9,9 +9,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path absolute_normal(const fs::path& path) {
-  fs::path normal = fs::absolute(path).lexically_normal();
-  return normal.has_filename() ? normal : normal.parent_path();  // no trailing slash
+/// Where a path leads, links followed as far as it exists.
+fs::path real(const fs::path& path) {
+  std::error_code error;
+  fs::path found = fs::weakly_canonical(fs::absolute(path), error);
+  // A link that leads in a circle leads nowhere.
+  if (error) found = fs::absolute(path).lexically_normal();
+  return found.has_filename() ? found : found.parent_path();  // no trailing slash
 }
 
 bool lies_in(const fs::path& path, const fs::path& root) {
@@ -29,9 +33,9 @@ bool drop_prefix(std::string& text, const std::string& prefix) {
 fs::path resolve_mesh(const std::string& filename, const std::string& where,
                       const fs::path& urdf_directory, const std::vector<fs::path>& search_roots) {
   std::vector<fs::path> roots;
-  for (const auto& root : search_roots) roots.push_back(absolute_normal(root));
+  for (const auto& root : search_roots) roots.push_back(real(root));
   std::vector<fs::path> bases = roots;
-  roots.insert(roots.begin(), absolute_normal(urdf_directory));
+  roots.insert(roots.begin(), real(urdf_directory));
 
   std::string rest = filename;
   const bool package = drop_prefix(rest, "package://") || drop_prefix(rest, "model://");
@@ -48,7 +52,7 @@ fs::path resolve_mesh(const std::string& filename, const std::string& where,
   std::string tried;
   bool escaped = false;
   for (const auto& base : bases) {
-    const fs::path candidate = absolute_normal(base / rest);  // an absolute `rest` replaces base
+    const fs::path candidate = real(base / rest);  // an absolute `rest` replaces base
     if (std::none_of(roots.begin(), roots.end(),
                      [&](const fs::path& root) { return lies_in(candidate, root); })) {
       escaped = true;

@@ -161,9 +161,8 @@ void check_no_cycle(const fs::path& file, std::string_view text) {
 UrdfTree read_urdf(const fs::path& file) {
   const std::string text = read_text(file);
   // The XML parser below recurses once per level.
-  if (const int depth = xml_depth(text); depth > kMaxXmlDepth) {
-    throw FileError(file.string() + ": elements nest " + std::to_string(depth) +
-                    " deep, at most " + std::to_string(kMaxXmlDepth) + " expected");
+  if (const std::string danger = xml_danger(text, kMaxXmlDepth); !danger.empty()) {
+    throw FileError(file.string() + ": not a usable URDF: " + danger);
   }
   check_no_cycle(file, text);
 

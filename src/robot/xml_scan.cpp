@@ -9,8 +9,9 @@ constexpr std::string_view kSpace = " \t\r\n";
 
 }  // namespace
 
-void XmlScanner::skip_past(std::string_view end) {
-  const auto found = text_.find(end, at_);
+void XmlScanner::skip_past(std::string_view start, std::string_view end) {
+  // From after the start: the bracket of "<!-->" ends nothing.
+  const auto found = text_.find(end, at_ + start.size());
   at_ = found == std::string_view::npos ? text_.size() : found + end.size();
 }
 
@@ -18,11 +19,14 @@ bool XmlScanner::next(XmlTag& tag) {
   while ((at_ = text_.find('<', at_)) != std::string_view::npos) {
     const std::string_view rest = text_.substr(at_);
     if (rest.starts_with("<!--")) {
-      skip_past("-->");
+      skip_past("<!--", "-->");
     } else if (rest.starts_with("<![CDATA[")) {
-      skip_past("]]>");
+      skip_past("<![CDATA[", "]]>");
     } else if (rest.starts_with("<?") || rest.starts_with("<!")) {
-      skip_past(">");
+      // Parsers do not agree on where these end: some at the first bracket, some not.
+      const auto bracket = rest.find('>');
+      if (rest[1] == '!' || bracket == std::string_view::npos || rest[bracket - 1] != '?') odd_ = true;
+      skip_past("<?", ">");
     } else {
       // A closing bracket inside a quoted attribute does not end the tag.
       char quote = 0;
@@ -72,15 +76,20 @@ std::string_view XmlTag::attribute(std::string_view key) const {
   }
 }
 
-int xml_depth(std::string_view text) {
+std::string xml_danger(std::string_view text, int max_depth) {
   int depth = 0;
   int deepest = 0;
   XmlScanner scanner(text);
   for (XmlTag tag; scanner.next(tag);) {
     if (tag.kind == XmlTag::Kind::kOpen) deepest = std::max(deepest, ++depth);
-    if (tag.kind == XmlTag::Kind::kClose) --depth;
+    // Parsers pass over an end without a start, so it must not make room for more below.
+    if (tag.kind == XmlTag::Kind::kClose && --depth < 0) {
+      return "</" + std::string(tag.name.substr(0, 40)) + "> ends an element that has not begun";
+    }
   }
-  return deepest;
+  if (scanner.odd()) return "it declares a document type, entities or the like, none expected";
+  if (deepest <= max_depth) return {};
+  return "elements nest " + std::to_string(deepest) + " deep, at most " + std::to_string(max_depth) + " expected";
 }
 
 }  // namespace bodyschema

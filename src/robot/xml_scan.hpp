@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <string_view>
 
 namespace bodyschema {
@@ -25,14 +26,18 @@ class XmlScanner {
   bool next(XmlTag& tag);
   /// What follows the last tag, to the end of the text.
   [[nodiscard]] std::string_view rest() const { return text_.substr(at_); }
+  /// Whether what was scanned held a declaration `<!...>` or a `<?...>` with a bracket inside.
+  [[nodiscard]] bool odd() const { return odd_; }
 
  private:
-  void skip_past(std::string_view end);
+  void skip_past(std::string_view start, std::string_view end);
   std::string_view text_;
   std::size_t at_ = 0;
+  bool odd_ = false;
 };
 
-/// How deep the elements of an XML text nest.
-int xml_depth(std::string_view text);
+/// Why a recursive parser should not see this text: its elements nest too deep, end more often than they
+/// begin, or it declares entities (which may stand for gigabytes). Empty when there is nothing.
+std::string xml_danger(std::string_view text, int max_depth);
 
 }  // namespace bodyschema

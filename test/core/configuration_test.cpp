@@ -91,6 +91,14 @@ TEST(Configuration, AnotherVersionIsRefused) {
               AllOf(HasSubstr("'version' is '2'"), HasSubstr("expected 1")));
 }
 
+TEST_F(ConfigurationFiles, AnotherVersionIsRefusedInAnIncludedFileToo) {
+  write("old.yaml", "version: 2\nrobot: {hand: a}\n");
+  write("middle.yaml", "include: old.yaml\nversion: 1\n");
+  const auto top = write("top.yaml", "include: middle.yaml\nversion: 1\n");
+  EXPECT_THAT(error_of([&] { Configuration::load(top); }),
+              AllOf(HasSubstr("old.yaml:1: key 'version' is '2'"), HasSubstr("expected 1")));
+}
+
 TEST(Configuration, DuplicateKeysAndBrokenYamlAreErrorsWithLines) {
   EXPECT_THAT(error_of([] { Configuration::parse("a: 1\nb: 2\na: 3\n"); }),
               AllOf(HasSubstr(":3"), HasSubstr("given twice")));

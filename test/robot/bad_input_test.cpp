@@ -85,6 +85,35 @@ TEST_F(BadInput, UrdfThatNestsWithoutEnd) {
   for (int i = 0; i < 200000; ++i) text += "<a>";
   EXPECT_THAT(urdf_message(text), HasSubstr("nest 200001 deep"));
 }
+// Parsers pass over an end without a start, which must not make room for more below.
+TEST_F(BadInput, UrdfThatEndsMoreThanItBegins) {
+  std::string text;
+  for (int i = 0; i < 2000; ++i) text += "</x>";
+  text += "<robot name='r'>";
+  for (int i = 0; i < 2000; ++i) text += "<a>";
+  EXPECT_THAT(urdf_message(text), HasSubstr("</x> ends an element that has not begun"));
+}
+// What hides ends from the parser but not from the guard before it.
+TEST_F(BadInput, UrdfWhoseNestingIsHidden) {
+  for (const std::string hidden : {"<!--></a>-->", "<?x ></a>?>", "<!x '></a>'>", "<![CDATA[></a>]]>"}) {
+    SCOPED_TRACE(hidden);
+    std::string text = "<robot name='r'>";
+    for (int i = 0; i < 500; ++i) text += "<a>" + hidden;
+    EXPECT_THAT(urdf_message(text), testing::AnyOf(HasSubstr("nest 501 deep"), HasSubstr("it declares")));
+  }
+}
+TEST_F(BadInput, UrdfThatDeclaresEntities) {
+  std::string text = "<!DOCTYPE robot [<!ENTITY a0 'aaaaaaaaaa'>";
+  for (int i = 1; i < 10; ++i) {
+    text += "<!ENTITY a" + std::to_string(i) + " '";
+    for (int k = 0; k < 10; ++k) text += "&a" + std::to_string(i - 1) + ";";
+    text += "'>";
+  }
+  text += "]>" + robot("<link name='&a9;'/>");
+  EXPECT_THAT(urdf_message(text), HasSubstr("declares a document type, entities or the like"));
+  const auto good = folder_.write("good.urdf", "<?xml version='1.0'?><!-- a > b -->" + robot("<link name='a'/>"));
+  EXPECT_NO_THROW(RobotModel::load({good, {}, {}}));
+}
 TEST_F(BadInput, UrdfThatIsTooLarge) {
   const auto file = folder_.write("large.urdf", "<robot/>");
   std::filesystem::resize_file(file, (16u << 20) + 1);
@@ -188,6 +217,20 @@ TEST_F(BadInput, PathsThatLeaveTheSearchRoots) {
     const auto urdf = folder_.write("root/bad.urdf", one_part_urdf(mesh_visual(name)));
     EXPECT_THAT(message({urdf, {root}, {"part"}}), HasSubstr("leads outside"));
   }
+  // Symbolic links, of files and of folders, lead where they lead, whatever they are called.
+  std::filesystem::create_symlink(folder_.path() / "outside.obj", root / "link.obj");
+  std::filesystem::create_directory_symlink(folder_.path(), root / "up");
+  for (const char* name : {"link.obj", "up/outside.obj", "package://up/outside.obj", "up/root/../outside.obj"}) {
+    SCOPED_TRACE(name);
+    const auto urdf = folder_.write("root/bad.urdf", one_part_urdf(mesh_visual(name)));
+    EXPECT_THAT(message({urdf, {root}, {"part"}}), HasSubstr("leads outside"));
+    EXPECT_NO_THROW(RobotModel::load({urdf, {root, folder_.path()}, {"part"}})) << "its target is a root";
+  }
+  // A root may itself be a link.
+  std::filesystem::create_directory_symlink(root, folder_.path() / "linked_root");
+  folder_.write("root/inside.obj", obj_text(test_box({0, 0, 0}, {1, 1, 1})));
+  const auto urdf = folder_.write("good.urdf", one_part_urdf(mesh_visual("package://inside.obj")));
+  EXPECT_NO_THROW(RobotModel::load({urdf, {folder_.path() / "linked_root"}, {"part"}}));
 }
 TEST_F(BadInput, ScaleOfZero) {
   folder_.write("a.obj", obj_text(test_box({0, 0, 0}, {1, 1, 1})));
@@ -247,6 +290,13 @@ TEST_F(BadInput, ColladaThatNestsOrUnfoldsWithoutEnd) {
                 return open + close;
               }())),
               AllOf(HasSubstr("deep.dae"), HasSubstr("deep, at most 100")));
+  std::string hidden;
+  for (int i = 0; i < 3000; ++i) hidden += "<node><!--></node>-->";
+  for (int i = 0; i < 3000; ++i) hidden += "</node>";
+  EXPECT_THAT(mesh_message("hidden.dae", spoilt(hidden)), HasSubstr("deep, at most 100"));
+  std::string ends;
+  for (int i = 0; i < 3000; ++i) ends += "</x>";
+  EXPECT_THAT(mesh_message("ends.dae", ends + good), HasSubstr("ends an element that has not begun"));
   EXPECT_THAT(mesh_message("self.dae", spoilt("<node id='n'><instance_node url='#n'/></node>")),
               HasSubstr("cycle"));
   std::string library = "<library_nodes>";
