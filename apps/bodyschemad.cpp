@@ -66,8 +66,10 @@ int main(int argc, char** argv) {
   common.add_to(app);
   common.add_extended_model_to(app);
   app.add_option("-l,--lcm-url", lcm_url, "LCM network; default: $LCM_DEFAULT_URL, else this machine only");
-  app.add_option("--record", record, "Record all messages in and out to this log");
-  app.add_option("--estimates", estimates, "Write one JSON line per estimate, as bodyschema replay does");
+  app.add_option("--record", record,
+                 "Record all messages in and out to this log; what is there already is kept, NAME.1 follows");
+  app.add_option("--estimates", estimates,
+                 "Write one JSON line per estimate, as bodyschema replay does; kept as with --record");
   app.add_option("--frames", options.frames, "Stop after so many estimates");
   app.add_option("--stop-after-idle", options.stop_after_idle_s,
                  "Stop when nothing has come for so many seconds, once something has")

@@ -41,10 +41,10 @@ function(bodyschema_warnings target)
   endif()
 endfunction()
 
-# bodyschema_test(<folder> SOURCES ... [LINKS lib...] [LABELS ...] [TIMEOUT seconds])
-#   One GoogleTest program per folder of test/, named test_<folder>.
+# bodyschema_test(<folder> SOURCES ... [LINKS lib...] [LABELS ...] [TIMEOUT seconds] [RUN_SERIAL])
+#   One GoogleTest program per folder of test/, named test_<folder>. RUN_SERIAL: no other test beside its own.
 function(bodyschema_test folder)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "RUN_SERIAL" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
   find_package(GTest REQUIRED)
   set(target test_${folder})
   add_executable(${target} ${ARG_SOURCES})
@@ -61,5 +61,5 @@ function(bodyschema_test folder)
   endif()
   include(GoogleTest)
   gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60
-    PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+    PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" RUN_SERIAL ${ARG_RUN_SERIAL})
 endfunction()

@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
@@ -20,6 +21,7 @@ namespace {
 
 constexpr std::size_t kLargestPacket = 65'536;
 constexpr int kPoll_ms = 50;
+constexpr std::int64_t kQuietTime_us = 5'000'000;
 
 /// Group and port of "udpm://group:port?...", as LCM reads it.
 sockaddr_in group_of(const std::string& url) {
@@ -94,32 +96,50 @@ void GuardedReceiver::work() {
     auto message = assembler.take(Bytes(packet.data(), static_cast<std::size_t>(bytes)),
                                   {ntohl(from.sin_addr.s_addr), ntohs(from.sin_port)});
     if (message) take(std::move(*message));
+    const std::lock_guard lock(mutex_);
+    lost_.incomplete = assembler.incomplete();
   }
 }
 
 void GuardedReceiver::take(UdpmAssembler::Message message) {
   const std::int64_t now = wall_us();
+  std::string complaint;  // written without the lock, which the disk must not hold
   {
     const std::lock_guard lock(mutex_);
     const auto at = subscriptions_.find(message.channel);
     if (at == subscriptions_.end()) return;
-    if (!owners_.admit(message.channel, message.sender, monotonic_us())) {
-      const bool news = refused_.channel != message.channel || refused_.sender != message.sender.text();
+    const std::int64_t heard_us = monotonic_us();
+    if (owners_.admit(message.channel, message.sender, heard_us)) {
+      enqueue(at->second, std::move(message), now);
+    } else {
       ++refused_.messages;
       refused_.channel = message.channel;
       refused_.sender = message.sender.text();
-      if (news) {
-        spdlog::warn("{}: messages of {} refused, the channel is {}'s", message.channel, refused_.sender,
-                     owners_.owner(message.channel)->text());
+      if (complained_us_ < 0 || heard_us - complained_us_ >= kQuietTime_us) {
+        complained_us_ = heard_us;
+        complaint = message.channel + ": messages of " + refused_.sender + " refused, the channel is " +
+                    owners_.owner(message.channel)->text() + "'s";
       }
-      return;
     }
-    Subscription& subscription = at->second;
-    if (subscription.waiting >= subscription.capacity) return;  // as LCM does
-    ++subscription.waiting;
-    queue_.push_back({std::move(message.channel), std::move(message.bytes), now});
   }
-  arrived_.notify_one();
+  if (!complaint.empty()) {
+    spdlog::warn("{}", complaint);
+  } else {
+    arrived_.notify_one();
+  }
+}
+
+/// Needs mutex_.
+void GuardedReceiver::enqueue(Subscription& subscription, UdpmAssembler::Message message, std::int64_t wall_us) {
+  if (subscription.waiting >= subscription.capacity) {
+    const auto oldest = std::find_if(queue_.begin(), queue_.end(),
+                                     [&](const Arrived& waiting) { return waiting.channel == message.channel; });
+    queue_.erase(oldest);
+    --subscription.waiting;
+    ++lost_.queue;
+  }
+  ++subscription.waiting;
+  queue_.push_back({std::move(message.channel), std::move(message.bytes), wall_us});
 }
 
 bool GuardedReceiver::handle(int timeout_ms) {
@@ -142,6 +162,11 @@ bool GuardedReceiver::handle(int timeout_ms) {
     spdlog::error("{}: message could not be handled: {}", arrived.channel, e.what());
   }
   return true;
+}
+
+LostMessages GuardedReceiver::lost() const {
+  const std::lock_guard lock(mutex_);
+  return lost_;
 }
 
 RefusedSources GuardedReceiver::refused() const {

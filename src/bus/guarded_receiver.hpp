@@ -29,6 +29,7 @@ class GuardedReceiver {
   /// As LcmLink::handle().
   bool handle(int timeout_ms);
   [[nodiscard]] RefusedSources refused() const;
+  [[nodiscard]] LostMessages lost() const;
 
  private:
   struct Arrived {
@@ -43,6 +44,7 @@ class GuardedReceiver {
   };
   void work();
   void take(UdpmAssembler::Message message);
+  void enqueue(Subscription& subscription, UdpmAssembler::Message message, std::int64_t wall_us);
 
   int socket_ = -1;
   std::atomic<bool> stopping_{false};
@@ -52,6 +54,8 @@ class GuardedReceiver {
   std::deque<Arrived> queue_;
   ChannelOwners owners_;
   RefusedSources refused_;
+  LostMessages lost_;
+  std::int64_t complained_us_ = -1;  ///< monotonic_us() of the last line about a second source
   std::thread thread_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <cerrno>
 #include <cstdlib>
 #include <lcm/lcm-cpp.hpp>
 
@@ -63,9 +64,13 @@ void LcmLink::subscribe(const std::string& channel, int queue_messages, Handler 
 
 RefusedSources LcmLink::refused_sources() const { return guarded_ ? guarded_->refused() : RefusedSources{}; }
 
+LostMessages LcmLink::lost() const { return guarded_ ? guarded_->lost() : LostMessages{}; }
+
 bool LcmLink::handle(int timeout_ms) {
   if (guarded_) return guarded_->handle(timeout_ms);
+  errno = 0;
   const int result = lcm_->handleTimeout(timeout_ms);
+  if (result < 0 && errno == EINTR) return false;  // a signal came, or the process was stopped for a while
   if (result < 0) throw DeviceError("LCM stopped receiving on '" + url_ + "'");
   return result > 0;
 }

@@ -144,14 +144,17 @@ bool LogReader::plausible_header_at(std::uint64_t offset) {
 bool LogReader::find_event(std::uint64_t from) {
   std::array<std::uint8_t, 4> sync{};
   put(sync.data(), kSync);
-  std::vector<std::uint8_t> block(1 << 20);
+  // Little at first: a log with much damage must not cost a large block for every place.
+  std::size_t wanted = 4096;
   while (from + kHeaderBytes <= size_) {
     if (fseeko(stream_.get(), static_cast<off_t>(from), SEEK_SET) != 0) return false;
-    const std::size_t n = std::fread(block.data(), 1, block.size(), stream_.get());
+    if (block_.size() < wanted) block_.resize(wanted);
+    const std::size_t n = std::fread(block_.data(), 1, wanted, stream_.get());
+    wanted = std::min<std::size_t>(2 * wanted, 1 << 20);
     if (n < sync.size()) return false;
-    const auto end = block.begin() + static_cast<std::ptrdiff_t>(n);
-    for (auto at = block.begin(); (at = std::search(at, end, sync.begin(), sync.end())) != end; ++at) {
-      const std::uint64_t offset = from + static_cast<std::uint64_t>(at - block.begin());
+    const auto end = block_.begin() + static_cast<std::ptrdiff_t>(n);
+    for (auto at = block_.begin(); (at = std::search(at, end, sync.begin(), sync.end())) != end; ++at) {
+      const std::uint64_t offset = from + static_cast<std::uint64_t>(at - block_.begin());
       if (plausible_header_at(offset)) {
         position_ = offset;
         return true;

@@ -55,7 +55,7 @@ std::string_view name_of(MessageFault fault) {
   static constexpr std::array<std::string_view, kMessageFaultCount> kNames{
       "none",      "wrong_type", "truncated",  "trailing_bytes",     "bad_count",     "too_large",
       "bad_text",  "bad_stamp",  "not_finite", "wrong_size",         "unsupported_format",
-      "broken_picture"};
+      "broken_picture", "other_kind"};
   return kNames[static_cast<std::size_t>(fault)];
 }
 

@@ -10,6 +10,8 @@ namespace bodyschema {
 namespace {
 
 constexpr std::chrono::seconds kQuietTime{5};
+/// Pictures in a row that make another kind of camera believed: ten seconds at 30 Hz.
+constexpr int kAnotherCamera = 300;
 
 std::vector<std::string> joint_names(const RobotModel& robot) {
   std::vector<std::string> names;
@@ -49,6 +51,8 @@ std::vector<std::pair<std::string, std::uint64_t>> BusStatistics::counters() con
   list.emplace_back("joint_state.duplicate", synchroniser.joint_messages_duplicate);
   list.emplace_back("joint_state.out_of_order", synchroniser.joint_messages_out_of_order);
   list.emplace_back("joint_state.no_known_joint", synchroniser.joint_messages_without_known_joint);
+  list.emplace_back("lost.queue", lost_in_queue);
+  list.emplace_back("lost.incomplete", lost_incomplete);
   list.emplace_back("clock_steps", synchroniser.clock_steps);
   return list;
 }
@@ -66,7 +70,7 @@ ObservationStream::ObservationStream(const std::vector<std::string>& joint_names
       throw ConfigurationError("cameras: '" + camera.name + "': a rig is one camera named left or right, or both, left first");
     }
     cameras_.push_back({camera.name, left ? bot_core::images_t::LEFT : bot_core::images_t::RIGHT,
-                        camera.intrinsics.width, camera.intrinsics.height});
+                        camera.intrinsics.width, camera.intrinsics.height, 0, false, 0});
   }
 }
 
@@ -133,7 +137,7 @@ void ObservationStream::receive_images(Bytes message, std::int64_t arrival_us) {
   std::vector<StampedImage> images;
   for (const ImageView& view : images_.images) {
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
-      const CameraFormat& camera = cameras_[c];
+      CameraFormat& camera = cameras_[c];
       if (view.type != camera.type) continue;
       StampedImage image;
       DecodeResult unpacked;
@@ -143,6 +147,7 @@ void ObservationStream::receive_images(Bytes message, std::int64_t arrival_us) {
                         ", configured are " + std::to_string(camera.width) + "x" + std::to_string(camera.height)};
       } else {
         unpacked = unpack(view, image.image, options_.limits);
+        if (unpacked.ok()) unpacked = admit_kind(camera, image.image.channels);
       }
       if (!unpacked.ok()) {
         ++statistics_.images_malformed;
@@ -159,6 +164,26 @@ void ObservationStream::receive_images(Bytes message, std::int64_t arrival_us) {
   const std::uint64_t missing_before = synchroniser_.statistics().dropped(DropReason::kMissingJoint);
   synchroniser_.add(std::move(images));
   if (synchroniser_.statistics().dropped(DropReason::kMissingJoint) > missing_before) warn_of_missing_joints();
+}
+
+void ObservationStream::expect_channels(std::size_t camera, int channels) {
+  cameras_.at(camera).channels = channels;
+  cameras_.at(camera).channels_given = true;
+}
+
+/// Backgrounds are learned of one kind of picture. A stray picture of another kind must not end that; a
+/// camera that was exchanged must not be refused for ever.
+DecodeResult ObservationStream::admit_kind(CameraFormat& camera, int channels) {
+  if (camera.channels != 0 && channels != camera.channels) {
+    if (camera.channels_given || ++camera.other_kind_in_a_row < kAnotherCamera) {
+      return {MessageFault::kOtherKind,
+              channels == 1 ? "gray where colour is expected" : "in colour where gray is expected"};
+    }
+    spdlog::warn("the {} camera's pictures are now {}", camera.name, channels == 1 ? "gray" : "in colour");
+  }
+  camera.channels = channels;
+  camera.other_kind_in_a_row = 0;
+  return {};
 }
 
 void ObservationStream::finish() {

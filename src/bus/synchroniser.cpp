@@ -51,7 +51,9 @@ void Synchroniser::add(const JointStateMessage& message) {
   }
   switch (arrival) {
     case JointHistory::Arrival::kFresh:
-      older_joints_in_a_row_ = 0;
+      // Head and arm may come apart: while one's newest stamp lies far ahead by mistake, good messages of the
+      // other must not hide that.
+      if (history_.newest() - message.utime <= options_.clock_step) older_joints_in_a_row_ = 0;
       ++statistics_.joint_messages;
       resolve(false);
       break;
@@ -69,18 +71,24 @@ void Synchroniser::add(const JointStateMessage& message) {
 
 void Synchroniser::add(std::vector<StampedImage> images) {
   ++group_;
+  Microseconds newest = -1;
   for (StampedImage& image : images) {
     if (image.camera < 0 || static_cast<std::size_t>(image.camera) >= cameras_.size()) continue;
     ++statistics_.images;
     Camera& camera = cameras_[static_cast<std::size_t>(image.camera)];
     if (!admit(camera, image.utime)) continue;
-    newest_image_ = std::max(newest_image_, image.utime);
-    if (history_.newest() >= 0) statistics_.encoder_lag = newest_image_ - history_.newest();
+    newest = newest < 0 ? image.utime : std::min(newest, image.utime);
     camera.queue.push_back({std::move(image), group_});
     if (camera.queue.size() > static_cast<std::size_t>(options_.max_waiting)) {
       camera.queue.pop_front();
       count_dropped(DropReason::kOverload);
     }
+  }
+  // That of the last message, not the largest there ever was: a camera that stamped one picture far in the
+  // future and died would otherwise make all of the other's too late.
+  if (newest >= 0) {
+    newest_image_ = newest;
+    if (history_.newest() >= 0) statistics_.encoder_lag = newest_image_ - history_.newest();
   }
   pair(false);
   resolve(false);

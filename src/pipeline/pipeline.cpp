@@ -98,6 +98,11 @@ Pipeline::Pipeline(const Configuration& configuration)
 
 ObservationStream Pipeline::make_stream() const {
   ObservationStream stream(robot_, setup_, rig_, bus_);
+  if (vision_.method == SegmentationMethod::kBackgroundPicture) {
+    for (std::size_t c = 0; c < eyes_.size(); ++c) {
+      stream.expect_channels(c, eyes_[c].segmenter.background().channels);
+    }
+  }
   if (error_model_) stream.set_follower(std::make_unique<OnlineErrorModel>(robot_, setup_, *error_model_));
   return stream;
 }

@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <future>
 #include <memory>
@@ -71,7 +73,25 @@ double brightness_of(const Image& image) {
   return n == 0 ? 0.0 : static_cast<double>(sum) / static_cast<double>(n);
 }
 
-/// Everything that belongs to one load of the configuration.
+/// This file, or the first of "name.1.ext", "name.2.ext", ... that holds nothing yet: what a service
+/// recorded before it was killed and started again must not be written over.
+std::filesystem::path free_name(const std::filesystem::path& wanted) {
+  const auto holds_something = [](const std::filesystem::path& file) {
+    std::error_code none;
+    return std::filesystem::is_regular_file(file, none) && std::filesystem::file_size(file, none) > 0;
+  };
+  std::filesystem::path file = wanted;
+  for (int n = 1; holds_something(file); ++n) {
+    file = wanted;
+    file.replace_filename(wanted.stem().string() + "." + std::to_string(n) + wanted.extension().string());
+  }
+  if (file != wanted) {
+    spdlog::warn("{} holds something already and is kept; writing to {}", wanted.string(), file.string());
+  }
+  return file;
+}
+
+/// Everything that belongs to one load of the configuration. Takes in messages once its receiver is started.
 struct Session {
   Session(std::unique_ptr<Pipeline> loaded, const std::string& lcm_url, Recorder* recorder)
       : pipeline(std::move(loaded)),
@@ -103,6 +123,12 @@ class Daemon {
         options_(options),
         lcm_url_(with_receive_buffer(options.lcm_url)),
         all_stages_(options.timings ? kTimingsWindow : 1) {}
+  /// After an error: what loads must not outlive what it loads from.
+  ~Daemon() {
+    if (reloading_.valid()) reloading_.wait();
+  }
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
 
   void run() {
     keep_memory_flat();
@@ -130,6 +156,11 @@ class Daemon {
                  progress_.estimated, facts.bus.synchroniser.images,
                  facts.bus.synchroniser.total_dropped(), progress_.shed);
     if (options_.timings) std::fputs(all_stages_.table().c_str(), stdout);
+    if (loading()) {  // which cannot be broken off: all else is done, so the process ends under it
+      spdlog::default_logger()->flush();
+      std::fflush(stdout);  // not all files: the load may hold one
+      std::_Exit(0);
+    }
   }
 
  private:
@@ -143,31 +174,40 @@ class Daemon {
   }
 
   void open_files() {
-    if (options_.record) recorder_ = std::make_unique<Recorder>(*options_.record);
+    if (options_.record) recorder_ = std::make_unique<Recorder>(free_name(*options_.record));
     if (!options_.estimates) return;
-    estimates_.open(*options_.estimates);
-    if (!estimates_) throw FileError(options_.estimates->string() + ": cannot be written");
+    estimates_file_ = free_name(*options_.estimates);
+    estimates_.open(estimates_file_);
+    if (!estimates_) throw FileError(estimates_file_.string() + ": cannot be written");
   }
 
   void finish_files() {
     recorder_.reset();
     if (!options_.estimates) return;
     estimates_.flush();
-    if (!estimates_) throw FileError(options_.estimates->string() + ": cut short, is the disk full?");
+    if (!estimates_) throw FileError(estimates_file_.string() + ": cut short, is the disk full?");
   }
 
-  /// Puts a loaded pipeline to work in place of the present one.
+  /// Puts a loaded pipeline to work in place of the present one, which stays where that fails.
   void start_session(std::unique_ptr<Pipeline> pipeline) {
     const std::lock_guard lock(session_mutex_);
+    if (session_) session_->receiver.stop();  // or what comes now would be taken in twice
+    std::unique_ptr<Session> fresh;
+    try {
+      fresh = std::make_unique<Session>(std::move(pipeline), lcm_url_, recorder_.get());
+    } catch (...) {
+      if (session_) session_->receiver.start();
+      throw;
+    }
     if (session_) {
       // What still waits is lost with the session, but not without being counted.
       session_->receiver.finish();
       add_counts(earlier_bus_, session_->receiver.facts().bus);
       earlier_shed_ += session_->queue.shed() + session_->waiting();
-      pipeline->take_background_from(*session_->pipeline);
-      session_.reset();
+      fresh->pipeline->take_background_from(*session_->pipeline);
     }
-    session_ = std::make_unique<Session>(std::move(pipeline), lcm_url_, recorder_.get());
+    session_ = std::move(fresh);
+    session_->receiver.start();
     Pipeline& loaded = *session_->pipeline;
     engine_ = loaded.estimator().engine_description();
     spdlog::info("silhouettes: {}", engine_);
@@ -203,7 +243,8 @@ class Daemon {
   void loop(const Signals& signals) {
     while (!signals.stop_requested() && !done()) {
       notifier_.alive();
-      if (signals.take_reload_request()) begin_reload();
+      // One that comes during a reload waits for its end: the configuration may have changed since.
+      if (!reloading_.valid() && signals.take_reload_request()) begin_reload();
       finish_reload();
       if (auto arrived = session_->take(kPoll)) estimate(*arrived);
     }
@@ -233,9 +274,18 @@ class Daemon {
     Observation& observation = arrived.observation;
     Pipeline& pipeline = *session_->pipeline;
     session_->next = session_->queue.pop(milliseconds(0));
-    const Estimate estimate = pipeline.process(observation, session_->next ? &session_->next->observation : nullptr);
+    Estimate estimate;
+    try {
+      estimate = pipeline.process(observation, session_->next ? &session_->next->observation : nullptr);
+    } catch (const Error& e) {  // of this frame; the next may be good
+      const std::lock_guard lock(progress_mutex_);
+      progress_.busy_since_us = -1;
+      progress_.frame_failure = e.what();
+      if (progress_.failed++ % 100 == 0) spdlog::error("a frame could not be worked on: {}", e.what());
+      return;
+    }
     const std::int64_t published = publish(estimate, arrived.arrival_us);
-    if (estimates_.is_open()) estimates_ << estimate_line(estimate, pipeline.rig()) << std::endl;
+    if (estimates_.is_open()) write(estimate);
 
     const StageTimes& t = estimate.times;
     const double latency_ms = ms_between(arrived.arrival_us, published);
@@ -262,6 +312,16 @@ class Daemon {
       notifier_.ready();
       spdlog::info("ready: the first pictures and encoders came together");
     }
+  }
+
+  void write(const Estimate& estimate) {
+    if (!estimates_) return;
+    estimates_ << estimate_line(estimate, session_->pipeline->rig()) << std::endl;
+    if (estimates_) return;
+    const std::string failure = estimates_file_.string() + ": cut short, is the disk full?";
+    spdlog::error("writing of estimates has ended: {}", failure);
+    const std::lock_guard lock(progress_mutex_);
+    progress_.estimates_failure = failure;
   }
 
   /// A GL context can be lost; the silhouettes are drawn by other means then.
@@ -325,22 +385,27 @@ class Daemon {
 
   // --- reloading: the new robot is loaded by a thread of its own while the old one works on -------
 
+  [[nodiscard]] bool loading() const {
+    return reloading_.valid() && reloading_.wait_for(milliseconds(0)) != std::future_status::ready;
+  }
+
   void begin_reload() {
-    if (reloading_.valid()) return;
     spdlog::info("reloading the configuration");
     if (ready_) notifier_.reloading();
-    reloading_ = std::async(std::launch::async, &Daemon::load, load_configuration_);
+    // Not std::async, whose future waits for the end of the load when it goes, which a stop cannot.
+    std::packaged_task<std::unique_ptr<Pipeline>()> task([from = load_configuration_] { return load(from); });
+    reloading_ = task.get_future();
+    std::thread(std::move(task)).detach();
   }
 
   void finish_reload() {
-    if (!reloading_.valid() || reloading_.wait_for(milliseconds(0)) != std::future_status::ready) return;
+    if (!reloading_.valid() || loading()) return;
     std::string failure;
     try {
       start_session(reloading_.get());
       give_back_memory();
       spdlog::info("configuration reloaded; estimating starts anew");
-    } catch (const Error& e) {
-      if (!session_) throw;
+    } catch (const std::exception& e) {  // whatever is wrong with what was loaded, the old works on
       failure = e.what();
       spdlog::error("reload refused, going on as before: {}", failure);
     }
@@ -412,6 +477,7 @@ class Daemon {
   const std::string lcm_url_;
   Notifier notifier_;
   std::unique_ptr<Recorder> recorder_;
+  std::filesystem::path estimates_file_;
   std::ofstream estimates_;
   std::unique_ptr<LivePage> page_;
 

@@ -61,6 +61,7 @@ const char* explain(MessageFault fault) {
     case MessageFault::kWrongSize: return "a picture has not the size that is configured";
     case MessageFault::kUnsupportedFormat: return "the pixel format is not gray, RGB or JPEG";
     case MessageFault::kBrokenPicture: return "a JPEG picture is broken";
+    case MessageFault::kOtherKind: return "a picture is gray where colour is expected, or in colour where gray is";
     case MessageFault::kNone: break;
   }
   return "unknown";
@@ -72,6 +73,11 @@ std::optional<std::string> refused(const HealthFacts& f) {
   if (*most == 0) return std::nullopt;
   const auto fault = static_cast<MessageFault>(most - faults.begin());
   return fmt::format("{} messages or pictures refused in the last second: {}", *most, explain(fault));
+}
+
+std::optional<std::string> failed(const HealthFacts& f) {
+  if (f.failed_since_last == 0) return std::nullopt;
+  return fmt::format("{} frames of the last second could not be worked on: {}", f.failed_since_last, f.frame_failure);
 }
 
 /// Why pictures of the last second did not become estimates.
@@ -109,6 +115,7 @@ std::optional<std::string> error(const HealthFacts& f) {
     return fmt::format("the estimator has been at work on one frame for {}", age(f.busy_ms));
   }
   if (f.estimated_since_last == 0 && !(f.estimate_age_ms >= 0.0 && f.estimate_age_ms < kStale_ms)) {
+    if (const auto why = failed(f)) return why;
     if (const auto why = refused(f)) return why;
     if (f.shed_since_last > 0) {
       return fmt::format("{} frames of the last second shed and none worked on: the machine is overloaded",
@@ -174,11 +181,11 @@ std::optional<std::string> warning(const HealthFacts& f) {
   if (shed > 0) {
     return fmt::format("{} frames of the last second shed: they come faster than they are worked on", shed);
   }
+  if (const auto text = failed(f)) return text;
   if (const auto text = refused(f)) return text;
   if (const auto text = dropped(f)) return text;
   if (!f.engine_change.empty()) return f.engine_change;
   if (!f.reload_failure.empty()) return "reload refused, going on as before: " + f.reload_failure;
-  if (!f.recording_failure.empty()) return "recording has ended: " + f.recording_failure;
   if (f.recording_lost > 0) {
     return fmt::format("{} messages missing in the recording: the disk is too slow", f.recording_lost);
   }
@@ -205,12 +212,28 @@ bool is_frozen(const CameraFacts& camera) {
   return camera.unchanged_ms > kFrozen_ms && camera.moved_meanwhile_rad > kFrozenMotion_rad;
 }
 
-Health assess(const HealthFacts& facts) {
+namespace {
+Health verdict(const HealthFacts& facts) {
   if (auto text = stale(facts)) return {HealthLevel::kStale, std::move(*text)};
   if (auto text = error(facts)) return {HealthLevel::kError, std::move(*text)};
   if (auto text = warning(facts)) return {HealthLevel::kWarn, std::move(*text)};
   return {HealthLevel::kOk, fmt::format("converged: hand known to {:.1f} mm; weakest {}",
                                         1e3 * facts.estimate.hand_sd_m, facts.estimate.weakest.text)};
+}
+}  // namespace
+
+Health assess(const HealthFacts& facts) {
+  Health health = verdict(facts);
+  // A file that ends is said beside whatever else there is to say: it would not be missed otherwise until
+  // it is needed.
+  const auto add = [&](const char* what, const std::string& failure) {
+    if (failure.empty()) return;
+    health.sentence += fmt::format("; {}: {}", what, failure);
+    health.level = std::max(health.level, HealthLevel::kWarn);
+  };
+  add("recording has ended", facts.recording_failure);
+  add("writing of estimates has ended", facts.estimates_failure);
+  return health;
 }
 
 }  // namespace bodyschema

@@ -25,6 +25,10 @@ Receiver::Receiver(LcmLink& link, ObservationStream stream, ObservationQueue& qu
   link_.subscribe(stream_.channels().joint_state, kWaitingJoints, handler);
   link_.subscribe(stream_.channels().cameras, kWaitingPictures, handler);
   facts_.missing_joints = stream_.synchroniser().joints().missing_joints();
+}
+
+void Receiver::start() {
+  stopping_ = false;
   thread_ = std::thread([this] { work(); });
 }
 
@@ -43,6 +47,9 @@ Receiver::Facts Receiver::facts() const {
   const std::lock_guard lock(mutex_);
   Facts facts = facts_;
   facts.refused = link_.refused_sources();
+  const LostMessages lost = link_.lost();
+  facts.bus.lost_in_queue = lost.queue;
+  facts.bus.lost_incomplete = lost.incomplete;
   return facts;
 }
 

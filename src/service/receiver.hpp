@@ -25,6 +25,8 @@ class Receiver {
   Receiver(const Receiver&) = delete;
   Receiver& operator=(const Receiver&) = delete;
 
+  /// Messages are taken in from here on; what has come since construction waits. Also after stop().
+  void start();
   /// Ends the thread. Observations already in the queue stay.
   void stop();
   /// Ends the thread and puts what still waits for a partner into the queue, as at the end of a log.

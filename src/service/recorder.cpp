@@ -3,6 +3,12 @@
 #include <spdlog/spdlog.h>
 
 namespace bodyschema {
+namespace {
+
+/// What a waiting message takes beside its data; without it, empty ones could wait without end.
+constexpr std::size_t kOverhead_bytes = 160;
+
+}  // namespace
 
 Recorder::Recorder(const std::filesystem::path& file, std::size_t max_waiting_bytes)
     : writer_(file), max_waiting_bytes_(max_waiting_bytes), thread_([this] { work(); }) {}
@@ -19,12 +25,13 @@ Recorder::~Recorder() {
 void Recorder::record(const std::string& channel, Microseconds time_us, Bytes message) {
   {
     const std::lock_guard lock(mutex_);
-    if (!state_.failure.empty() || waiting_bytes_ + message.size() > max_waiting_bytes_) {
+    const std::size_t bytes = message.size() + kOverhead_bytes;
+    if (!state_.failure.empty() || waiting_bytes_ + bytes > max_waiting_bytes_) {
       ++state_.lost;
       return;
     }
     waiting_.push_back({channel, time_us, {message.begin(), message.end()}});
-    waiting_bytes_ += message.size();
+    waiting_bytes_ += bytes;
   }
   filled_.notify_one();
 }
@@ -50,7 +57,7 @@ void Recorder::work() {
       spdlog::error("recording has ended: {}", failure);
     }
     lock.lock();
-    waiting_bytes_ -= message.data.size();
+    waiting_bytes_ -= message.data.size() + kOverhead_bytes;
     if (failure.empty()) {
       ++state_.written;
     } else {

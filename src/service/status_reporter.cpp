@@ -38,6 +38,8 @@ void combine(BusStatistics& into, const BusStatistics& other, Operation op) {
   into.messages = op(into.messages, other.messages);
   into.messages_malformed = op(into.messages_malformed, other.messages_malformed);
   into.images_malformed = op(into.images_malformed, other.images_malformed);
+  into.lost_in_queue = op(into.lost_in_queue, other.lost_in_queue);
+  into.lost_incomplete = op(into.lost_incomplete, other.lost_incomplete);
   all(into.faults, other.faults);
   all(s.images_dropped, t.images_dropped);
   s.joint_messages = op(s.joint_messages, t.joint_messages);
@@ -87,6 +89,9 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
   facts.since_last = counts_since(bus, last_bus_);
   facts.estimated_since_last = progress.estimated - last_estimated_;
   facts.shed_since_last = progress.shed - last_shed_;
+  facts.failed_since_last = progress.failed - last_failed_;
+  facts.frame_failure = progress.frame_failure;
+  facts.estimates_failure = progress.estimates_failure;
   facts.refused = received.refused;
   facts.refused.messages -= std::min(facts.refused.messages, last_refused_);
   facts.estimate = progress.estimate;
@@ -110,7 +115,7 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
       instants(s.total_dropped() + bus.images_malformed, identity_.camera_count);
   m.frames_in = static_cast<std::int64_t>(s.observations + lost_before_queue);
   m.frames_estimated = static_cast<std::int64_t>(progress.estimated);
-  m.frames_dropped = static_cast<std::int64_t>(progress.shed + lost_before_queue);
+  m.frames_dropped = static_cast<std::int64_t>(progress.shed + progress.failed + lost_before_queue);
   m.gaps = static_cast<std::int64_t>(s.gaps);
   const double elapsed_s = last_report_us_ < 0 ? seconds(m.uptime_us) : seconds(now - last_report_us_);
   m.frame_rate_hz = elapsed_s > 0.0 ? static_cast<double>(facts.estimated_since_last) / elapsed_s : 0.0;
@@ -129,6 +134,7 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
   for (const auto& [name, value] : bus.counters()) count(name, value);
   count("refused.second_source", received.refused.messages);
   count("shed.queue", progress.shed);
+  count("failed", progress.failed);
   count("mono", s.mono_observations);
   count("publishing_failed", progress.publishing_failures);
   count("recording.written", recording.written);
@@ -166,6 +172,7 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
   last_refused_ = received.refused.messages;
   last_estimated_ = progress.estimated;
   last_shed_ = progress.shed;
+  last_failed_ = progress.failed;
   return m;
 }
 

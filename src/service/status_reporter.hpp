@@ -31,6 +31,9 @@ struct Progress {
   std::string reload_failure;
   std::string engine_change;  ///< as in HealthFacts
   std::uint64_t publishing_failures = 0;
+  std::uint64_t failed = 0;        ///< frames that could not be worked on
+  std::string frame_failure;       ///< why, of the last
+  std::string estimates_failure;   ///< as in HealthFacts
 };
 
 /// What does not change between two loads of a configuration.
@@ -69,6 +72,7 @@ class StatusReporter {
   std::uint64_t last_estimated_ = 0;
   std::uint64_t last_shed_ = 0;
   std::uint64_t last_refused_ = 0;
+  std::uint64_t last_failed_ = 0;
 };
 
 }  // namespace bodyschema

@@ -26,8 +26,7 @@ struct AtlasOptions {
 
 /// The GL engine: every particle and camera has a tile of one atlas, cropped to where the model can
 /// be; tiles are counted by shaders and only the counts are read back. Takes the context over.
-/// Throws std::invalid_argument for an unusable model or camera, gl::ContextError where the driver
-/// falls short.
+/// Throws what contour::check does, gl::ContextError where the driver falls short.
 std::unique_ptr<SilhouetteScorer> make_atlas_scorer(const SilhouetteModel& model,
                                                     std::span<const PinholeIntrinsics> cameras,
                                                     std::unique_ptr<gl::Context> context,

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "bodyschema/core/error.hpp"
 #include "bodyschema/geometry/mesh_topology.hpp"
 
 namespace bodyschema::contour {
@@ -214,18 +215,17 @@ void check(const SilhouetteModel& model, std::span<const PinholeIntrinsics> came
     const auto& mesh = model.parts[p];
     const std::string who = "silhouette part " + std::to_string(p) + " '" + mesh.name + "'";
     if (mesh.vertices.empty() || mesh.triangles.empty()) {
-      throw std::invalid_argument(who + " has no triangles");
+      throw FileError(who + " has no triangles");
     }
     for (const auto& v : mesh.vertices) {
       if (!v.allFinite() || v.cwiseAbs().maxCoeff() > kFarthest_m) {
-        throw std::invalid_argument(who + " has a vertex that is not finite or beyond 1000 km");
+        throw FileError(who + " has a vertex that is not finite or beyond 1000 km");
       }
     }
     for (const auto& t : mesh.triangles) {
       if (std::max({t[0], t[1], t[2]}) >= mesh.vertices.size()) {
-        throw std::invalid_argument(who + " has a triangle with vertex " +
-                                    std::to_string(std::max({t[0], t[1], t[2]})) + " of " +
-                                    std::to_string(mesh.vertices.size()));
+        throw FileError(who + " has a triangle with vertex " + std::to_string(std::max({t[0], t[1], t[2]})) +
+                        " of " + std::to_string(mesh.vertices.size()));
       }
     }
   }

@@ -13,8 +13,8 @@
 
 namespace bodyschema::contour {
 
-/// Throws std::invalid_argument naming the part for a mesh that cannot be used (no parts, an index
-/// beyond the vertices, a vertex that is not finite), and the camera for sizes out of range.
+/// Throws FileError naming the part for a mesh that cannot be used (an index beyond the vertices, a vertex
+/// that is not finite), std::invalid_argument for no parts at all, or naming a camera of a size out of range.
 void check(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras);
 
 /// One part made ready for contour extraction. All coordinates are relative to `centre`.

@@ -136,11 +136,9 @@ void Segmenter::Impl::check(const Image& image) {
                     std::to_string(image.data.size()) + " bytes, expected " +
                     std::to_string(width) + "x" + std::to_string(height) + ", 1 or 3 channels");
   }
-  if (channels == 0) channels = given.channels;
-  if (channels == 0) channels = image.channels;
-  if (image.channels != channels) {
+  if (image.channels != given.channels && given.channels != 0) {
     throw DataError("camera '" + camera + "': picture with " + std::to_string(image.channels) +
-                    " channels, expected " + std::to_string(channels) + " as in the background");
+                    " channels, expected " + std::to_string(given.channels) + " as in the background");
   }
 }
 
@@ -309,8 +307,18 @@ Segmenter::~Segmenter() = default;
 Segmenter::Segmenter(Segmenter&&) noexcept = default;
 Segmenter& Segmenter::operator=(Segmenter&&) noexcept = default;
 
+/// Throws where the picture cannot be used; one of another kind (gray, colour) starts all learning anew.
+void Segmenter::admit(const Image& image) {
+  impl_->check(image);
+  if (impl_->channels == image.channels) return;
+  if (impl_->channels != 0) {
+    impl_ = std::make_unique<Impl>(impl_->setup, impl_->camera, impl_->width, impl_->height);
+  }
+  impl_->channels = image.channels;
+}
+
 void Segmenter::learn_from(const Image& frame) {
-  impl_->check(frame);
+  admit(frame);
   if (impl_->setup.method == SegmentationMethod::kLearnedBackground) impl_->selection.add(frame);
   if (impl_->setup.method == SegmentationMethod::kSingleColour) impl_->single_colour.update(frame);
 }
@@ -337,8 +345,8 @@ const BackgroundModel& Segmenter::background() const { return impl_->background(
 
 void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
                         std::vector<std::uint8_t>& coverage, const BinaryMask* predicted) {
+  admit(image);
   auto& self = *impl_;
-  self.check(image);
   self.just_learned = false;
   if (!self.fits(predicted)) predicted = nullptr;
   const auto fit = [&](BinaryMask& m) {

@@ -132,6 +132,48 @@ TEST(ObservationStream, CountsAndSkipsWhatIsMalformed) {
   EXPECT_EQ(all, 4u);
 }
 
+/// How many of `n` pictures of each camera, left in colour or gray, become part of an observation.
+struct Used {
+  int left = 0, right = 0;
+};
+Used used(ObservationStream& stream, Microseconds& now, int n, int left_channels) {
+  Used used;
+  for (int i = 0; i < n; ++i, now += 20 * kMs) {
+    stream.receive("ICUB_JOINT_STATE", encode(arm(now, 0.5F)));
+    stream.receive("ICUB_CAMERAS", encode(pictures(now - 5 * kMs, Image(8, 6, left_channels))));
+    while (const auto arrived = stream.next()) {
+      used.left += arrived->observation.cameras[0].has_value();
+      used.right += arrived->observation.cameras[1].has_value();
+    }
+  }
+  return used;
+}
+
+TEST(ObservationStream, RefusesPicturesOfAnotherKindUntilTheyAreManyInARow) {
+  BusOptions options;
+  options.synchroniser.camera_wait = 0;
+  ObservationStream stream({"arm"}, {}, rig(), options);
+  Microseconds now = 20 * kMs;
+  stream.receive("ICUB_JOINT_STATE", encode(arm(0, 0.5F)));
+  EXPECT_EQ(used(stream, now, 10, 3).left, 10);
+  const Used stray = used(stream, now, 20, 1);
+  EXPECT_EQ(stray.left, 0);
+  EXPECT_GE(stray.right, 15);
+  EXPECT_EQ(stream.statistics().faults[static_cast<std::size_t>(MessageFault::kOtherKind)], 20u);
+  EXPECT_EQ(used(stream, now, 10, 3).left, 10);
+  // A driver that was exchanged sends them for good.
+  EXPECT_EQ(used(stream, now, 290, 1).left, 0);
+  EXPECT_EQ(used(stream, now, 30, 1).left, 21);
+}
+
+TEST(ObservationStream, WhereTheBackgroundIsGivenItsKindIsKeptForGood) {
+  ObservationStream stream({"arm"}, {}, rig(), {});
+  stream.expect_channels(0, 3);
+  Microseconds now = 20 * kMs;
+  EXPECT_EQ(used(stream, now, 1000, 1).left, 0);
+  EXPECT_GE(used(stream, now, 30, 3).left, 25);
+}
+
 TEST(ObservationStream, RefusesARigItCannotServe) {
   auto swapped = rig();
   std::swap(swapped[0], swapped[1]);

@@ -392,6 +392,36 @@ TEST_F(SynchroniserTest, RecoversFromAStampFarInTheFuture) {
   EXPECT_GE(out().size(), 14u);
 }
 
+TEST_F(SynchroniserTest, RecoversFromAStampFarInTheFutureWhereHeadAndArmComeApart) {
+  make();
+  const auto both = [this](Microseconds t) {
+    sync_->add(joints(t, {{"neck", static_cast<float>(-0.5 * seconds(t))}}));
+    sync_->add(joints(t + kMs, {{"arm", static_cast<float>(seconds(t + kMs))}}));
+  };
+  for (int i = 0; i < 10; ++i) both(10 * i * kMs);
+  sync_->add(joints(3'600'000 * kMs, {{"arm", 9.0F}}));
+  for (int i = 10; i < 70; ++i) {
+    both(10 * i * kMs);
+    if (i % 3 == 0) pair((10 * i - 5) * kMs, (10 * i - 5) * kMs);
+  }
+  EXPECT_GE(out().size(), 14u);
+  EXPECT_EQ(sync_->statistics().clock_steps, 1u);
+}
+
+TEST_F(SynchroniserTest, ACameraThatStampsThePictureBeforeItsDeathInTheFutureHoldsUpNobody) {
+  make();
+  for (int i = 0; i < 60; ++i) {
+    const Microseconds now = 10 * i * kMs;
+    if (i == 10) picture(1, 3'600'000 * kMs);
+    // The picture comes before the encoders of its time.
+    if (i % 3 == 0) picture(0, now + 5 * kMs);
+    encoders(now, now);
+  }
+  EXPECT_GE(out().size(), 18u);
+  EXPECT_LE(dropped(DropReason::kNoEncoders), 1u) << "the one that waited when that stamp came";
+  EXPECT_LE(sync_->statistics().encoder_lag, 20 * kMs);
+}
+
 TEST_F(SynchroniserTest, BoundsWhatWaitsAndShedsTheOldest) {
   SynchroniserOptions options;
   options.max_waiting = 8;

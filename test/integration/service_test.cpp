@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 #include <cstddef>
 #include <cstring>
 #include <fstream>
+#include <random>
 
 #include "bodyschema/service/health.hpp"
 #include "harness.hpp"
@@ -18,6 +20,7 @@ namespace bodyschema::integration {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 class Service : public testing::Test {
  protected:
@@ -184,6 +187,33 @@ TEST_F(Service, StopsWithinASecondIdleAndBusy) {
   }
 }
 
+TEST_F(Service, StopsWithinASecondWhileReloading) {
+  const auto config = scratch_ / "estimator.yaml";
+  std::ofstream(config) << "include: [" << reach_configuration() << "]\n";
+  const auto record = scratch_ / "stopped.lcmlog";
+  Process service({"bodyschemad", "--config", config.string(), "-l", url_, "--record", record.string()},
+                  scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  // A load without end: it reads from a pipe that nobody writes to.
+  const auto pipe = scratch_ / "background.png";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  std::ofstream(config) << "include: [" << reach_configuration() << "]\n"
+                        << "vision: {method: background_picture, background_pictures: {left: " << pipe
+                        << ", right: " << pipe << "}}\n";
+  service.signal(SIGHUP);
+  ASSERT_TRUE(service.said("reloading the configuration", Seconds(5)));
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  const auto begin = std::chrono::steady_clock::now();
+  service.signal(SIGTERM);
+  EXPECT_EQ(service.wait(Seconds(20)), 0);
+  EXPECT_LT(Seconds(std::chrono::steady_clock::now() - begin).count(), 1.0);
+  EXPECT_THAT(service.err(), HasSubstr("stopped after"));
+  EXPECT_THAT(service.err(), Not(HasSubstr("reload refused"))) << "the load was not under way";
+  LogReader log(record);
+  LogEvent event;
+  EXPECT_TRUE(log.next(event)) << "its last status";
+}
+
 TEST_F(Service, TellsTheManagerWhenItIsReadyAndAlive) {
   const std::string name = "@bodyschema-integration-" + std::to_string(getpid());
   const int manager = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0);
@@ -240,9 +270,29 @@ TEST_F(Service, ReloadsOnSighupAndRefusesABrokenConfiguration) {
   EXPECT_THAT(service.err(), HasSubstr("did you mean 'filter.particles'?"));
   EXPECT_TRUE(listener.wait_status(particles(40), Seconds(5)));
 
+  // A mesh no silhouette can be drawn of.
+  std::ofstream(scratch_ / "far.obj") << "v 0 0 0\nv 1e7 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  std::ofstream(scratch_ / "far.urdf")
+      << R"(<robot name="r"><link name="part"><visual><geometry><mesh filename="far.obj"/></geometry></visual></link>)"
+      << R"(<link name="k"/><joint name="j" type="continuous"><parent link="part"/><child link="k"/>)"
+      << R"(<axis xyz="1 0 0"/></joint></robot>)";
+  std::ofstream(config) << "version: 1\nrobot: {urdf: far.urdf, rendered_links: [part], hand_link: part, "
+                           "estimated_joints: [j]}\n"
+                           "cameras: {left: {link: part, width: 64, height: 48, fx: 50, fy: 50, cx: 32, cy: 24}}\n";
+  service.signal(SIGHUP);
+  EXPECT_TRUE(service.said("silhouette part 0 'part' has a vertex", kStart)) << service.err();
+  EXPECT_TRUE(service.running());
+
   write("filter: {particles: 60}\n");
   service.signal(SIGHUP);
   EXPECT_TRUE(listener.wait_status(particles(60), kStart));
+  // Two in a row: the second is not lost, whatever the first has read by then.
+  write("filter: {particles: 70}\n");
+  service.signal(SIGHUP);
+  usleep(250'000);
+  write("filter: {particles: 80}\n");
+  service.signal(SIGHUP);
+  EXPECT_TRUE(listener.wait_status(particles(80), kStart));
   Player player(url_, reach_log());
   EXPECT_TRUE(listener.wait_offsets(1, Seconds(20))) << "the reloaded service works";
   service.signal(SIGTERM);
@@ -273,23 +323,60 @@ TEST_F(Service, ItsThreadsShareTwoArenas) {
 }
 #endif
 
-TEST_F(Service, RecordingIsReadableUpToTheLastMessageWhenKilled) {
-  const auto record = scratch_ / "killed.lcmlog";
-  Listener listener(url_);
-  Process service(daemon({"--record", record.string()}), scratch_.folder());
-  ASSERT_TRUE(service.said("waiting for", kStart));
-  Player player(url_, reach_log());
-  ASSERT_TRUE(listener.wait_offsets(10, Seconds(30)));
-  service.signal(SIGKILL);
-  EXPECT_EQ(service.wait(Seconds(5)), 128 + SIGKILL);
-  LogReader log(record);
+/// Messages by channel of a log without damage.
+std::map<std::string, int> recorded(const std::filesystem::path& file) {
+  LogReader log(file);
   LogEvent event;
   std::map<std::string, int> seen;
   while (log.next(event)) ++seen[event.channel];
-  EXPECT_EQ(log.damaged_places(), 0u);
-  EXPECT_GE(seen["ICUB_JOINT_OFFSETS"], 8) << "at most what was on its way to the disk is missing";
-  EXPECT_GE(seen["ICUB_CAMERAS"], 8);
-  EXPECT_GE(seen["ICUB_JOINT_STATE"], 8);
+  EXPECT_EQ(log.damaged_places(), 0u) << file;
+  return seen;
+}
+
+TEST_F(Service, RecordingIsReadableUpToTheLastMessageWhenKilled) {
+  // Killed at random moments and each time started again by the same command, as systemd does it.
+  const unsigned seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  const auto record = scratch_ / "killed.lcmlog";
+  const auto estimates = scratch_ / "estimates.jsonl";
+  Listener listener(url_);
+  constexpr int kTimes = 3;
+  for (int i = 0; i < kTimes; ++i) {
+    Process service(daemon({"--record", record.string(), "--estimates", estimates.string()}), scratch_.folder());
+    ASSERT_TRUE(service.said("waiting for", kStart));
+    Player player(url_, reach_log());
+    ASSERT_TRUE(listener.wait_offsets(listener.offsets().size() + 10, Seconds(30)));
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 200'000));
+    service.signal(SIGKILL);
+    EXPECT_EQ(service.wait(Seconds(5)), 128 + SIGKILL);
+  }
+  for (int i = 0; i < kTimes; ++i) {
+    const std::string part = i == 0 ? "" : "." + std::to_string(i);
+    auto seen = recorded(scratch_ / ("killed" + part + ".lcmlog"));
+    EXPECT_GE(seen["ICUB_JOINT_OFFSETS"], 8) << "at most what was on its way to the disk is missing";
+    EXPECT_GE(seen["ICUB_CAMERAS"], 8);
+    EXPECT_GE(seen["ICUB_JOINT_STATE"], 8);
+    std::ifstream lines(scratch_ / ("estimates" + part + ".jsonl"));
+    EXPECT_GE(std::count(std::istreambuf_iterator<char>(lines), {}, '\n'), 8);
+  }
+}
+
+TEST_F(Service, EstimatesThatCannotBeWrittenAreSaidAtOnce) {
+  if (access("/dev/full", W_OK) != 0) GTEST_SKIP() << "this machine has no /dev/full";
+  Listener listener(url_);
+  Process service(daemon({"--estimates", "/dev/full"}), scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  Robot robot(url_, reach_log(), 0.5);
+  const auto told = listener.wait_status(
+      [](const offsets_status_t& s) {
+        return s.sentence.find("writing of estimates has ended: /dev/full") != std::string::npos;
+      },
+      Seconds(20));
+  ASSERT_TRUE(told) << service.err();
+  EXPECT_NE(told->state, "converged") << "not only once nothing else is to be said";
+  const auto estimates = listener.offsets().size();
+  EXPECT_TRUE(listener.wait_offsets(estimates + 10, Seconds(20))) << "estimating goes on";
 }
 
 TEST_F(Service, StatusFollowsWhatHappens) {

@@ -234,6 +234,7 @@ TEST(Soak, DaemonLivesThroughFaultsAtRandom) {
   const std::int64_t refused = counter(last, "pictures.refused");
   const std::int64_t mono = counter(last, "mono");
   const std::int64_t shed = counter(last, "shed.queue");
+  const std::int64_t failed = counter(last, "failed");
   std::printf("%d faults; %lld messages sent, %lld arrived, %lld lost on the way\n", total, static_cast<long long>(sent),
               static_cast<long long>(arrived), static_cast<long long>(sent - arrived));
   std::printf("%lld pictures: %lld used, %lld dropped, %lld refused, %lld waiting at the end\n",
@@ -255,9 +256,13 @@ TEST(Soak, DaemonLivesThroughFaultsAtRandom) {
   const std::int64_t waiting = pictures - used - dropped - refused;
   EXPECT_GE(waiting, 0);
   EXPECT_LE(waiting, 6);
-  EXPECT_EQ((used + mono) / 2, last.frames_estimated + shed);
+  EXPECT_EQ((used + mono) / 2, last.frames_estimated + shed + failed);
+  EXPECT_EQ(failed, 0) << "frames that could not be worked on";
   EXPECT_LE(honesty.published_, last.frames_estimated);
   EXPECT_LE(arrived, sent);
+  // 1.2 % in the hour of docs/reliability.md: held up for 3 s, or waiting for a processor, the service leaves
+  // its socket full.
+  EXPECT_GE(static_cast<double>(arrived), 0.95 * static_cast<double>(sent));
   EXPECT_EQ(dishonest, 0);
 
   // The first two minutes are warm-up.
@@ -278,7 +283,8 @@ TEST(Soak, DaemonLivesThroughFaultsAtRandom) {
   };
   EXPECT_LE(drift("resident MiB", [](const Minute& m) { return m.rss_MiB; }), 0.02);
   EXPECT_LE(drift("processor time per estimate, ms", [](const Minute& m) { return m.cost_ms; }), 0.15);
-  // The clock on the wall counts other people's work too: printed beside the machine's load.
+  // Printed beside the machine's load and not judged: the clock on the wall counts other people's work too,
+  // and not in proportion (a queue fills all at once). What drifts by itself shows in processor time.
   drift("latency, ms", [](const Minute& m) { return m.latency_ms; });
   drift("load of the machine", [](const Minute& m) { return m.load; });
 }

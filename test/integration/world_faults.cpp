@@ -122,6 +122,22 @@ Fault pixel_format_jumps() {
   });
 }
 
+Fault pixel_format_jumps_to_gray() {
+  return on_pictures([](images_t& p, MessageSink&) {
+    for (auto& image : p.images) {
+      std::vector<std::uint8_t> gray(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
+      for (std::size_t i = 0; i < gray.size() && 3 * i + 2 < image.data.size(); ++i) {
+        gray[i] = static_cast<std::uint8_t>((image.data[3 * i] + image.data[3 * i + 1] + image.data[3 * i + 2]) / 3);
+      }
+      image.data = std::move(gray);
+      image.size = static_cast<int>(image.data.size());
+      image.row_stride = image.width;
+      image.pixelformat = bot_core::image_t::PIXEL_FORMAT_GRAY;
+    }
+    return true;
+  });
+}
+
 Fault lights_go_off() {
   return on_pictures([](images_t& p, MessageSink&) {
     for (auto& image : p.images) std::fill(image.data.begin(), image.data.end(), std::uint8_t{0});
@@ -271,6 +287,7 @@ std::vector<Named> all(unsigned seed, const std::shared_ptr<Stall>& stall) {
           {"pictures 0.5 s late", [] { return pictures_late(500'000); }},
           {"picture size jumps", picture_size_jumps},
           {"pixel format jumps", pixel_format_jumps},
+          {"pictures turn gray", pixel_format_jumps_to_gray},
           {"lights off", lights_go_off},
           {"hand leaves the view", hand_leaves_the_view},
           {"second publisher", [] { return second_publisher(); }},

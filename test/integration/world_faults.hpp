@@ -27,6 +27,8 @@ Fault pictures_out_of_order();
 Fault pictures_late(Microseconds delay);
 Fault picture_size_jumps();
 Fault pixel_format_jumps();
+/// Colour pictures come as gray ones of the same size.
+Fault pixel_format_jumps_to_gray();
 Fault lights_go_off();
 /// Pictures of the room without the robot.
 Fault hand_leaves_the_view();

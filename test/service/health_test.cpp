@@ -209,6 +209,22 @@ TEST(Health, RecordingAndReloadFailures) {
   expect(facts, HealthLevel::kWarn, "recording has ended: a.lcmlog: No space left on device");
   facts.reload_failure = "b.yaml:3: unknown key";
   expect(facts, HealthLevel::kWarn, "reload refused, going on as before: b.yaml:3: unknown key");
+  // Nothing else hides that a file has ended, and it hides nothing.
+  facts.estimates_failure = "c.jsonl: cut short";
+  facts.picture_age_ms = 3200.0;
+  expect(facts, HealthLevel::kStale,
+         "no pictures on ICUB_CAMERAS for 3.2 s; recording has ended: a.lcmlog: No space left on device; "
+         "writing of estimates has ended: c.jsonl: cut short");
+}
+
+TEST(Health, FramesThatCouldNotBeWorkedOn) {
+  HealthFacts facts = well();
+  facts.failed_since_last = 2;
+  facts.frame_failure = "camera 'left': picture of 1x1x3";
+  expect(facts, HealthLevel::kWarn, "2 frames of the last second could not be worked on: camera 'left'");
+  facts.estimated_since_last = 0;
+  facts.estimate_age_ms = 2000.0;
+  expect(facts, HealthLevel::kError, "2 frames of the last second could not be worked on: camera 'left'");
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 #include "bodyschema/service/recorder.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "bodyschema/core/error.hpp"
@@ -52,6 +54,28 @@ TEST(Recorder, WhatWaitsIsBounded) {
   recorder.record("A", 1, std::vector<std::uint8_t>(2000, 7));  // can never fit
   EXPECT_EQ(recorder.state().lost, 1u);
   std::filesystem::remove(file);
+}
+
+TEST(Recorder, EmptyMessagesTakeRoomToo) {
+  // A disk that stands still: a pipe that nobody reads.
+  const auto pipe = scratch_file("stalled");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const int reader = open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_GE(reader, 0);
+  {
+    Recorder recorder(pipe, 100'000);
+    for (int i = 0; i < 20'000; ++i) recorder.record("A", i, {});
+    const auto state = recorder.state();
+    // The pipe itself holds 64 KiB, a few thousand messages.
+    EXPECT_GT(state.lost, 10'000u);
+    std::vector<char> sink(1 << 16);
+    for (int i = 0; i < 500 && recorder.state().written + recorder.state().lost < 20'000; ++i) {
+      (void)!read(reader, sink.data(), sink.size());
+      usleep(1000);
+    }
+  }
+  close(reader);
+  std::filesystem::remove(pipe);
 }
 
 TEST(Recorder, FileThatCannotBeMade) {

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "atlas_scorer.hpp"
+#include "bodyschema/core/error.hpp"
 #include "silhouette/reference.hpp"
 #include "silhouette/synthetic_hand.hpp"
 
@@ -456,13 +457,13 @@ TEST_P(Engine, RejectsWhatItCannotUse) {
   EXPECT_THROW(make(model, {}), std::invalid_argument);
   auto broken = model;
   broken.parts[3].triangles[0][1] = 100000;
-  EXPECT_THROW(make(broken, cameras), std::invalid_argument);
+  EXPECT_THROW(make(broken, cameras), FileError);
   broken = model;
   broken.parts[3].vertices[0].x() = std::nanf("");
-  EXPECT_THROW(make(broken, cameras), std::invalid_argument);
+  EXPECT_THROW(make(broken, cameras), FileError);
   broken = model;
   broken.parts[3].triangles.clear();
-  EXPECT_THROW(make(broken, cameras), std::invalid_argument);
+  EXPECT_THROW(make(broken, cameras), FileError);
   auto flat = cameras;
   flat[0].height = 0;
   EXPECT_THROW(make(model, flat), std::invalid_argument);

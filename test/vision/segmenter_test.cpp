@@ -310,6 +310,30 @@ TEST(Segmenter, StatisticsFollowThePredictionOnAMovingBackground) {
   EXPECT_EQ(out.valid.count(), static_cast<std::size_t>(scene.width * scene.height));
 }
 
+TEST(Segmenter, LearnsAnewWhenPicturesTurnFromGrayToColour) {
+  Scene scene;
+  scene.texture = Texture::kClutter;
+  scene.supersampling = 4;
+  std::mt19937 random(11);
+  auto setup = setup_for(SegmentationMethod::kLearnedBackground);
+  setup.learning_frames = 15;
+  Segmenter segmenter(setup, "left", scene.width, scene.height);
+  Output out;
+  for (const int channels : {1, 3}) {
+    scene.channels = channels;
+    scene.shapes.clear();
+    for (const Image& picture : pictures(scene, 15, random)) {
+      segmenter.segment(picture, out.mask, out.valid, out.coverage);
+      EXPECT_EQ(out.mask.count(), 0u);
+      segmenter.adapt(picture, out.mask);
+    }
+    EXPECT_TRUE(segmenter.ready());
+    scene.shapes = test::hand(120, 70);
+    segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
+    EXPECT_GT(iou(out.mask, scene.true_mask()), 0.9) << channels;
+  }
+}
+
 TEST(Segmenter, RefusesPicturesThatDoNotFit) {
   Segmenter segmenter(setup_for(SegmentationMethod::kSingleColour), "left", 32, 24);
   Output out;
@@ -324,7 +348,6 @@ TEST(Segmenter, RefusesPicturesThatDoNotFit) {
   cut.data.pop_back();
   expect_refused(cut);
   EXPECT_NO_THROW(segmenter.segment(Image(32, 24, 1), out.mask, out.valid, out.coverage));
-  expect_refused(Image(32, 24, 3));  // gray before, RGB now
   EXPECT_THROW(Segmenter(VisionSetup{}, "left", 0, 24), ConfigurationError);
 }
 
@@ -379,6 +402,7 @@ TEST(Segmenter, GivenCleanPictureAndNoisyFrames) {
   segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
   EXPECT_NEAR(segmenter.background().noise_sd, 2.5, 0.4);
   EXPECT_GT(iou(out.mask, scene.true_mask()), 0.98);
+  EXPECT_THROW(segmenter.segment(Image(scene.width, scene.height, 1), out.mask, out.valid, out.coverage), DataError);
 }
 
 }  // namespace

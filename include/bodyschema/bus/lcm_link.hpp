@@ -29,6 +29,13 @@ struct RefusedSources {
   std::string sender;   ///< of the newest: address and port
 };
 
+/// Messages that reached this machine and were given up before anyone saw them. Known only where one
+/// source is admitted: LCM itself keeps no count that it would tell.
+struct LostMessages {
+  std::uint64_t queue = 0;       ///< too many waited: the oldest of that channel
+  std::uint64_t incomplete = 0;  ///< a part of them never came; of any channel
+};
+
 /// A connection to LCM: publishes, and hands every message of the subscribed channels to one
 /// function. publish() may be called from any thread; handle() from one.
 class LcmLink : public MessageSink {
@@ -57,6 +64,8 @@ class LcmLink : public MessageSink {
   [[nodiscard]] const std::string& url() const { return url_; }
   /// None where every source is admitted. Any thread.
   [[nodiscard]] RefusedSources refused_sources() const;
+  /// Any thread.
+  [[nodiscard]] LostMessages lost() const;
 
  private:
   struct Subscriber;

@@ -60,6 +60,7 @@ class LogReader {
   std::uint64_t position_ = 0;
   std::uint64_t damaged_places_ = 0;
   std::uint64_t skipped_bytes_ = 0;
+  std::vector<std::uint8_t> block_;  ///< of find_event
 };
 
 /// Writes a log in LCM's event format. Every event reaches the kernel in one call before publish()

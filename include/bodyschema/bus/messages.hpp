@@ -38,8 +38,9 @@ enum class MessageFault {
   kWrongSize,          ///< a picture's size is not the camera's, or its data not its size
   kUnsupportedFormat,  ///< a pixel format this project does not read
   kBrokenPicture,      ///< a JPEG that does not decode
+  kOtherKind,          ///< a gray picture of a camera whose pictures are in colour, or the reverse
 };
-inline constexpr std::size_t kMessageFaultCount = 12;
+inline constexpr std::size_t kMessageFaultCount = 13;
 
 /// Lower-case words with underscores ("wrong_type"), as used in counters.
 [[nodiscard]] std::string_view name_of(MessageFault fault);

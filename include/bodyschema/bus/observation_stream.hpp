@@ -22,6 +22,8 @@ struct BusStatistics {
   std::uint64_t messages = 0;           ///< on our two input channels
   std::uint64_t messages_malformed = 0; ///< not used as a whole
   std::uint64_t images_malformed = 0;   ///< pictures of good messages that could not be used
+  std::uint64_t lost_in_queue = 0;      ///< LostMessages, which the network's side fills in
+  std::uint64_t lost_incomplete = 0;
   /// Messages and pictures by what was wrong with them.
   std::array<std::uint64_t, kMessageFaultCount> faults{};
   SynchroniserStatistics synchroniser;
@@ -53,6 +55,11 @@ class ObservationStream {
   /// From now on the follower sees all encoder samples and annotates every observation.
   void set_follower(std::unique_ptr<EncoderFollower> follower) { follower_ = std::move(follower); }
 
+  /// Pictures of this camera are gray (1 channel) or in colour (3) for good: its background is given.
+  /// Otherwise its first picture decides; another kind is refused, unless it comes for some ten seconds
+  /// (300 pictures in a row), which is another camera.
+  void expect_channels(std::size_t camera, int channels);
+
   /// @param arrival_us  the caller's clock, handed through to ArrivedObservation
   /// @return whether the channel is one of our inputs
   bool receive(std::string_view channel, Bytes message, std::int64_t arrival_us = 0);
@@ -72,6 +79,9 @@ class ObservationStream {
     int type;  ///< bot_core::images_t
     int width;
     int height;
+    int channels = 0;  ///< of its pictures; 0: none came yet
+    bool channels_given = false;
+    int other_kind_in_a_row = 0;
   };
   struct Complaint {
     std::chrono::steady_clock::time_point last{};
@@ -81,6 +91,7 @@ class ObservationStream {
   void show_follower();
   void annotate(Observation& observation);
   void receive_images(Bytes message, std::int64_t arrival_us);
+  static DecodeResult admit_kind(CameraFormat& camera, int channels);
   void refuse(const std::string& source, const DecodeResult& result);
   void warn_of_missing_joints();
   bool may_complain(Complaint& complaint);

@@ -12,9 +12,10 @@ namespace bodyschema {
 
 struct DaemonOptions {
   std::string lcm_url;
-  /// Log of every message that comes in on our channels or goes out.
+  /// Log of every message that comes in on our channels or goes out. A file that holds something already
+  /// is kept: name.1.lcmlog, name.2.lcmlog, ... are written instead.
   std::optional<std::filesystem::path> record;
-  /// estimates.jsonl, as replay writes it.
+  /// estimates.jsonl, as replay writes it; kept in the same way.
   std::optional<std::filesystem::path> estimates;
   std::uint64_t frames = 0;        ///< stop after this many estimates; 0: do not
   double stop_after_idle_s = 0.0;  ///< stop when nothing has come for so long, once something has; 0: do not

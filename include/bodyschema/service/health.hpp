@@ -47,6 +47,8 @@ struct HealthFacts {
   BusStatistics since_last;      ///< counts since the verdict before this one
   std::uint64_t estimated_since_last = 0;
   std::uint64_t shed_since_last = 0;
+  std::uint64_t failed_since_last = 0;  ///< frames that could not be worked on
+  std::string frame_failure;            ///< why, of the last of them
 
   RefusedSources refused;        ///< the newest sender that was refused, and how many messages since
                                  ///< the verdict before this one
@@ -55,6 +57,7 @@ struct HealthFacts {
   std::string reload_failure;    ///< why the last reload was refused; empty: none
   std::string recording_failure; ///< empty: none
   std::uint64_t recording_lost = 0;  ///< messages
+  std::string estimates_failure; ///< of their file; empty: none
 };
 
 struct Health {

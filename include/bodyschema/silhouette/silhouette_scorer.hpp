@@ -76,8 +76,8 @@ struct SilhouetteOptions {
   int threads = 0;                   ///< contour: worker threads, 0 = one per core
 };
 
-/// Throws std::invalid_argument for an unusable model or option, gl::ContextError when the atlas is
-/// asked for and no context can be had. `reason` (optional) receives why this engine was taken.
+/// Throws FileError for an unusable mesh, std::invalid_argument for an unusable option, ContextError when the atlas
+/// is asked for and no context can be had. `reason` (optional) receives why this engine was taken.
 std::unique_ptr<SilhouetteScorer> make_silhouette_scorer(const SilhouetteModel& model,
                                                          std::span<const PinholeIntrinsics> cameras,
                                                          const SilhouetteOptions& options = {},

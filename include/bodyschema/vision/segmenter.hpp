@@ -31,8 +31,10 @@ namespace bodyschema {
 /// and keeps adapting where the robot is not: `adapt`. `statistics` needs a prediction with every
 /// picture.
 ///
-/// Throws DataError for an empty picture or one of another size or number of channels than before;
-/// otherwise `segment` and `adapt` neither throw nor allocate once warm. One segmenter per camera and
+/// A picture of another number of channels than before starts all learning anew.
+///
+/// Throws DataError for an empty picture, one of another size, or one of another number of channels than
+/// a given background has; otherwise `segment` and `adapt` neither throw nor allocate once warm. One segmenter per camera and
 /// thread.
 class Segmenter {
  public:
@@ -70,6 +72,7 @@ class Segmenter {
 
  private:
   struct Impl;
+  void admit(const Image& image);
   std::unique_ptr<Impl> impl_;
 };
 
