@@ -21,6 +21,7 @@ namespace {
 
 constexpr const char* kUnused = "-";
 constexpr std::size_t kMaxLineBytes = 1 << 16;
+constexpr std::uintmax_t kMaxDataBytes = 256u << 20;  // an hour at 100 Hz is a third of it; rows are kept
 
 struct Line {
   std::string where;  ///< file:line, for errors
@@ -47,11 +48,21 @@ double parse_number(const std::string& text, const std::string& where) {
   return value;
 }
 
+/// The next line; of one that is too long, enough to see that it is.
+bool next_line(std::istream& in, std::string& line) {
+  line.clear();
+  for (int c = 0; line.size() <= kMaxLineBytes && (c = in.get()) != std::char_traits<char>::eof();) {
+    if (c == '\n') return true;
+    line += static_cast<char>(c);
+  }
+  return !line.empty();
+}
+
 /// How many stamps stand before the values: `Stamp: tx; rx;` in info.log means two, sender's first.
 int stamps_per_line(const std::filesystem::path& folder) {
   std::ifstream info(folder / "info.log");
   std::string line;
-  while (std::getline(info, line) && line.size() < kMaxLineBytes) {
+  while (next_line(info, line) && line.size() <= kMaxLineBytes) {
     if (line.rfind("Stamp:", 0) == 0) {
       return line.find("tx") != std::string::npos && line.find("rx") != std::string::npos ? 2 : 1;
     }
@@ -68,14 +79,19 @@ std::vector<Line> read_data_log(const std::filesystem::path& folder, const std::
   const auto file = folder / "data.log";
   std::ifstream in(file);
   if (!in) throw FileError(file.string() + ": cannot be opened");
+  std::error_code error;
+  if (const auto size = std::filesystem::file_size(file, error); !error && size > kMaxDataBytes) {
+    throw FileError(file.string() + ": " + std::to_string(size) + " bytes, at most " +
+                    std::to_string(kMaxDataBytes) + " expected");
+  }
   const auto stamps = static_cast<std::size_t>(stamps_per_line(folder));
   std::vector<Line> lines;
   std::string text;
   std::uint64_t number = 0;
-  while (std::getline(in, text)) {
+  while (next_line(in, text)) {
     Line line;
     line.where = file.string() + ":" + std::to_string(++number);
-    if (text.size() > kMaxLineBytes) throw FileError(line.where + ": line of " + std::to_string(text.size()) + " bytes");
+    if (text.size() > kMaxLineBytes) throw FileError(line.where + ": line of more than " + std::to_string(kMaxLineBytes) + " bytes");
     std::replace_if(text.begin(), text.end(), [](char c) { return c == '(' || c == ')' || c == '\r' || c == '\t'; }, ' ');
     std::vector<std::string> words;
     for (std::size_t at = 0; (at = text.find_first_not_of(' ', at)) != std::string::npos;) {

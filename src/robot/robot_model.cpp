@@ -144,6 +144,8 @@ void build_tree(const UrdfTree& urdf_tree, const std::string& file, RobotModel::
   }
 }
 
+constexpr std::size_t kMaxTriangles = 4'000'000;  // of all rendered links; an iCub has some 100,000
+
 /// Scales and places a mesh in the link frame; a mirroring scale turns the winding back.
 void place(TriangleMesh& mesh, const Eigen::Vector3d& scale, const Pose& X_LM) {
   for (auto& p : mesh.vertices) {
@@ -210,8 +212,9 @@ TriangleMesh visual_mesh(const urdf::Visual& visual, const std::string& where,
   return mesh;
 }
 
+/// `budget`: triangles that all links to come may have together.
 LinkMesh link_mesh(const urdf::Link& link, const fs::path& file, const RobotModelOptions& options,
-                   std::vector<std::string>& warnings) {
+                   std::size_t& budget, std::vector<std::string>& warnings) {
   const std::string where = file.string() + ": link '" + link.name + "'";
   if (link.visual_array.empty()) {
     throw FileError(where + " is to be rendered but has no visual");
@@ -221,6 +224,11 @@ LinkMesh link_mesh(const urdf::Link& link, const fs::path& file, const RobotMode
   result.mesh.name = link.name;
   for (const auto& visual : link.visual_array) {
     TriangleMesh part = visual_mesh(*visual, where, file.parent_path(), options);
+    if (part.triangles.size() > budget) {
+      throw FileError(where + ": the rendered links have more than " + std::to_string(kMaxTriangles) +
+                      " triangles together");
+    }
+    budget -= part.triangles.size();
     weld(part);
     if (part.triangles.empty()) {
       throw FileError(where + ": mesh '" + part.name +
@@ -257,6 +265,7 @@ std::shared_ptr<const RobotModel> RobotModel::load(const RobotModelOptions& opti
   build_tree(urdf_tree, options.urdf.string(), impl);
 
   std::set<std::string> rendered;
+  std::size_t budget = kMaxTriangles;
   for (const std::string& name : options.rendered_links) {
     const auto link = urdf_tree.model->getLink(name);
     if (!link) {
@@ -267,7 +276,7 @@ std::shared_ptr<const RobotModel> RobotModel::load(const RobotModelOptions& opti
     if (!rendered.insert(name).second) {
       throw FileError(options.urdf.string() + ": link '" + name + "' is to be rendered twice");
     }
-    impl.meshes.push_back(link_mesh(*link, file, options, impl.warnings));
+    impl.meshes.push_back(link_mesh(*link, file, options, budget, impl.warnings));
   }
   return robot;
 }

@@ -156,7 +156,10 @@ TEST_F(YarpImport, NamesFileAndLineOfWhatIsWrong) {
   EXPECT_THAT(with("arm/data.log", "-1 -5.0 1 2 3\n"), HasSubstr("not a time stamp"));
   EXPECT_THAT(with("arm/data.log", "-1\n"), HasSubstr("expected a counter, a time stamp and values"));
   EXPECT_THAT(with("arm/data.log", ""), HasSubstr("holds no data"));
-  EXPECT_THAT(with("arm/data.log", std::string(100'000, '1')), HasSubstr("line of 100000 bytes"));
+  EXPECT_THAT(with("arm/data.log", std::string(100'000, '1')), HasSubstr("line of more than 65536 bytes"));
+  write_recording();
+  std::filesystem::resize_file(directory_ / "arm/data.log", std::uintmax_t{4} << 30);  // takes no room on the disk
+  EXPECT_THAT(error(), AllOf(HasSubstr("arm/data.log"), HasSubstr("4294967296 bytes, at most 268435456")));
   EXPECT_THAT(with("left/data.log", "-1 100.0 a.ppm\n-1 100.1 gone.ppm\n"),
               AllOf(HasSubstr("left/data.log:2"), HasSubstr("gone.ppm is missing")));
   EXPECT_THAT(with("left/data.log", "-1 100.0 ../right/b.ppm\n"), HasSubstr("not the name of a picture"));

@@ -237,6 +237,11 @@ TEST_F(BadInput, ScaleOfZero) {
   EXPECT_THAT(urdf_message(one_part_urdf(mesh_visual("a.obj", "1 0 1")), {"part"}),
               HasSubstr("scale must be finite and not zero"));
 }
+TEST_F(BadInput, MoreTrianglesThanARobotHas) {
+  std::string visuals;
+  for (int i = 0; i < 40'000; ++i) visuals += "<visual><geometry><sphere radius='1'/></geometry></visual>";
+  EXPECT_THAT(urdf_message(one_part_urdf(visuals), {"part"}), HasSubstr("more than 4000000 triangles together"));
+}
 TEST_F(BadInput, PrimitiveOfNoSize) {
   EXPECT_THAT(urdf_message(one_part_urdf("<visual><geometry><sphere radius='-1'/></geometry></visual>"),
                            {"part"}),
