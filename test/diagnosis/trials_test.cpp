@@ -13,15 +13,15 @@ namespace {
 
 /// Of `trials` with a rate of right answers, at least as many as a tool at the demanded rate reaches but
 /// for once in ten thousand: a dozen of these fail less than once in a thousand runs.
-void expect_right(const char* what, double rate, double demanded, std::size_t trials) {
+void expect_right(const char* what, double rate, double demanded, std::size_t trials, double chance = 1e-4) {
   const auto right = std::lround(rate * static_cast<double>(trials));
-  const int least = test::fewest_right(std::vector<double>(trials, demanded), 1e-4);
+  const int least = test::fewest_right(std::vector<double>(trials, demanded), chance);
   EXPECT_GE(right, least) << what << ": of " << trials;
   EXPECT_GT(least, 0) << what << ": too few trials to say anything";
 }
 
 TEST(Trials, AFewOfEveryRowGoWell) {
-  const TrialCounts counts = {4, 4, 6, 4, 5, 5, 14};
+  const TrialCounts counts = {4, 4, 6, 4, 5, 5, 10};
   const auto outcomes =
       run_diagnosis_trials(test::robot(), counts, test::seed(), 2, silhouette_logs(test::robot()));
   const auto r = rates(outcomes);
@@ -39,7 +39,8 @@ TEST(Trials, AFewOfEveryRowGoWell) {
   expect_right("two causes, nothing else", 1.0 - r.two_spurious, 0.95, of(TrialRow::kTwo));
   expect_right("outside", r.outside_unexplained, 0.85, of(TrialRow::kOutside));
   expect_right("outside, hard: joint", r.outside_hard_joint, 0.70, of(TrialRow::kOutsideHard));
-  expect_right("outside, hard: class", r.outside_hard_class_or_unexplained, 0.50, of(TrialRow::kOutsideHard));
+  // Half is demanded (86 % are reached): ten logs bound that at once in a thousand.
+  expect_right("outside, hard: class", r.outside_hard_class_or_unexplained, 0.50, of(TrialRow::kOutsideHard), 1e-3);
   expect_right("intervals", r.coverage95, 0.90, r.parameters);
   expect_right("signs", r.sign, 0.999, r.parameters);
   EXPECT_GE(r.gains, 1u);
