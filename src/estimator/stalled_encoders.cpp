@@ -19,7 +19,7 @@ bool StalledEncoders::Track::moved_to(double reading) const { return std::abs(re
 bool StalledEncoders::ends(const Eigen::VectorXd& reading_rad) const {
   for (Eigen::Index k = 0; k < reading_rad.size(); ++k) {
     const Track& track = tracks_[static_cast<std::size_t>(k)];
-    if (track.stood < kStanding || !track.moved_to(reading_rad(k))) continue;
+    if (track.stood < kBriefly || !track.moved_to(reading_rad(k))) continue;
     if (track.moves > 0 || frames_since_drop_ < std::min(track.stood, kTaught)) return true;
   }
   return false;
@@ -53,7 +53,7 @@ void StalledEncoders::look(const Eigen::VectorXd& reading_rad, const Eigen::Vect
     drift_rad_(k) = track.drift_rad();
     ++track.frames_since;
     ++track.stood;
-    if (track.stood >= kStanding && frames_since_drop_ < kRecent) dropped_while_standing_ = true;
+    if (track.stood >= kBriefly && frames_since_drop_ < kRecent) dropped_while_standing_ = true;
     if (fits) {
       const double away_rad = std::abs(offset_rad(k) - track.offset_rad);
       track.away = track.known && away_rad > std::max(kMove_rad, kMove_sd * std::hypot(sd_rad(k), track.sd_rad))

@@ -45,7 +45,7 @@ class StalledEncoders {
 
  private:
   static constexpr std::size_t kRecent = 30;    ///< frames
-  static constexpr std::size_t kStanding = 15;  ///< frames; readings of a slow joint stand for some
+  static constexpr std::size_t kBriefly = 5;    ///< frames; enough where a memory was dropped besides
   static constexpr std::size_t kTaught = 300;   ///< frames for which a dropped memory casts doubt on the next
   /// Since the reading last changed.
   struct Track {
