@@ -38,6 +38,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kPoll{50};
 constexpr milliseconds kStatusPeriod{1000};
+constexpr int kReportsBetweenTidying = 10;  // statuses, so seconds
 constexpr std::size_t kTimingsWindow = 100'000;
 constexpr int kEngineCheckFrames = 8;
 
@@ -57,8 +58,9 @@ void keep_memory_flat() {
 #endif
 }
 
-/// What the replaced session has freed lies scattered over the arenas of many threads; without this,
-/// memory would grow by some 17 MB with each of the first reloads.
+/// What the replaced session has freed lies scattered over the heap; without this, memory would grow by
+/// some 17 MB with each of the first reloads. Called now and then besides (it takes less than a
+/// millisecond): frames that waited, and whatever was needed for a moment only, leave holes too.
 void give_back_memory() {
 #ifdef __GLIBC__
   malloc_trim(0);
@@ -433,12 +435,15 @@ class Daemon {
 
   void report_every_second(const std::stop_token& stop) {
     auto next = std::chrono::steady_clock::now() + kStatusPeriod;
+    int reports = 0;
     while (!stop.stop_requested()) {
       std::this_thread::sleep_for(std::min<std::chrono::steady_clock::duration>(
           kPoll, next - std::chrono::steady_clock::now()));
       if (std::chrono::steady_clock::now() < next) continue;
-      next += kStatusPeriod;
+      // After a pause of the whole process one report is due, not one for each second missed.
+      next = std::max(next + kStatusPeriod, std::chrono::steady_clock::now());
       report();
+      if (++reports % kReportsBetweenTidying == 0) give_back_memory();
     }
   }
 
