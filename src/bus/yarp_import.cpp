@@ -11,6 +11,7 @@
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/file_size.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "netpbm.hpp"
@@ -21,7 +22,7 @@ namespace {
 
 constexpr const char* kUnused = "-";
 constexpr std::size_t kMaxLineBytes = 1 << 16;
-constexpr std::uintmax_t kMaxDataBytes = 256u << 20;  // an hour at 100 Hz is a third of it; rows are kept
+constexpr std::uintmax_t kMaxDataBytes = 256u << 20;  // rows are kept; an hour of an arm at 100 Hz has some 50 MB
 
 struct Line {
   std::string where;  ///< file:line, for errors
@@ -79,11 +80,7 @@ std::vector<Line> read_data_log(const std::filesystem::path& folder, const std::
   const auto file = folder / "data.log";
   std::ifstream in(file);
   if (!in) throw FileError(file.string() + ": cannot be opened");
-  std::error_code error;
-  if (const auto size = std::filesystem::file_size(file, error); !error && size > kMaxDataBytes) {
-    throw FileError(file.string() + ": " + std::to_string(size) + " bytes, at most " +
-                    std::to_string(kMaxDataBytes) + " expected");
-  }
+  file_size_at_most(file, kMaxDataBytes);
   const auto stamps = static_cast<std::size_t>(stamps_per_line(folder));
   std::vector<Line> lines;
   std::string text;

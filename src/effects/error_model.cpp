@@ -8,12 +8,14 @@
 #include <sstream>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/file_size.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 
 namespace bodyschema {
 namespace {
 
 constexpr int kVersion = 1;
+constexpr std::uintmax_t kMaxFileBytes = 1 << 20;
 
 /// "width_deg", "compliance_deg_per_Nm", "gain_percent", "k1".
 std::string key_of(const EffectParameter& p) {
@@ -82,6 +84,7 @@ ErrorModel& ErrorModel::operator=(const ErrorModel& other) {
 ErrorModel ErrorModel::load(const std::filesystem::path& file, const JointRoles& roles) {
   std::ifstream in(file);
   if (!in) throw ConfigurationError(file.string() + ": cannot be read, expected an extended model");
+  file_size_at_most(file, kMaxFileBytes);
   std::stringstream text;
   text << in.rdbuf();
   return parse(text.str(), roles, file.string());

@@ -5,9 +5,12 @@
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/file_size.hpp"
 
 namespace bodyschema {
 namespace {
+
+constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 30;  // an hour at 30 Hz is a fifth of it
 
 using Json = nlohmann::json;
 constexpr Microseconds kTolerance_us = 60'000;
@@ -41,6 +44,7 @@ std::vector<Pose> hand_in(const std::vector<std::string>& cameras, const Json& i
 Truth Truth::load(const std::filesystem::path& file, const std::vector<std::string>& cameras) {
   std::ifstream stream(file);
   if (!stream) throw FileError(file.string() + ": no such truth file");
+  file_size_at_most(file, kMaxFileBytes);
   Truth truth;
   try {
     const Json json = Json::parse(stream);

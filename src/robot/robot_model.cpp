@@ -144,7 +144,7 @@ void build_tree(const UrdfTree& urdf_tree, const std::string& file, RobotModel::
   }
 }
 
-constexpr std::size_t kMaxTriangles = 4'000'000;  // of all rendered links; an iCub has some 100,000
+constexpr std::size_t kMaxTriangles = 4'000'000;  // of all rendered links together
 
 /// Scales and places a mesh in the link frame; a mirroring scale turns the winding back.
 void place(TriangleMesh& mesh, const Eigen::Vector3d& scale, const Pose& X_LM) {

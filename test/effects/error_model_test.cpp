@@ -2,6 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/geometry/pose.hpp"
@@ -100,6 +104,11 @@ TEST(ErrorModel, SaysWhatIsWrongWithAFile) {
                            "parameters: {width_deg: 1}}"),
               ThrowsMessage<ConfigurationError>(HasSubstr("twice")));
   EXPECT_THROW(ErrorModel::load("/nonexistent/x.yaml", r), ConfigurationError);
+  const auto large = std::filesystem::temp_directory_path() / ("model_" + std::to_string(getpid()) + ".yaml");
+  std::ofstream(large) << "version: 1\n";
+  std::filesystem::resize_file(large, std::uintmax_t{4} << 30);  // without a byte on the disk
+  EXPECT_THAT([&] { ErrorModel::load(large, r); }, ThrowsMessage<FileError>(HasSubstr("at most 1048576 expected")));
+  std::filesystem::remove(large);
 }
 
 }  // namespace

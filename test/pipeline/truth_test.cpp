@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 
 #include "bodyschema/core/error.hpp"
@@ -13,6 +14,7 @@ namespace bodyschema {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
 
 class TruthFile : public ::testing::Test {
  protected:
@@ -62,6 +64,8 @@ TEST_F(TruthFile, ErrorsNameTheFile) {
   EXPECT_THAT(error_of(R"({"frames": [{"utime": 1}]})"), HasSubstr("not a truth file"));
   EXPECT_THAT(error_of(R"({"frames": []})"), HasSubstr("holds no pose"));
   EXPECT_THROW(Truth::load("/nonexistent/truth.json"), FileError);
+  std::filesystem::resize_file(path_, std::uintmax_t{4} << 30);  // without a byte on the disk
+  EXPECT_THAT([&] { Truth::load(path_, {"left", "right"}); }, ThrowsMessage<FileError>(HasSubstr("at most 1073741824 expected")));
 }
 
 TEST(TruthOfTheRecording, HoldsSeventyThreePoses) {
