@@ -17,10 +17,14 @@ constexpr int kMoves = 3;               // a slip is one, seen as two at most
 bool StalledEncoders::Track::moved_to(double reading) const { return std::abs(reading_rad - reading) > kStands_rad; }
 
 bool StalledEncoders::ends(const Eigen::VectorXd& reading_rad) const {
+  std::size_t shortest = kTaught;
+  for (const Track& track : tracks_) shortest = std::min(shortest, track.stood);
   for (Eigen::Index k = 0; k < reading_rad.size(); ++k) {
     const Track& track = tracks_[static_cast<std::size_t>(k)];
     if (track.stood < kBriefly || !track.moved_to(reading_rad(k))) continue;
-    if (track.moves > 0 || frames_since_drop_ < std::min(track.stood, kTaught)) return true;
+    // An arm that is held still stands in all its joints; what made it drop a memory is something else.
+    const bool alone = track.stood > shortest + kBriefly;
+    if (track.moves > 0 || (alone && frames_since_drop_ < std::min(track.stood, kTaught))) return true;
   }
   return false;
 }

@@ -23,7 +23,8 @@ class StalledEncoders {
   void look(const Eigen::VectorXd& reading_rad, const Eigen::VectorXd& offset_rad, const Eigen::VectorXd& sd_rad,
             bool fits, bool settled, bool remembers);
   /// Whether a reading that stood under suspicion has moved again: its joint was seen to move meanwhile, or
-  /// a memory was dropped in its last ten seconds (300 frames). What has been learned since is wrong then.
+  /// a memory was dropped in its last 300 frames while other joints moved. What has been learned since is
+  /// wrong then.
   /// Asked with a frame's readings before `look` sees the frame.
   [[nodiscard]] bool ends(const Eigen::VectorXd& reading_rad) const;
   /// How far each offset has run in 30 frames (a second at 30 Hz) under a reading that stands, radians; zero
