@@ -72,13 +72,15 @@ class OneSource : public testing::Test {
     try {
       link_ = std::make_unique<LcmLink>("udpm://239.255.76.67:" + std::to_string(port_) + "?ttl=0", 60.0);
     } catch (const Error& e) {
-      GTEST_SKIP() << e.what();
+      GTEST_SKIP() << "LCM needs a multicast route (scripts/multicast adds it): " << e.what();
     }
     link_->subscribe(kChannel, 4, [this](const std::string&, Bytes message, std::int64_t) {
       sizes_.push_back(message.size());
     });
     sender_.message();
-    if (!link_->handle(2000)) GTEST_SKIP() << "no multicast packet comes back on this machine";
+    if (!link_->handle(2000)) {
+      GTEST_SKIP() << "no multicast packet comes back on this machine: LCM needs a route (scripts/multicast adds it)";
+    }
     sizes_.clear();
   }
   /// Until all that was sent before has come in.

@@ -14,6 +14,7 @@
 #include "bodyschema/bus/observation_stream.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/geometry/pose.hpp"
+#include "test_data.hpp"
 
 namespace bodyschema {
 namespace {
@@ -21,12 +22,6 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-std::filesystem::path data_folder() {
-  const char* given = std::getenv("BODYSCHEMA_DATA");
-  return given != nullptr ? std::filesystem::path(given)
-                          : std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "../shared/data";
-}
 
 class YarpImport : public ::testing::Test {
  protected:
@@ -204,11 +199,8 @@ TEST_F(YarpImport, ConfigurationErrorsNameTheKey) {
 /// The recording imported and synchronised as replay does it: at every kept picture the encoders must
 /// be those of the pose that is held, although poses jump and pictures follow encoders late.
 TEST_F(YarpImport, RecordingGivesTheHeldEncodersAtEveryPicture) {
+  SKIP_WITHOUT("eyehand-sim");
   const auto recording = data_folder() / "eyehand-sim";
-  if (!std::filesystem::exists(recording / "truth.json")) {
-    GTEST_SKIP() << "the public recording, which is no part of this project, is not in " << recording
-                 << "; BODYSCHEMA_DATA names its folder";
-  }
   setenv("BODYSCHEMA_DATA", data_folder().c_str(), 0);
   const auto folder = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_unity";
   const auto import_configuration = Configuration::load(folder / "import.yaml");
@@ -279,10 +271,7 @@ TEST_F(YarpImport, RecordingGivesTheHeldEncodersAtEveryPicture) {
 }
 
 TEST(YarpImportConfiguration, OfTheOfficialRobotNamesItsJoints) {
-  if (!std::filesystem::exists(data_folder() / "icub-models")) {
-    GTEST_SKIP() << "the official iCub model, which is no part of this project, is not in " << data_folder()
-                 << "; BODYSCHEMA_DATA names its folder";
-  }
+  SKIP_WITHOUT("icub-models");
   setenv("BODYSCHEMA_DATA", data_folder().c_str(), 0);
   const auto folder = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_v2_5";
   const auto import_configuration = Configuration::load(folder / "import.yaml");

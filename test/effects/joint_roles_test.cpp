@@ -1,14 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "bodyschema/effects/effect.hpp"
+#include "test_data.hpp"
 
 namespace bodyschema {
 namespace {
-
-namespace fs = std::filesystem;
 
 using Names = std::vector<std::string>;
 
@@ -61,9 +59,7 @@ TEST(JointRoles, OfARobotWithoutHeadOrFingers) {
 
 /// The official iCub names its joints otherwise: ..._0_joint opposes the thumb and spreads the fingers.
 TEST(JointRoles, OfTheOfficialIcub) {
-  const char* data = std::getenv("BODYSCHEMA_DATA");
-  const fs::path root = data != nullptr ? fs::path(data) : fs::path(BODYSCHEMA_SOURCE_DIR) / "../shared/data";
-  if (!fs::is_directory(root / "icub-models")) GTEST_SKIP() << "no icub-models under " << root;
+  SKIP_WITHOUT("icub-models");
   const auto r = robot("icub_v2_5/robot.yaml");
   const auto fingers = r.names(r.roles.fingers);
   EXPECT_GE(fingers.size(), 11u);

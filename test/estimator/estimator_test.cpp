@@ -171,6 +171,33 @@ TEST_F(EstimatorOnOwnRobot, ASlipOfFiveDegreesIsFoundAgain) {
   EXPECT_LT(position_error_m(estimate, after.true_hand(pose(39 / 40.0), 0)), 1e-3);
 }
 
+/// An encoder keeps its reading from one frame up to another.
+struct Stall {
+  Eigen::Index joint;   ///< of the robot
+  Eigen::Index offset;  ///< of the estimate
+  int from, to;
+  double reading_rad = 0.0;
+
+  /// Frames in order. Returns the offsets as they are then, of which `healthy` are without the stall.
+  Eigen::VectorXd befall(int frame, Observation& seen, Eigen::VectorXd healthy) {
+    double& reading = seen.cameras[0]->joints.q(joint);
+    if (frame == from) reading_rad = reading;
+    if (frame < from || frame >= to) return healthy;
+    healthy(offset) += reading_rad - reading;
+    reading = seen.cameras[1]->joints.q(joint) = reading_rad;
+    return healthy;
+  }
+};
+
+/// What calls itself converged is right to 1 deg, or five of its own sd.
+void expect_honest(const Estimate& estimate, const Eigen::VectorXd& truth, int frame) {
+  for (Eigen::Index k = 0; k < truth.size(); ++k) {
+    const double sd = std::sqrt(estimate.covariance_rad2(k, k));
+    EXPECT_LT(std::abs(estimate.offset_rad(k) - truth(k)), std::max(5.0 * sd, radians(1.0)))
+        << "frame " << frame << ", joint " << k;
+  }
+}
+
 // The encoder of one joint keeps its reading while the arm moves on, slowly or fast. What calls itself
 // converged meanwhile must be right (1 deg, or five of its own sd), and the joint is named; when the
 // encoder lives again, so does the estimate.
@@ -181,7 +208,7 @@ TEST_F(EstimatorOnOwnRobot, AStalledEncoderIsNamedAndNothingFalseIsCalledConverg
   for (const double deg_s : {2.0, 6.0, 30.0}) {
     SCOPED_TRACE(std::to_string(deg_s) + " deg/s");
     Estimator estimator(robot_, setup_, rig_, options_);
-    double stalled_reading = 0.0;
+    Stall stall{.joint = index, .offset = elbow, .from = kStalls, .to = kLives};
     int named = 0, converged = 0;
     Estimate estimate;
     for (int frame = 0; frame < kEnd; ++frame) {
@@ -191,13 +218,7 @@ TEST_F(EstimatorOnOwnRobot, AStalledEncoderIsNamedAndNothingFalseIsCalledConverg
       q(index) += radians((path < travel_deg ? path : 2.0 * travel_deg - path) - 0.5 * travel_deg);
       q(robot_->joint_index("r_wrist_yaw")) += radians(4.0 * std::sin(0.1 * frame));
       Observation seen = reach_->observe(q, frame * 33'333);
-      double& reading = seen.cameras[0]->joints.q(index);
-      Eigen::VectorXd truth = offset_rad_;
-      if (frame == kStalls) stalled_reading = reading;
-      if (frame >= kStalls && frame < kLives) {
-        truth(elbow) += stalled_reading - reading;
-        reading = seen.cameras[1]->joints.q(index) = stalled_reading;
-      }
+      const Eigen::VectorXd truth = stall.befall(frame, seen, offset_rad_);
       estimate = estimator.step(seen);
       if (frame < kLives && !estimate.stalled_joint.empty()) {
         ++named;
@@ -208,10 +229,7 @@ TEST_F(EstimatorOnOwnRobot, AStalledEncoderIsNamedAndNothingFalseIsCalledConverg
       }
       if (estimate.state != EstimatorState::kConverged) continue;
       ++converged;
-      for (Eigen::Index k = 0; k < truth.size(); ++k) {
-        const double sd = std::sqrt(estimate.covariance_rad2(k, k));
-        EXPECT_LT(std::abs(estimate.offset_rad(k) - truth(k)), std::max(5.0 * sd, radians(1.0))) << frame;
-      }
+      expect_honest(estimate, truth, frame);
     }
     EXPECT_GT(named, 0);
     EXPECT_GT(converged, 20);
@@ -237,27 +255,17 @@ TEST_F(EstimatorOnOwnRobot, WhatAStallTaughtDoesNotOutliveIt) {
     const int period = between(40, 120);
     SCOPED_TRACE("BODYSCHEMA_SEED=" + std::to_string(seed) + ", stalls from frame " + std::to_string(stalls) + " to " +
                  std::to_string(lives) + ", there and back in " + std::to_string(period));
-    double stalled_reading = 0.0;
+    Stall stall{.joint = index, .offset = elbow, .from = stalls, .to = lives};
     for (int frame = 0; frame < end; ++frame) {
       if (between(0, 3) == 0 && frame != stalls) continue;
       const double s = 0.5 - 0.5 * std::cos(2.0 * kPi * frame / period);
       Eigen::VectorXd q = pose(3.0 * s - 1.0);
       Observation seen = reach_->observe(q, frame * 33'333);
-      double& reading = seen.cameras[0]->joints.q(index);
-      Eigen::VectorXd truth = offset_rad_;
-      if (frame == stalls) stalled_reading = reading;
-      if (frame >= stalls && frame < lives) {
-        truth(elbow) += stalled_reading - reading;
-        reading = seen.cameras[1]->joints.q(index) = stalled_reading;
-      }
+      const Eigen::VectorXd truth = stall.befall(frame, seen, offset_rad_);
       const Estimate estimate = estimator.step(seen);
       if (estimate.state != EstimatorState::kConverged) continue;
       converged_after += frame >= lives;
-      for (Eigen::Index k = 0; k < truth.size(); ++k) {
-        const double sd = std::sqrt(estimate.covariance_rad2(k, k));
-        EXPECT_LT(std::abs(estimate.offset_rad(k) - truth(k)), std::max(5.0 * sd, radians(1.0)))
-            << "frame " << frame << ", joint " << k;
-      }
+      expect_honest(estimate, truth, frame);
     }
   }
   EXPECT_GT(converged_after, 10 * kTrials);

@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
 #include "bodyschema/core/error.hpp"
+#include "test_data.hpp"
 
 namespace bodyschema {
 namespace {
@@ -69,12 +69,8 @@ TEST_F(TruthFile, ErrorsNameTheFile) {
 }
 
 TEST(TruthOfTheRecording, HoldsSeventyThreePoses) {
-  const char* data = std::getenv("BODYSCHEMA_DATA");
-  const std::filesystem::path root =
-      data != nullptr ? std::filesystem::path(data)
-                      : std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "../shared/data";
-  if (!std::filesystem::exists(root / "eyehand-sim/truth.json")) GTEST_SKIP() << "no recording at hand";
-  const Truth truth = Truth::load(root / "eyehand-sim/truth.json");
+  SKIP_WITHOUT("eyehand-sim");
+  const Truth truth = Truth::load(data_folder() / "eyehand-sim/truth.json");
   EXPECT_EQ(truth.instants().size(), 73u);
   EXPECT_EQ(truth.fingers().size(), 5u);
   EXPECT_EQ(truth.offsets().size(), 7u);

@@ -49,12 +49,12 @@ void expect_kinematics_match(const std::string& configuration, unsigned seed) {
 }
 
 TEST(ForwardKinematics, AgreesWithAProductOfTransformsOnTheOfficialRobot) {
-  SKIP_WITHOUT_DATA();
+  SKIP_WITHOUT("icub-models");
   expect_kinematics_match("icub_v2_5/robot.yaml", 1);
 }
 
 TEST(ForwardKinematics, AgreesWithAProductOfTransformsOnTheRecordingsRobot) {
-  SKIP_WITHOUT_DATA();
+  SKIP_WITHOUT("eyehand-sim");
   expect_kinematics_match("icub_unity/robot.yaml", 2);
 }
 
@@ -63,7 +63,7 @@ TEST(ForwardKinematics, AgreesWithAProductOfTransformsOnOurRobot) {
 }
 
 TEST(ForwardKinematics, PutsOurHandWhereANominalICubHasIt) {
-  SKIP_WITHOUT_DATA();
+  SKIP_WITHOUT("eyehand-sim");
   const auto pose_in_left_eye = [](const std::string& configuration) {
     RobotSetup setup = robot_setup(configuration);
     setup.model.rendered_links.clear();
@@ -88,7 +88,7 @@ TEST(ForwardKinematics, PutsOurHandWhereANominalICubHasIt) {
 }
 
 TEST(ForwardKinematics, AgreesWithTheRecordingsTruthInAllPoses) {
-  SKIP_WITHOUT_DATA();
+  SKIP_WITHOUT("eyehand-sim");
   std::ifstream stream(data_folder() / "eyehand-sim/truth.json");
   const json truth = json::parse(stream);
   const Configuration configuration = robot_configuration("icub_unity/robot.yaml");

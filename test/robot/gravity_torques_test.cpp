@@ -56,7 +56,7 @@ TEST(GravityTorques, AreMinusTheGradientOfEnergyOnOurRobot) {
 }
 
 TEST(GravityTorques, AreMinusTheGradientOfEnergyOnTheOfficialRobot) {
-  SKIP_WITHOUT_DATA();
+  SKIP_WITHOUT("icub-models");
   expect_minus_gradient_of_energy(robot_setup("icub_v2_5/robot.yaml").model.urdf, 4);
 }
 

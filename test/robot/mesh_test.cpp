@@ -231,7 +231,7 @@ TEST_F(MeshTest, VerticesWithinATenthOfAMicrometreAreOne) {
 }
 
 TEST(RecordingRobot, TheTwoOpenCoversAreNamed) {
-  SKIP_WITHOUT_DATA();
+  SKIP_WITHOUT("eyehand-sim");
   for (const char* file : {"icub_unity/robot.yaml", "icub_unity/robot_v1.yaml"}) {
     const auto robot = robot_setup(file).load();
     EXPECT_EQ(robot->meshes().size(), 21u);
@@ -249,7 +249,7 @@ TEST(RecordingRobot, TheTwoOpenCoversAreNamed) {
 }
 
 TEST(OfficialRobot, LoadsUnmodified) {
-  SKIP_WITHOUT_DATA();
+  SKIP_WITHOUT("icub-models");
   const auto robot = robot_setup("icub_v2_5/robot.yaml").load();
   EXPECT_EQ(robot->meshes().size(), 25u);
   EXPECT_TRUE(robot->has_masses());

@@ -3,21 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <algorithm>
 
 #include "bodyschema/vision/mask_picture.hpp"
 #include "bodyschema/vision/segmenter.hpp"
+#include "test_data.hpp"
 
 namespace bodyschema {
 namespace {
-
-std::filesystem::path data_folder() {
-  const char* set = std::getenv("BODYSCHEMA_DATA");
-  return set != nullptr ? std::filesystem::path(set)
-                        : std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / ".." / "shared" / "data";
-}
 
 /// "|image - background| > 2 levels in any channel, less components under 40 px", black ignored.
 BinaryMask recipe(const Image& image, const Image& background) {
@@ -59,7 +53,7 @@ class Recording : public ::testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
     root_ = data_folder() / "eyehand-sim";
-    if (!std::filesystem::exists(root_)) GTEST_SKIP() << root_ << " is absent";
+    SKIP_WITHOUT("eyehand-sim");
     for (const auto& entry :
          std::filesystem::directory_iterator(root_ / "yarp" / "images" / GetParam())) {
       if (entry.path().extension() == ".ppm") files_.push_back(entry.path());

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+namespace bodyschema {
+
+/// Folder of the public recording and of the official models, which are no part of this project:
+/// BODYSCHEMA_DATA, or where a checkout beside it would be.
+inline std::filesystem::path data_folder() {
+  const char* given = std::getenv("BODYSCHEMA_DATA");
+  return given != nullptr ? std::filesystem::path(given)
+                          : std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "../shared/data";
+}
+
+/// Why a test that needs this part of the data is skipped; empty where it is there.
+inline std::string why_no_data(const std::string& part) {
+  std::error_code none;
+  if (std::filesystem::exists(data_folder() / part, none)) return "";
+  return part + ", which is no part of this project, is not in " + data_folder().string() +
+         "; BODYSCHEMA_DATA names its folder";
+}
+
+}  // namespace bodyschema
+
+#define SKIP_WITHOUT(part) \
+  if (const auto reason = ::bodyschema::why_no_data(part); !reason.empty()) GTEST_SKIP() << reason
