@@ -72,6 +72,7 @@ class Tree {
                   attribute(element->FirstChildElement("child"), "link"), false,
                   attribute(element, "type") == "fixed"};
       joint.movable = !joint.fixed && element->FirstChildElement("mimic") == nullptr;
+      if (attribute(element, "type") == "prismatic") sliding_.insert(joint.name);
       above_[joint.child] = joint;
       below_[joint.parent].push_back(joint);
     }
@@ -106,6 +107,7 @@ class Tree {
       collect(joint.child, only_fixed, links, joints);
     }
   }
+  [[nodiscard]] bool slides(const std::string& joint) const { return sliding_.contains(joint); }
   [[nodiscard]] bool has_shape(const std::string& link) const { return with_shape_.contains(link); }
   /// Folders above the URDF that hold the packages its meshes are in, as in a ROS workspace.
   [[nodiscard]] std::vector<fs::path> mesh_roots() const {
@@ -125,6 +127,7 @@ class Tree {
   fs::path urdf_;
   std::vector<std::string> names_;
   std::set<std::string> with_shape_;
+  std::set<std::string> sliding_;                    ///< joints
   std::set<std::string> packages_;                   ///< named by the meshes
   std::map<std::string, Joint> above_;               ///< by child
   std::map<std::string, std::vector<Joint>> below_;  ///< by parent
@@ -148,6 +151,7 @@ std::string list(const std::vector<std::string>& names) {
 /// What of a robot matters here.
 struct Parts {
   std::vector<std::string> arm, head, others, rendered;
+  std::vector<std::string> others_m;  ///< those of the others that slide
 };
 
 Parts parts_of(const Tree& tree, const StarterOptions& options) {
@@ -182,6 +186,10 @@ Parts parts_of(const Tree& tree, const StarterOptions& options) {
     if (!in(shared, joint) && !in(parts.head, joint)) parts.head.push_back(joint);
   }
   parts.others.insert(parts.others.begin(), shared.begin(), shared.end());
+  const auto slides = [&](const std::string& joint) { return tree.slides(joint); };
+  std::erase_if(parts.arm, slides);  // published like any other, but no offset of it is estimated
+  std::copy_if(parts.others.begin(), parts.others.end(), std::back_inserter(parts.others_m), slides);
+  std::erase_if(parts.others, slides);
   return parts;
 }
 
@@ -204,11 +212,14 @@ std::string robot_yaml(const StarterOptions& options, const Parts& parts,
       options.urdf.filename().string(),
       yaml(from_here(options.urdf)), list(roots), list(parts.rendered), yaml(options.hand_link), list(parts.arm));
   if (!parts.head.empty()) text += fmt::format("  head_joints: {}\n", list(parts.head));
-  if (!parts.others.empty()) {
-    text += "  # deg; take out the joints that the robot publishes.\n  fixed_joints_deg:\n";
-    for (const auto& joint : parts.others)
+  const auto fix = [&](const char* unit, const std::vector<std::string>& joints) {
+    if (joints.empty()) return;
+    text += fmt::format("  # {0}; take out the joints that the robot publishes.\n  fixed_joints_{0}:\n", unit);
+    for (const auto& joint : joints)
       text += fmt::format("    {}: 0\n", yaml(joint));
-  }
+  };
+  fix("deg", parts.others);
+  fix("m", parts.others_m);
   text +=
       "  gravity_m_s2: [0, 0, -9.81]       # root frame\n\n"
       "# Focal lengths fx, fy and principal point cx, cy in px; distortion k1 k2 p1 p2 k3: "
@@ -291,9 +302,11 @@ std::string write_starter_configuration(const StarterOptions& options) {
 
   std::string told = fmt::format("arm: {}\n", fmt::join(parts.arm, ", "));
   if (!parts.head.empty()) told += fmt::format("head: {}\n", fmt::join(parts.head, ", "));
-  if (!parts.others.empty())
-    told += fmt::format("taken as fixed at 0 unless you take them out: {}\n",
-                        fmt::join(parts.others, ", "));
+  auto fixed = parts.others;
+  fixed.insert(fixed.end(), parts.others_m.begin(), parts.others_m.end());
+  if (!fixed.empty()) {
+    told += fmt::format("taken as fixed at 0 unless you take them out: {}\n", fmt::join(fixed, ", "));
+  }
   told += fmt::format("seen: {}\n", fmt::join(parts.rendered, ", "));
   if (options.focal_px <= 0.0) {
     told += fmt::format("focal length: a guess, {:.0f} px; fill in your cameras' in robot.yaml\n",

@@ -127,6 +127,7 @@ void build_tree(const UrdfTree& urdf_tree, const std::string& file, RobotModel::
     constexpr double kInf = std::numeric_limits<double>::infinity();
     info.lower_rad = unlimited ? -kInf : joint.limits->lower;
     info.upper_rad = unlimited ? kInf : joint.limits->upper;
+    info.slides = joint.type == urdf::Joint::PRISMATIC;
     info.parent_link = joint.parent_link_name;
     info.child_link = joint.child_link_name;
     impl.joint_index.emplace(info.name, static_cast<Eigen::Index>(impl.joints.size()));

@@ -36,6 +36,10 @@ RobotSetup RobotSetup::from(const Configuration& robot) {
   for (const std::string& joint : fixed.keys()) {
     setup.fixed_joints_rad[joint] = radians(fixed.number(joint, -3600.0, 3600.0));
   }
+  const Configuration fixed_m = robot.section("fixed_joints_m");
+  for (const std::string& joint : fixed_m.keys()) {
+    setup.fixed_joints_m[joint] = fixed_m.number(joint, -100.0, 100.0);
+  }
   const std::vector<double> gravity = robot.numbers_or("gravity_m_s2", {0.0, 0.0, -9.81});
   if (gravity.size() != 3) robot.fail("gravity_m_s2", "three numbers [x, y, z]");
   setup.gravity_W = {gravity[0], gravity[1], gravity[2]};
@@ -63,9 +67,24 @@ std::shared_ptr<const RobotModel> RobotSetup::load() const {
   };
   need_link("hand_link", hand_link);
   for (const auto& name : fingertip_links) need_link("fingertip_links", name);
-  for (const auto& name : estimated_joints) need_joint("estimated_joints", name);
+  const auto slides = [&](const std::string& name) {
+    return robot->joints()[static_cast<std::size_t>(robot->joint_index(name))].slides;
+  };
+  for (const auto& name : estimated_joints) {
+    need_joint("estimated_joints", name);
+    if (slides(name)) {
+      throw ConfigurationError("robot.estimated_joints: '" + name + "' slides; expected joints that turn");
+    }
+  }
   for (const auto& name : head_joints) need_joint("head_joints", name);
-  for (const auto& [name, value] : fixed_joints_rad) need_joint("fixed_joints_deg", name);
+  const auto need_fixed = [&](const char* key, const std::string& name, bool sliding, const char* instead) {
+    need_joint(key, name);
+    if (slides(name) == sliding) return;
+    throw ConfigurationError(std::string("robot.") + key + ": '" + name + (sliding ? "' turns" : "' slides") +
+                             "; give it under robot." + instead);
+  };
+  for (const auto& [name, value] : fixed_joints_rad) need_fixed("fixed_joints_deg", name, false, "fixed_joints_m");
+  for (const auto& [name, value] : fixed_joints_m) need_fixed("fixed_joints_m", name, true, "fixed_joints_deg");
   return robot;
 }
 
@@ -75,7 +94,9 @@ Eigen::VectorXd RobotSetup::default_joints(const RobotModel& robot) const {
     const JointInfo& joint = robot.joints()[static_cast<std::size_t>(j)];
     q[j] = std::clamp(0.0, joint.lower_rad, joint.upper_rad);
   }
-  for (const auto& [name, value] : fixed_joints_rad) q[robot.joint_index(name)] = value;
+  for (const auto* fixed : {&fixed_joints_rad, &fixed_joints_m}) {
+    for (const auto& [name, value] : *fixed) q[robot.joint_index(name)] = value;
+  }
   return q;
 }
 

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sstream>
 #include <unistd.h>
 
 #include "bodyschema/core/error.hpp"
@@ -110,6 +111,29 @@ TEST_F(StarterConfiguration, AHumanoidsTorsoIsSharedAndItsHeadIsNoArm) {
                                             "l_eye_pan", "r_eye_pan"));
   EXPECT_TRUE(pipeline.setup().fixed_joints_rad.contains("torso_pitch"));
   EXPECT_TRUE(pipeline.setup().fixed_joints_rad.contains("r_thumb_proximal"));
+}
+
+TEST_F(StarterConfiguration, JointsThatSlideAreGivenInMetresAndNotEstimated) {
+  auto o = options();
+  std::stringstream text;
+  text << std::ifstream(o.urdf).rdbuf();
+  std::string urdf = text.str();
+  for (const std::string joint : {"left_finger_joint", "joint1"}) {
+    const auto at = urdf.find("<joint name=\"" + joint + "\"");
+    ASSERT_NE(at, std::string::npos);
+    const auto end = urdf.find('>', at);
+    urdf.replace(at, end - at, "<joint name=\"" + joint + "\" type=\"prismatic\"");
+    if (urdf.find("<limit", at) > urdf.find("</joint>", at)) {
+      urdf.insert(urdf.find("</joint>", at), "<limit lower=\"0\" upper=\"0.04\" effort=\"9\" velocity=\"1\"/>");
+    }
+  }
+  fs::copy(o.urdf.parent_path(), folder_ / "sliding", fs::copy_options::recursive);
+  o.urdf = folder_ / "sliding/arm7.urdf";
+  std::ofstream(o.urdf) << urdf;
+  EXPECT_THAT(write_starter_configuration(o), HasSubstr("robot and meshes load"));
+  const Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
+  EXPECT_THAT(pipeline.setup().fixed_joints_m, testing::Contains(testing::Key("left_finger_joint")));
+  EXPECT_THAT(pipeline.setup().estimated_joints, testing::Not(testing::Contains("joint1")));
 }
 
 TEST_F(StarterConfiguration, ReplacesNothing) {

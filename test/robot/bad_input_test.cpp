@@ -392,6 +392,36 @@ TEST(RobotSetupErrors, NamesAreCheckedAgainstTheRobot) {
               HasSubstr("robot.fixed_joints_deg"));
 }
 
+TEST(RobotSetupErrors, JointsThatSlideAreFixedInMetresAndNeverEstimated) {
+  TemporaryFolder folder;
+  const auto joint = [](const char* name, const char* type, const char* from, const char* to) {
+    return std::string("<joint name='") + name + "' type='" + type + "'><parent link='" + from + "'/><child link='" +
+           to + "'/><axis xyz='0 0 1'/><limit lower='-1' upper='1' effort='1' velocity='1'/></joint>";
+  };
+  RobotSetup setup;
+  setup.model.urdf = folder.write("slide.urdf",
+                                  "<robot name='slide'><link name='base'/><link name='cart'/><link name='hand'/>" +
+                                      joint("lift", "prismatic", "base", "cart") +
+                                      joint("turn", "revolute", "cart", "hand") + "</robot>");
+  setup.hand_link = "hand";
+  setup.estimated_joints = {"turn"};
+  setup.fixed_joints_m["lift"] = 0.25;
+  const auto robot = setup.load();
+  EXPECT_EQ(setup.default_joints(*robot)[robot->joint_index("lift")], 0.25);
+  const auto refused = [&](const RobotSetup& wrong, const char* why) {
+    EXPECT_THAT([&] { (void)wrong.load(); }, testing::ThrowsMessage<ConfigurationError>(HasSubstr(why)));
+  };
+  auto in_degrees = setup;
+  in_degrees.fixed_joints_rad["lift"] = 0.1;
+  refused(in_degrees, "robot.fixed_joints_deg: 'lift' slides; give it under robot.fixed_joints_m");
+  auto in_metres = setup;
+  in_metres.fixed_joints_m["turn"] = 0.1;
+  refused(in_metres, "robot.fixed_joints_m: 'turn' turns; give it under robot.fixed_joints_deg");
+  auto estimated = setup;
+  estimated.estimated_joints = {"turn", "lift"};
+  refused(estimated, "robot.estimated_joints: 'lift' slides");
+}
+
 TEST(RobotSetupErrors, ValuesAreChecked) {
   const auto text_of = [](const std::string& yaml) {
     try {
@@ -407,6 +437,7 @@ TEST(RobotSetupErrors, ValuesAreChecked) {
   EXPECT_THAT(text_of(good + "  gravity_m_s2: [0, 1]\n"), HasSubstr("gravity_m_s2"));
   EXPECT_THAT(text_of(good + "  face_culling: front\n"), HasSubstr("face_culling"));
   EXPECT_THAT(text_of(good + "  fixed_joints_deg: {j: x}\n"), HasSubstr("fixed_joints_deg"));
+  EXPECT_THAT(text_of(good + "  fixed_joints_m: {j: 1000}\n"), HasSubstr("fixed_joints_m"));
   EXPECT_THAT(text_of("robot:\n  urdf: a.urdf\n  rendered_links: []\n  hand_link: a\n"
                       "  estimated_joints: [j]\n"),
               HasSubstr("rendered_links"));
