@@ -1,6 +1,7 @@
 #include "mcap_writer.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <system_error>
 #include <type_traits>
 
@@ -76,6 +77,7 @@ McapWriter::~McapWriter() {
 }
 
 McapWriter::SchemaId McapWriter::add_schema(std::string_view name, std::string_view json_schema) {
+  check_room(schemas_.size() + 1);
   const auto id = static_cast<SchemaId>(schemas_.size() + 1);  // 0 stands for "no schema"
   schemas_.push_back(Fields().number(id).text(name).text("jsonschema").text(json_schema));
   put_record(kSchema, schemas_.back());
@@ -83,12 +85,19 @@ McapWriter::SchemaId McapWriter::add_schema(std::string_view name, std::string_v
 }
 
 McapWriter::ChannelId McapWriter::add_channel(std::string_view topic, SchemaId schema) {
+  check_room(channels_.size());
   const auto id = static_cast<ChannelId>(channels_.size());
   channels_.push_back(
       Fields().number(id).number(schema).text(topic).text("json").number(std::uint32_t{0}));
   counts_.push_back(0);
   put_record(kChannel, channels_.back());
   return id;
+}
+
+void McapWriter::check_room(std::size_t id) const {
+  if (id > std::numeric_limits<std::uint16_t>::max()) {
+    throw FileError(file_.string() + ": more channels than MCAP can number, 65535");
+  }
 }
 
 void McapWriter::write(ChannelId channel, std::uint64_t log_time, std::uint64_t publish_time,

@@ -35,6 +35,8 @@ class McapWriter {
   [[nodiscard]] std::uint64_t bytes_written() const { return position_; }
 
  private:
+  /// Throws FileError where MCAP has no number left.
+  void check_room(std::size_t id) const;
   /// Little-endian fields of one record.
   class Fields;
   struct ChunkIndex {
