@@ -48,7 +48,7 @@ struct Arguments {
   std::string offsets = "paper";
   std::vector<std::string> faults;
   std::vector<std::uint64_t> hidden;
-  double hidden_size = 5.0;
+  std::optional<double> hidden_size;
   bool hidden_outside = false;
   std::string truth;
   std::string log;
@@ -262,7 +262,7 @@ int main(int argc, char** argv) {
                  "or a list a,b,c,...")->group("Truth");
   app.add_option("--fault", a.faults, "NAME:key=value,... (repeatable); see --list-faults")->group("Truth");
   app.add_option("--hidden-fault", a.hidden, "Draw a fault from this seed; it goes to --truth only (repeatable)")->group("Truth");
-  app.add_option("--hidden-size", a.hidden_size, "Size of hidden faults, times the smallest detectable (default 5)")
+  app.add_option("--hidden-size", a.hidden_size, "Size of hidden faults, times the smallest detectable (default: drawn from 3 to 6)")
       ->check(CLI::Range(0.01, 100.0))->group("Truth");
   app.add_flag("--hidden-outside", a.hidden_outside, "Draw hidden faults that no diagnosis can name")->group("Truth");
   app.add_flag("--list-faults", a.list_faults, "Print all faults and stop")->group("Truth");

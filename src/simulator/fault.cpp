@@ -222,7 +222,9 @@ FaultSpec draw_fault(std::uint64_t seed, const FaultSite& site, const DrawOption
   const FaultTarget& target = targets[random.below(targets.size())];
   FaultSpec spec = target.spec;
   const double sign = kind->one_sided ? 1.0 : random.sign();
-  spec.set("value", sign * options.multiple_of_detectable * target.detectable);
+  constexpr double kSmallest = 3.0, kLargest = 6.0;
+  const double drawn = random.uniform(kSmallest, kLargest);
+  spec.set("value", sign * options.multiple_of_detectable.value_or(drawn) * target.detectable);
   if (kind->name == "slip") spec.set("at", (site.end_s - site.begin_s) * random.uniform(0.2, 0.8));
   if (kind->name == "wobble") spec.set("period", random.uniform(4.0, 12.0));
   return spec;

@@ -297,8 +297,9 @@ void Rasterizer::dilate(float dilation_px) {
   // Rows: only samples within the radius matter, so a window replaces the full envelope. A sample
   // as far away as the new outline gets a share of it, so that the outline is placed finer than the
   // samples lie. From the outline to the nearest source sample it is half a sample where the outline
-  // runs along the grid and less elsewhere, a little less on average.
-  constexpr float kToOutline = 0.38f;
+  // runs along the grid and less elsewhere; less still from farther away, where more samples compete to be
+  // the nearest. Measured on discs of 6 to 30 px: within 0.015 px from 0.4 to 2 px of dilation.
+  const float to_outline = std::max(0.2f, 0.39f - 0.021f * radius);
   const int reach = static_cast<int>(std::ceil(radius)) + 1;
   changes_.clear();
   for (int y = 0; y < rows; ++y) {
@@ -318,7 +319,7 @@ void Rasterizer::dilate(float dilation_px) {
           best_x = xx;
         }
       }
-      const float share = std::clamp(radius + kToOutline + 0.5f - std::sqrt(best), 0.0f, 1.0f);
+      const float share = std::clamp(radius + to_outline + 0.5f - std::sqrt(best), 0.0f, 1.0f);
       if (share <= 0.0f || best_x < 0) continue;
       const auto cell = static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) +
                         static_cast<std::size_t>(best_x);

@@ -440,9 +440,11 @@ TEST(DrawFault, DrawsEveryKindAtTheAskedSizeAndNeverAnOffset) {
     (kind.in_catalogue ? in_catalogue : expected_outside).insert(kind.name);
   }
   std::set<int> signs;
+  DrawOptions five_times;
+  five_times.multiple_of_detectable = 5.0;
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
-    const FaultSpec spec = draw_fault(seed, site);
-    EXPECT_EQ(spec, draw_fault(seed, site));
+    const FaultSpec spec = draw_fault(seed, site, five_times);
+    EXPECT_EQ(spec, draw_fault(seed, site, five_times));
     drawn.insert(spec.name);
     const auto& kind = fault_kind(spec.name);
     bool as_asked = false;
@@ -463,6 +465,25 @@ TEST(DrawFault, DrawsEveryKindAtTheAskedSizeAndNeverAnOffset) {
   beyond.outside_catalogue = true;
   for (std::uint64_t seed = 0; seed < 100; ++seed) outside.insert(draw_fault(seed, site, beyond).name);
   EXPECT_EQ(outside, expected_outside);
+}
+
+TEST(DrawFault, DrawsTheSizeTooUnlessOneIsAskedFor) {
+  const auto& stage = icub_right();
+  const auto site = fault_site(stage.model, stage.setup, stage.rig, stage.settings, joints_only());
+  double least = 1e9, most = 0.0;
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    const FaultSpec spec = draw_fault(seed, site);
+    DrawOptions once;
+    once.multiple_of_detectable = 1.0;
+    const FaultSpec smallest = draw_fault(seed, site, once);
+    EXPECT_EQ(spec.name, smallest.name);
+    least = std::min(least, spec.value() / smallest.value());
+    most = std::max(most, spec.value() / smallest.value());
+  }
+  EXPECT_GE(least, 3.0);
+  EXPECT_LT(least, 3.2);
+  EXPECT_GT(most, 5.8);
+  EXPECT_LE(most, 6.0);
 }
 
 }  // namespace

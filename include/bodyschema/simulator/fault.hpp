@@ -164,11 +164,12 @@ const FaultKind& fault_kind(const std::string& name);
 std::unique_ptr<Fault> make_fault(const FaultSpec& spec, const FaultSite& site);
 
 struct DrawOptions {
-  double multiple_of_detectable = 5.0;
+  /// Size over the smallest detectable one; drawn between 3 and 6 unless given.
+  std::optional<double> multiple_of_detectable{};
   bool outside_catalogue = false;      ///< draw among the faults no diagnosis can name
   std::vector<std::string> exclude{};  ///< kinds not to draw
 };
-/// A fault whose kind, place, sign and remaining arguments are drawn at random. Joint offsets are
+/// A fault whose kind, place, sign, size and remaining arguments are drawn at random. Joint offsets are
 /// never drawn: they are not a fault of this sort.
 FaultSpec draw_fault(std::uint64_t seed, const FaultSite& site, const DrawOptions& options = {});
 

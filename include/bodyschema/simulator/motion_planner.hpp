@@ -66,7 +66,6 @@ class MotionPlanner {
   /// A point in front of the eyes, root frame.
   /// @param pixel  where it appears, mean of all cameras; @param distance_m  from between the eyes
   Eigen::Vector3d point_in_view(const Eigen::Vector2d& pixel, double distance_m, const Eigen::VectorXd& q);
-  [[nodiscard]] const Eigen::VectorXd& base_posture() const { return base_; }
   /// With the distances in force.
   [[nodiscard]] const MotionSettings& settings() const { return settings_; }
 
