@@ -11,6 +11,10 @@ namespace {
 /// Half the window: as short as holds enough samples.
 constexpr std::array<Microseconds, 3> kHalfWindows = {60'000, 125'000, 250'000};
 constexpr std::size_t kForParabola = 5;
+/// Half the window of accelerations, where the samples after the instant reach as far: over 60 ms the steps
+/// of a 12-bit encoder alone look like 11 deg/s^2, which is more than slow motion has; and what is made of
+/// the encoder's error seems to explain that error in the pictures.
+constexpr Microseconds kHalfForAcceleration = 150'000;
 /// No arm changes its speed faster than this; on top come the steps of coarse encoders and of joints that
 /// are published in turns (the others then repeat their last value).
 constexpr double kMostAcceleration_rad_s2 = 50.0;
@@ -44,6 +48,47 @@ bool jumps(std::span<const JointSample> near, Eigen::Index joint) {
   return false;
 }
 
+/// Least squares of c0 + c1 t + c2 t^2 (or without c2), t from an instant on in units of the window.
+class Parabola {
+ public:
+  Parabola(std::span<const JointSample> near, Microseconds utime)
+      : near_(near), utime_(utime), terms_(near.size() < kForParabola ? 2 : 3),
+        unit_s_(seconds(std::max<Microseconds>(near.back().utime - near.front().utime, 1))) {
+    // Normal equations, alike for all joints.
+    Eigen::Matrix3d moments = Eigen::Matrix3d::Identity();
+    moments.topLeftCorner(terms_, terms_).setZero();
+    for (const auto& sample : near_) {
+      const Eigen::Vector3d p = powers(sample);
+      moments.noalias() += p * p.transpose();
+    }
+    inverse_ = moments.inverse();
+  }
+
+  struct Motion {
+    double velocity = 0.0, acceleration = 0.0;
+  };
+  /// Still, for a joint that jumps.
+  [[nodiscard]] Motion of(Eigen::Index joint) const {
+    if (jumps(near_, joint)) return {};
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const auto& sample : near_) sum += powers(sample) * (sample.q[joint] - near_.front().q[joint]);
+    const Eigen::Vector3d c = inverse_ * sum;
+    return {c[1] / unit_s_, terms_ == 3 ? 2.0 * c[2] / (unit_s_ * unit_s_) : 0.0};
+  }
+
+ private:
+  [[nodiscard]] Eigen::Vector3d powers(const JointSample& sample) const {
+    const double t = seconds(sample.utime - utime_) / unit_s_;
+    return {1.0, t, terms_ == 3 ? t * t : 0.0};
+  }
+
+  std::span<const JointSample> near_;
+  Microseconds utime_;
+  Eigen::Index terms_;
+  double unit_s_;
+  Eigen::Matrix3d inverse_;
+};
+
 }  // namespace
 
 void joint_motion(std::span<const JointSample> ordered, Microseconds utime, Eigen::VectorXd& qdot,
@@ -52,34 +97,20 @@ void joint_motion(std::span<const JointSample> ordered, Microseconds utime, Eige
   qdot.setZero(joints);
   qddot.setZero(joints);
   std::span<const JointSample> near;
-  for (const auto half : kHalfWindows) {
+  Microseconds half = 0;
+  for (const auto wider : kHalfWindows) {
+    half = wider;
     near = window(ordered, utime, half);
     if (near.size() >= kForParabola) break;
   }
   if (near.size() < 2) return;
+  const Parabola narrow(near, utime);
+  for (Eigen::Index j = 0; j < joints; ++j) qdot[j] = narrow.of(j).velocity;
 
-  // Normal equations of c0 + c1 t + c2 t^2, with t in units of the window, alike for all joints.
-  const Eigen::Index terms = near.size() < kForParabola ? 2 : 3;
-  const double unit_s = seconds(std::max<Microseconds>(near.back().utime - near.front().utime, 1));
-  Eigen::Matrix3d moments = Eigen::Matrix3d::Identity();
-  moments.topLeftCorner(terms, terms).setZero();
-  const auto powers = [&](const JointSample& sample) {
-    const double t = seconds(sample.utime - utime) / unit_s;
-    return Eigen::Vector3d(1.0, t, terms == 3 ? t * t : 0.0);
-  };
-  for (const auto& sample : near) {
-    const Eigen::Vector3d p = powers(sample);
-    moments.noalias() += p * p.transpose();
-  }
-  const Eigen::Matrix3d inverse = moments.inverse();
-  for (Eigen::Index j = 0; j < joints; ++j) {
-    if (jumps(near, j)) continue;
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (const auto& sample : near) sum += powers(sample) * (sample.q[j] - near.front().q[j]);
-    const Eigen::Vector3d c = inverse * sum;
-    qdot[j] = c[1] / unit_s;
-    if (terms == 3) qddot[j] = 2.0 * c[2] / (unit_s * unit_s);
-  }
+  const Microseconds known = std::min(ordered.back().utime - utime, utime - ordered.front().utime);
+  const Microseconds half_wide = std::max(half, std::min(known, kHalfForAcceleration));
+  const Parabola wide(window(ordered, utime, half_wide), utime);
+  for (Eigen::Index j = 0; j < joints; ++j) qddot[j] = wide.of(j).acceleration;
 }
 
 }  // namespace bodyschema

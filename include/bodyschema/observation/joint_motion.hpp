@@ -11,8 +11,8 @@ namespace bodyschema {
 /// they call velocity (zeros, lagging averages, single steps of a coarse encoder).
 ///
 /// A parabola through the positions within 60 ms on both sides (least squares); where few samples follow the
-/// instant, as beside a running robot, further back instead. Encoders slower than some 40 Hz get up to
-/// 250 ms. A joint that jumps within the window, as from one hold of a recording to the next, counts as
+/// instant, as beside a running robot, further back instead. Accelerations: within 150 ms, or as far as
+/// samples follow the instant. Encoders slower than some 40 Hz get up to 250 ms. A joint that jumps within the window, as from one hold of a recording to the next, counts as
 /// still, and so does everything where fewer than two samples are near. No throw, no allocation once the
 /// results have their size.
 /// @param ordered  samples in order of time
