@@ -30,6 +30,7 @@ std::map<std::string, double> resting_joints(const std::shared_ptr<const RobotMo
   const ForwardKinematics kinematics(robot, links);
   const Eigen::VectorXd q = setup.default_joints(*robot);
   std::map<std::string, double> resting = setup.fixed_joints_rad;
+  resting.insert(setup.fixed_joints_m.begin(), setup.fixed_joints_m.end());
   for (Eigen::Index j = 0; j < robot->joint_count(); ++j) {
     bool matters = false;
     for (std::size_t link = 0; link < links.size() && !matters; ++link) matters = kinematics.moves(j, link);
@@ -157,7 +158,6 @@ void ObservationStream::receive_images(Bytes message, std::int64_t arrival_us) {
       image.camera = static_cast<int>(c);
       image.utime = view.utime;
       image.arrival_us = arrival_us;
-      newest_image_ = view.utime;
       images.push_back(std::move(image));
     }
   }

@@ -8,20 +8,23 @@
 namespace bodyschema::diagnosis {
 namespace {
 
-constexpr double kStill = 0.25 * kPi / 180.0;  ///< within this every joint stands
+constexpr double kStill = 0.25 * kPi / 180.0;  ///< within this a joint stands
 constexpr double kShortestHold_s = 3.0;
 constexpr double kCell_s = 0.5;
 
 using Hold = std::pair<std::size_t, std::size_t>;  ///< views [first, last)
 
-std::vector<Hold> find_holds(std::span<const ViewInput> views) {
+/// Rests of arm and head. Encoders of fingers and of what else is published may shake meanwhile.
+std::vector<Hold> find_holds(std::span<const ViewInput> views, const JointRoles& roles) {
+  auto joints = roles.arm;
+  joints.insert(joints.end(), roles.head.begin(), roles.head.end());
+  const auto moved = [&](const ViewInput& a, const ViewInput& b) {
+    return (a.joints.q(joints) - b.joints.q(joints)).cwiseAbs().maxCoeff();
+  };
   std::vector<Hold> holds;
   for (std::size_t v = 0; v < views.size();) {
     std::size_t end = v;
-    while (end < views.size() &&
-           (views[end].joints.q - views[v].joints.q).cwiseAbs().maxCoeff() < kStill) {
-      ++end;
-    }
+    while (end < views.size() && moved(views[end], views[v]) < kStill) ++end;
     const bool hold =
         seconds(views[end - 1].joints.utime - views[v].joints.utime) >= kShortestHold_s;
     if (hold) holds.emplace_back(v, end);
@@ -129,10 +132,24 @@ NoiseFit fit_noise(const Eigen::VectorXd& observed, const Eigen::VectorXd& slow,
   return fit;
 }
 
+/// What follows takes time and memory with the square of a stretch's length; a long rest is several.
+std::vector<StillStretch> in_pieces(const std::vector<StillStretch>& stretches) {
+  constexpr Eigen::Index kMostSamples = 600;
+  std::vector<StillStretch> pieces;
+  for (const auto& stretch : stretches) {
+    const Eigen::Index n = stretch.samples.cols(), count = (n + kMostSamples - 1) / kMostSamples;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      pieces.push_back({stretch.samples.middleCols(i * (n / count), n / count), stretch.step_s});
+    }
+  }
+  return pieces;
+}
+
 }  // namespace
 
-double noise_correlation_s(const std::vector<StillStretch>& stretches) {
+double noise_correlation_s(const std::vector<StillStretch>& whole) {
   constexpr double kSlowest_s = 12.0, kRatio = 1.3;
+  const auto stretches = in_pieces(whole);
   double result = 0.0;
   // Stretches of one length share what is expected of them.
   std::vector<bool> used(stretches.size(), false);
@@ -175,7 +192,7 @@ BlockPlan plan_blocks(const MeasurementSource& source, const std::vector<Compres
   plan.weight_of_view.assign(views.size(), 1.0);
   if (views.empty()) return plan;
 
-  const auto holds = find_holds(views);
+  const auto holds = find_holds(views, source.roles());
   std::vector<bool> still(views.size(), false);
   for (const auto& [first, last] : holds) {
     std::fill(still.begin() + static_cast<std::ptrdiff_t>(first),

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kDeg = kPi / 180.0;
 constexpr double kHeadStill = 5.0 * kDeg;
+constexpr double kLeastAcceleration = 5.0 * kDeg;  ///< rad/s^2 rms
 
 std::string number(double value, int decimals) {
   std::ostringstream text;
@@ -34,6 +35,12 @@ std::vector<double> normalised(std::vector<double> value) {
   const double deviation = std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, value.size())));
   for (double& x : value) x = deviation > 1e-12 ? x / deviation * kDeg : 0.0;
   return value;
+}
+
+double root_mean_square(const std::vector<double>& x) {
+  double square = 0.0;
+  for (const double value : x) square += value * value;
+  return std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, x.size())));
 }
 
 /// Generic features of one joint, added to the set as candidates named "unexplained".
@@ -105,7 +112,35 @@ double arm_period_s(std::span<const JointSample> stream, const JointRoles& roles
   return *quarter;
 }
 
+/// How often a joint turns round; turning points at least half a degree apart, so that encoder noise is none.
+int turning_points(std::span<const JointSample> stream, Eigen::Index joint) {
+  constexpr double kReversal = 0.5 * kDeg;
+  double extreme = stream.empty() ? 0.0 : stream.front().q[joint];
+  int count = 0, direction = 0;
+  for (const auto& sample : stream) {
+    const double q = sample.q[joint];
+    if (direction >= 0 && q < extreme - kReversal) {
+      count += direction > 0;
+      direction = -1;
+      extreme = q;
+    } else if (direction <= 0 && q > extreme + kReversal) {
+      count += direction < 0;
+      direction = 1;
+      extreme = q;
+    } else if ((direction >= 0 && q > extreme) || (direction < 0 && q < extreme)) {
+      extreme = q;
+    }
+  }
+  return count;
+}
+
 }  // namespace
+
+bool passes_once(const MeasurementSource& source) {
+  const auto& arm = source.roles().arm;
+  return std::all_of(arm.begin(), arm.end(),
+                     [&](const auto joint) { return turning_points(source.stream(), joint) < 2; });
+}
 
 bool is_excluded(const std::vector<NotTestable>& excluded, const CauseName& cause) {
   return std::any_of(excluded.begin(), excluded.end(),
@@ -216,7 +251,8 @@ CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at,
     features.add_curve("time", t, 7);
     features.add("velocity", {v});
     features.add("velocity", {v_abs});
-    features.add("acceleration", {a});
+    // Of slower motion little is known but the encoder's steps.
+    if (root_mean_square(a) > kLeastAcceleration) features.add("acceleration", {a});
     if (q_range > 1.0 * kDeg) {
       features.add("angle", {q2});
       features.add("angle", {q3});
@@ -267,7 +303,6 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
   constexpr double kLeastRange = 5.0 * kDeg;       ///< for causes that follow a joint's angle
   constexpr double kLeastSpeed = 3.0 * kDeg;       ///< rad/s rms, for causes of timing
   constexpr double kLeastTorque = 0.05;            ///< Nm, change of torque for compliance
-  constexpr double kReversal = 0.5 * kDeg;
   constexpr double kSparseEncoders_s = 0.025;
   const auto& roles = source.roles();
   const auto views = source.views();
@@ -343,24 +378,7 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
                                             number(torque_high - torque_low, 3) + " Nm");
     }
     // Backlash shows where a joint passes the same angles in both directions.
-    double extreme = stream.empty() ? 0.0 : stream.front().q[joint];
-    // Turning points at least kReversal apart, so that encoder noise is none.
-    int reversals = 0;
-    int direction = 0;
-    for (const auto& sample : stream) {
-      const double q = sample.q[joint];
-      if (direction >= 0 && q < extreme - kReversal) {
-        reversals += direction > 0;
-        direction = -1;
-        extreme = q;
-      } else if (direction <= 0 && q > extreme + kReversal) {
-        reversals += direction < 0;
-        direction = 1;
-        extreme = q;
-      } else if ((direction >= 0 && q > extreme) || (direction < 0 && q < extreme)) {
-        extreme = q;
-      }
-    }
+    const int reversals = turning_points(stream, joint);
     if (reversals < 2) {
       exclude_joint("backlash", name, name + " turned round " +
                                           (reversals == 0 ? "never" : std::string("once")) +
@@ -397,6 +415,9 @@ std::string splitting_motion(const std::vector<CauseName>& same) {
   };
   const auto named = std::find_if(same.begin(), same.end(), [](const auto& cause) { return !cause.joint.empty(); });
   const std::string joint = named == same.end() ? "" : named->joint;
+  if (names == std::set<std::string>{"axis_shift", "link_length"}) {
+    return "No motion tells them apart: both say how long the link is.";
+  }
   if (has("encoder_gain") && has("eccentricity")) {
     say("Sweep " + joint + " through more than 90 deg.");
   }

@@ -36,6 +36,10 @@ void drop_aliased_columns(const BlockStatistics& statistics, CandidateSet& set);
 /// round, no masses, too slow, one camera, encoders too sparse.
 std::vector<NotTestable> untestable(const MeasurementSource& source, const Linearisation& at);
 
+/// Whether the arm passes every posture once: no joint turns round twice. Then whatever follows an angle
+/// follows time as well.
+bool passes_once(const MeasurementSource& source);
+
 bool is_excluded(const std::vector<NotTestable>& excluded, const CauseName& cause);
 
 /// What a cause looks like in every log of this kind, whatever its numbers say: while the head stands

@@ -204,6 +204,7 @@ class Diagnoser {
     drop_aliased_columns(statistics, set);
     auto rules = options_.selection;
     rules.search = searches();
+    rules.one_pass = passes_once(source_);
     rules.given = candidates_of(set, given);
     found.selection = select_causes(statistics, set.offsets, set.candidates, rules);
     progress(0.65);

@@ -90,7 +90,7 @@ class Findings {
 
   void add_facts(DiagnosisReport& report) const {
     report.z_threshold = rules_.z_enter;
-    report.gain_threshold = rules_.gain_floor;
+    report.gain_threshold = found_.selection.gain_floor;
     report.duration_s = seconds(source_.views().back().joints.utime -
                                 source_.views().front().joints.utime);
     report.block_s = plan_.length_s;
@@ -197,6 +197,10 @@ class Findings {
       report.warnings.push_back("several small errors share what is left" +
                                 (list.empty() ? "" : "; none stands out among " + list));
     }
+    if (passes_once(source_)) {
+      report.warnings.push_back("every joint moved one way only: what follows an angle looks like what follows "
+                                "time; pass the same postures several times, in both directions");
+    }
     if (report.duration_s < 30.0) {
       report.warnings.push_back("the log is shorter than 30 s: small causes stay hidden");
     }
@@ -255,6 +259,7 @@ class Findings {
     const auto views = source_.views();
     const auto arm = static_cast<Eigen::Index>(source_.roles().arm.size());
     double square = 0.0, weight = 0.0, mm2 = 0.0, deg2 = 0.0, outline = 0.0, matched = 0.0;
+    double outline_seen = 0.0, matched_seen = 0.0;
     std::size_t hands = 0;
     if (before) report.samples.resize(views.size());
     Eigen::MatrixXd A(arm, arm);
@@ -273,6 +278,8 @@ class Findings {
         matched += view.matched;
         if (view.weight <= 0.0) continue;
         seen = v;
+        outline_seen += view.outline;
+        matched_seen += view.matched;
         const auto rest = held_out(fit, v);
         square += plan_.weight_of_view[v] * rest.loss;
         weight += plan_.weight_of_view[v] * view.weight;
@@ -296,6 +303,7 @@ class Findings {
     }
     error.rms_px = weight > 0.0 ? std::sqrt(std::max(0.0, square / weight)) : 0.0;
     if (outline > 0.0) error.outline_found = matched / outline;
+    if (outline_seen > 0.0) error.outline_where_seen = matched_seen / outline_seen;
     if (hands > 0) {
       error.hand_mm = std::sqrt(mm2 / static_cast<double>(hands));
       error.hand_deg = std::sqrt(deg2 / static_cast<double>(hands));

@@ -51,6 +51,7 @@ class LogDiagnosis {
     };
     diagnosis.noise_rms_px = kNoise_px;
     diagnosis.trusted_rms_px = kShapeError_px;
+    diagnosis.trusted_outline = kTrustedOutline;
     diagnosis.systematic_share = kSystematicShare;
     diagnosis.selection.crowd_rest_t = kCrowdThroughPictures;
     auto report = diagnosed(diagnosis);
@@ -196,6 +197,8 @@ class LogDiagnosis {
   static constexpr double kSystematicShare = 0.02;
   /// Pictures err a little in many ways at once: of logs with nothing wrong one had 0.25.
   static constexpr double kCrowdThroughPictures = 1.0;
+  /// Models of the recording's own parts find 86 to 99 % of their outlines, the official hand on it 67 %.
+  static constexpr double kTrustedOutline = 0.75;
   static constexpr double kShapeError_px = 0.8;  ///< ... and where this is left, parts have another shape
   static constexpr double kStill_rad = 0.5 * kPi / 180.0;
   static constexpr double kStill_rad_s = 0.5 * kPi / 180.0;

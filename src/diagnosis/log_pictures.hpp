@@ -14,7 +14,7 @@ namespace bodyschema::diagnosis {
 /// A few of a log's pictures, kept while it is read, for the page about it.
 class LogPictures {
  public:
-  /// Keeps every so-manieth observation, so that at most `kMost` stay, spread over the log.
+  /// Keeps one observation in so many that at most `kMost` stay, spread over the log.
   void offer(const Observation& observation);
 
   /// When each picture of the report was taken and where the hand is in it: `utime`,

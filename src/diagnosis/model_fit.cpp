@@ -9,7 +9,7 @@ namespace bodyschema::diagnosis {
 namespace {
 
 constexpr double kUsual_px = 8.0, kWidest_px = 40.0;
-constexpr std::size_t kCoarse = 4;   ///< every so-manieth instant, far from the optimum
+constexpr std::size_t kCoarse = 4;   ///< one instant in so many, far from the optimum
 constexpr double kNarrow = 0.75;     ///< of the search, a step
 constexpr double kReach = 4.0;       ///< the search begins at so many times the typical distance
 constexpr double kLost_px2 = 19.0;   ///< cost of a point that left the pictures

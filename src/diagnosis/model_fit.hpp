@@ -42,7 +42,7 @@ class ModelFitter {
   struct Settings {
     int iterations = 8;  ///< at most
     std::function<void(double)> progress{};
-    std::size_t every = 1;  ///< so-manieth instant only, where the source can leave some out
+    std::size_t every = 1;  ///< every n-th instant only, where the source can leave some out
     bool from_afar = true;  ///< approaches first
   };
   /// Fits the model's parameters, which end at the optimum. Parameters that the log cannot see stay

@@ -36,7 +36,8 @@ class Selector {
   Selector(const BlockStatistics& statistics, const Columns& always,
            const std::vector<Candidate>& candidates, const SelectionOptions& options)
       : statistics_(statistics), always_(always), candidates_(candidates), options_(options),
-        gain_floor_(options.gain_floor), generic_gain_floor_(options.generic_gain_floor) {
+        gain_floor_(options.one_pass ? options.gain_far : options.gain_floor),
+        generic_gain_floor_(std::max(gain_floor_, options.generic_gain_floor)) {
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       if (candidates[c].nuisance) model_.push_back(c);
     }
@@ -44,6 +45,7 @@ class Selector {
 
   Selection run() {
     Selection result;
+    result.gain_floor = gain_floor_;
     drop_dependent_nuisances(result);
     refit();
     refuse_unusable();
@@ -60,6 +62,7 @@ class Selector {
       add_causes();
       simplify();
       drop_causes();
+      drop_what_wandering_explains();
       if (options_.given.empty()) stand_out(result);
     }
     for (const auto c : reported()) result.causes.push_back(describe(c));
@@ -310,6 +313,36 @@ class Selector {
       remove(*least);
       dropped_.push_back(*least);
     }
+  }
+
+  /// Where a joint moved over time in a way that slip or drift only stands for, what the stand-in leaves
+  /// belongs to that joint: other causes must show beside a free curve of it.
+  void drop_what_wandering_explains() {
+    const auto found = causes_;
+    for (const auto cause : found) {
+      if (!candidates_[cause].temporal() || candidates_[cause].generic()) continue;
+      const auto curve = free_curve(candidates_[cause].target);
+      if (!curve || contains(model_, *curve) || !wanders(candidates_[cause].target)) continue;
+      const auto beside = with(model_, *curve);
+      const auto extended = extended_by(*curve);
+      if (!extended.usable) continue;
+      Ids superfluous;
+      for (const auto other : causes_) {
+        if (other != cause && wald_z(extended, beside, other) < options_.z_enter) superfluous.push_back(other);
+      }
+      for (const auto other : superfluous) remove(other);
+    }
+  }
+
+  /// The candidate that is any curve in time of a joint.
+  [[nodiscard]] std::optional<std::size_t> free_curve(const EffectTarget& joint) const {
+    std::optional<std::size_t> best;
+    for (std::size_t c = 0; c < candidates_.size(); ++c) {
+      const auto& candidate = candidates_[c];
+      if (!candidate.generic() || candidate.variable != "time" || !(candidate.target == joint)) continue;
+      if (!best || candidate.columns.size() > candidates_[*best].columns.size()) best = c;
+    }
+    return best;
   }
 
   void remove(std::size_t c) {

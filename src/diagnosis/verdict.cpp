@@ -49,6 +49,14 @@ void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options) {
     if (!list.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + list + ".";
     return;
   }
+  if (const double found = report.after.outline_where_seen; found < options.trusted_outline) {
+    report.verdict = "unexplained";
+    report.sentence = fmt::format(
+        "No cause can be told from this log: only {:.0f} % of the predicted outlines are found in the pictures. The "
+        "parts have another shape, or the masks miss some of them.", 100.0 * found);
+    if (!list.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + list + ".";
+    return;
+  }
   if (!causes.empty()) {
     const bool unexplained = std::any_of(causes.begin(), causes.end(), is_unexplained);
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });

@@ -179,7 +179,7 @@ Json json_of(const TrialOutcome& o) {
                       {"z", c.z}, {"heldout_gain", c.heldout_gain}, {"parameters", parameters}});
   }
   return {{"row", kTrialRowNames[static_cast<std::size_t>(o.row)]}, {"seed", o.seed},
-          {"truth", truth}, {"answer", answer}, {"sentence", o.report.sentence},
+          {"truth", truth}, {"answer", answer}, {"sentence", o.report.sentence}, {"crowded", o.report.crowded},
           {"rms_px", {o.report.before.rms_px, o.report.after.rms_px}}, {"seconds", o.seconds}};
 }
 

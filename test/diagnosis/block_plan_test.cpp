@@ -13,17 +13,18 @@ namespace bodyschema::diagnosis {
 namespace {
 
 /// Rests in which seven quantities shake with slow noise of this time constant beside white noise.
-std::vector<StillStretch> rests(std::uint64_t seed, double time_s, double white_share) {
+std::vector<StillStretch> rests(std::uint64_t seed, double time_s, double white_share, int count = 16,
+                                Eigen::Index samples = 150) {
   constexpr double kStep_s = 0.1;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   const double decay = time_s > 0.0 ? std::exp(-kStep_s / time_s) : 0.0;
   std::vector<StillStretch> list;
-  for (int stretch = 0; stretch < 16; ++stretch) {
-    StillStretch rest{Eigen::MatrixXd(7, 150), kStep_s};
+  for (int stretch = 0; stretch < count; ++stretch) {
+    StillStretch rest{Eigen::MatrixXd(7, samples), kStep_s};
     for (Eigen::Index row = 0; row < 7; ++row) {
       double slow = normal(random);
-      for (Eigen::Index i = 0; i < 150; ++i) {
+      for (Eigen::Index i = 0; i < samples; ++i) {
         slow = decay * slow + std::sqrt(1.0 - decay * decay) * normal(random);
         rest.samples(row, i) = std::sqrt(1.0 - white_share) * slow + std::sqrt(white_share) * normal(random);
       }
@@ -65,6 +66,53 @@ TEST(NoiseCorrelation, OfWhiteNoiseLengthensNoBlock) {
 }
 
 TEST(NoiseCorrelation, CountsTheSlowShareOnly) { EXPECT_LT(measured_s(1.0, 0.5), 0.8 * measured_s(1.0, 0.0)); }
+
+/// At once its covariance would take 26 GB.
+TEST(NoiseCorrelation, TakesAnHourOfRestInPieces) {
+  const double measured = noise_correlation_s(rests(test::seed(), 1.0, 0.0, 1, 36'000));
+  EXPECT_GT(measured, 0.7);
+  EXPECT_LT(measured, 1.3);
+}
+
+/// A log with fingers that shake by a degree.
+class Shaking final : public MeasurementSource {
+ public:
+  Shaking(MeasurementSource& source, std::uint64_t seed)
+      : source_(source), views_(source.views().begin(), source.views().end()) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> shake(0.0, 0.02);
+    for (auto& view : views_) {
+      for (const auto finger : source.roles().fingers) view.joints.q[finger] += shake(random);
+    }
+  }
+  [[nodiscard]] const JointRoles& roles() const override { return source_.roles(); }
+  [[nodiscard]] std::span<const ViewInput> views() const override { return views_; }
+  [[nodiscard]] std::span<const JointSample> stream() const override { return source_.stream(); }
+  void instant(std::size_t view, const Eigen::VectorXd& offsets, Instant& out) override {
+    source_.instant(view, offsets, out);
+  }
+  void compress(std::span<const Corrections> corrections, std::vector<CompressedView>& out) override {
+    source_.compress(corrections, out);
+  }
+  Eigen::MatrixXd hand_jacobian(std::size_t view, const Corrections& corrections) override {
+    return source_.hand_jacobian(view, corrections);
+  }
+
+ private:
+  MeasurementSource& source_;
+  std::vector<ViewInput> views_;
+};
+
+/// The Hall sensors of an iCub's fingers shake by more than an arm at rest does.
+TEST(BlockPlan, ShakingFingersDoNotHideARest) {
+  const auto log = make_synthetic_log(test::robot(), {}, 1);
+  std::vector<CompressedView> views;
+  log->compress(std::vector<Corrections>(log->views().size(), Corrections(static_cast<Eigen::Index>(log->roles().names.size()))),
+                views);
+  const auto plan = plan_blocks(Shaking(*log, test::seed()), views, 2.0);
+  EXPECT_NEAR(plan.still_share, 1.0 / 6.0, 0.08);
+  EXPECT_GT(plan.correlation_s, 0.0);
+}
 
 TEST(BlockPlan, ARestIsOneBlockThatWeighsAsOne) {
   const auto log = make_synthetic_log(test::robot(), {}, 1);

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "diagnosis/regression_blocks.hpp"
 #include "diagnosis/trial_robot.hpp"
 
 namespace bodyschema {
@@ -15,16 +16,7 @@ struct Regression {
   Eigen::VectorXd y;
   Eigen::Index blocks;
 
-  [[nodiscard]] BlockStatistics statistics() const {
-    std::vector<BlockStatistics::Block> list;
-    const Eigen::Index n = X.rows() / blocks;
-    for (Eigen::Index b = 0; b < blocks; ++b) {
-      const Eigen::MatrixXd x = X.middleRows(b * n, n);
-      const Eigen::VectorXd r = y.segment(b * n, n);
-      list.push_back({x.transpose() * x, x.transpose() * r, r.squaredNorm(), static_cast<double>(n)});
-    }
-    return BlockStatistics(std::move(list));
-  }
+  [[nodiscard]] BlockStatistics statistics() const { return test::statistics_of(X, y, blocks); }
 };
 
 Regression regression(std::uint64_t seed, double noise, double block_noise) {

@@ -169,6 +169,16 @@ TEST(LazyBreakers, OneWayMotionCannotShowBacklash) {
   EXPECT_TRUE(std::any_of(report.not_testable.begin(), report.not_testable.end(), [](const auto& n) {
     return n.cause == CauseName{"backlash", "r_elbow", ""} && n.reason.find("never") != std::string::npos;
   }));
+  EXPECT_THAT(report.warnings, testing::Contains(testing::HasSubstr("one way only")));
+}
+
+TEST(LazyBreakers, OneWayMotionStillShowsWhatIsLarge) {
+  // Several degrees over the joint's way; 6 % is set aside among what each posture gets wrong by itself.
+  auto options = log_with({fault("encoder_gain", "r_elbow", 20.0)});
+  options.one_way = true;
+  const auto log = make_synthetic_log(robot(), options, test::log_seed());
+  const auto report = diagnosis(*log);
+  EXPECT_TRUE(in_class(report, options.faults[0])) << report.sentence;
 }
 
 TEST(LazyBreakers, AnExactlyAliasedPairIsAClass) {

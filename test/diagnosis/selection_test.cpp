@@ -7,24 +7,13 @@
 #include <random>
 
 #include "bodyschema/core/error.hpp"
+#include "diagnosis/regression_blocks.hpp"
 #include "diagnosis/trial_robot.hpp"
 
 namespace bodyschema {
 namespace {
 
 constexpr Eigen::Index kRows = 400;
-
-/// Rows of a regression gathered into blocks of equal length.
-BlockStatistics statistics_of(const Eigen::MatrixXd& X, const Eigen::VectorXd& y, Eigen::Index blocks) {
-  std::vector<BlockStatistics::Block> list;
-  const Eigen::Index n = X.rows() / blocks;
-  for (Eigen::Index b = 0; b < blocks; ++b) {
-    const Eigen::MatrixXd x = X.middleRows(b * n, n);
-    const Eigen::VectorXd r = y.segment(b * n, n);
-    list.push_back({x.transpose() * x, x.transpose() * r, r.squaredNorm(), static_cast<double>(n)});
-  }
-  return BlockStatistics(std::move(list));
-}
 
 Candidate candidate(const std::string& name, Eigen::Index column) {
   Candidate c;
@@ -56,7 +45,7 @@ TEST(Selection, ACauseThatIsListedInPlaceOfAnotherHasItsOwnFigures) {
   int listed = 0;
   for (std::uint64_t i = 0; i < 20; ++i) {
     const Swapped data(test::seed() + i);
-    const auto statistics = statistics_of(data.X, data.y, 20);
+    const auto statistics = test::statistics_of(data.X, data.y, 20);
     const auto found = select_causes(statistics, always, candidates);
     ASSERT_EQ(found.causes.size(), 1u);
     if (found.causes[0].candidate != 1 || found.model != std::vector<std::size_t>{0}) continue;
@@ -71,6 +60,28 @@ TEST(Selection, ACauseThatIsListedInPlaceOfAnotherHasItsOwnFigures) {
   EXPECT_GE(listed, 5);
 }
 
+TEST(Selection, AsksForMoreWhereEveryPostureIsPassedOnce) {
+  const std::vector<Candidate> candidates = {candidate("cause", 2)};
+  std::mt19937_64 random(test::seed());
+  std::normal_distribution<double> normal;
+  // A cause that takes away a tenth of the loss, and one that takes away half.
+  for (const auto& [size, found_in_one_pass] : {std::pair{0.35, false}, std::pair{1.0, true}}) {
+    Eigen::MatrixXd X(kRows, 3);
+    Eigen::VectorXd y(kRows);
+    for (Eigen::Index i = 0; i < kRows; ++i) {
+      X.row(i) << 1.0, 0.0, i % 2 == 0 ? 1.0 : -1.0;
+      y[i] = 1.0 + size * X(i, 2) + normal(random);
+    }
+    const auto statistics = test::statistics_of(X, y, 20);
+    SelectionOptions usual;
+    usual.crowd_rest_t = 1e9;  // a single candidate is no crowd
+    auto one_pass = usual;
+    one_pass.one_pass = true;
+    EXPECT_EQ(select_causes(statistics, {{0}}, candidates, usual).causes.size(), 1u) << size;
+    EXPECT_EQ(select_causes(statistics, {{0}}, candidates, one_pass).causes.size(), found_in_one_pass ? 1u : 0u) << size;
+  }
+}
+
 TEST(Selection, RefusesWhatCannotBeFitted) {
   const Swapped data(test::seed());
   const std::vector<Candidate> candidates = {candidate("cause", 2)};
@@ -78,8 +89,8 @@ TEST(Selection, RefusesWhatCannotBeFitted) {
     return testing::ThrowsMessage<DataError>(testing::AllOf(testing::HasSubstr(why), testing::HasSubstr("; record")));
   };
   // One block, as of an arm that never moves; and offsets that are one and the same.
-  EXPECT_THAT([&] { select_causes(statistics_of(data.X, data.y, 1), {{0}, {1}}, candidates); }, refused("stands still"));
-  EXPECT_THAT([&] { select_causes(statistics_of(data.X, data.y, 20), {{0}, {1}, {1}}, candidates); },
+  EXPECT_THAT([&] { select_causes(test::statistics_of(data.X, data.y, 1), {{0}, {1}}, candidates); }, refused("stands still"));
+  EXPECT_THAT([&] { select_causes(test::statistics_of(data.X, data.y, 20), {{0}, {1}, {1}}, candidates); },
               refused("too little"));
 }
 

@@ -30,6 +30,7 @@ DiagnosisOptions picture_options() {
   DiagnosisOptions options;
   options.noise_rms_px = 0.5;
   options.trusted_rms_px = 0.8;
+  options.trusted_outline = 0.75;
   return options;
 }
 
@@ -55,6 +56,18 @@ TEST(Verdict, TrustsNoNameWhereTheFitStillMissesTheOutlines) {
   EXPECT_EQ(report.verdict, "unexplained");
   EXPECT_THAT(report.sentence, HasSubstr("1.3 px"));
   EXPECT_THAT(report.sentence, HasSubstr("encoder_gain of r_elbow"));
+}
+
+TEST(Verdict, TrustsNoNameWhereMuchOfTheOutlineIsMissing) {
+  for (const bool with_cause : {true, false}) {
+    auto report = report_of(0.3, {});
+    if (with_cause) report.causes = {gain_of_elbow()};
+    report.after.outline_where_seen = 0.67;
+    word_verdict(report, picture_options());
+    EXPECT_EQ(report.verdict, "unexplained");
+    EXPECT_THAT(report.sentence, HasSubstr("only 67 %"));
+    EXPECT_EQ(report.sentence.find("encoder_gain of r_elbow") != std::string::npos, with_cause);
+  }
 }
 
 TEST(Verdict, SaysNoiseOnlyWhereNoiseIsAllThatIsLeft) {

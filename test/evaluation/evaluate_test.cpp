@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "bodyschema/core/error.hpp"
+#include "test_data.hpp"
 
 namespace bodyschema {
 namespace {
@@ -47,12 +48,10 @@ TEST(Evaluate, AModeIsRefusedAsEveryExperimentRunsItsOwn) {
 }
 
 TEST(Evaluate, WhatIsSetAboutEstimatingReachesTheRecordingToo) {
-  const char* data = std::getenv("BODYSCHEMA_DATA");
+  SKIP_WITHOUT("eyehand-sim");
   EvaluationOptions options;
   options.experiment = "recording";
-  options.data = data != nullptr ? std::filesystem::path(data)
-                                 : std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "../shared/data";
-  if (!std::filesystem::exists(options.data / "eyehand-sim/truth.json")) GTEST_SKIP() << "no recording";
+  options.data = data_folder();
   options.out = std::filesystem::path(testing::TempDir()) / "bodyschema-evaluate-recording";
   // The simulator's robot is another one; how it is estimated is not.
   options.overrides = {"robot.urdf=/nowhere.urdf", "simulator.seed=1", "filter.particles=minus_one"};

@@ -16,6 +16,7 @@
 #include "bodyschema/bus/messages.hpp"
 #include "diagnosis/binomial.hpp"
 #include "integration/harness.hpp"
+#include "test_data.hpp"
 
 /// The simulator hides an effect in a log; `bodyschema diagnose`, another process, gets log and
 /// configuration alone; only then is the truth opened. Fresh seeds each run.
@@ -64,9 +65,15 @@ struct Written {
   std::string error;
 };
 
-Written simulate(const Scratch& scratch, const std::string& name, const std::vector<std::string>& arguments) {
+/// Played by one file, known to the other.
+struct Robot {
+  std::string simulator = configuration("simulator.yaml"), estimator = configuration("estimator.yaml");
+};
+
+Written simulate(const Scratch& scratch, const std::string& name, const std::vector<std::string>& arguments,
+                 const Robot& robot = {}) {
   Written written{scratch / (name + ".log"), scratch / (name + ".truth.json"), ""};
-  std::vector<std::string> command = {"bodyschema-sim", "--config", configuration("simulator.yaml"),
+  std::vector<std::string> command = {"bodyschema-sim", "--config", robot.simulator,
                                       "--set", "simulator.cameras.rate_hz=10", "--offsets", "random",
                                       "--log", written.log.string(), "--truth", written.truth.string()};
   command.insert(command.end(), arguments.begin(), arguments.end());
@@ -78,13 +85,13 @@ Written simulate(const Scratch& scratch, const std::string& name, const std::vec
 
 /// What the tool says about a log; the truth is read last.
 Answer diagnose(const Scratch& scratch, const std::string& name, const Written& written,
-                const std::vector<std::string>& arguments = {}) {
+                const std::vector<std::string>& arguments = {}, const Robot& robot = {}) {
   Answer answer;
   answer.error = written.error;
   if (!answer.error.empty()) return answer;
   const auto out = scratch / (name + ".report");
   std::vector<std::string> command = {"bodyschema", "diagnose", written.log.string(), "--config",
-                                      configuration("estimator.yaml"), "--threads", "1", "--out", out.string()};
+                                      robot.estimator, "--threads", "1", "--out", out.string()};
   command.insert(command.end(), arguments.begin(), arguments.end());
   std::filesystem::create_directories(scratch / name);
   Process diagnose(command, scratch / name);
@@ -95,9 +102,10 @@ Answer diagnose(const Scratch& scratch, const std::string& name, const Written& 
 }
 
 /// Simulates with these arguments and diagnoses; the log is deleted.
-Answer ask(const Scratch& scratch, const std::string& name, const std::vector<std::string>& arguments) {
-  const auto written = simulate(scratch, name, arguments);
-  auto answer = diagnose(scratch, name, written);
+Answer ask(const Scratch& scratch, const std::string& name, const std::vector<std::string>& arguments,
+           const Robot& robot = {}) {
+  const auto written = simulate(scratch, name, arguments, robot);
+  auto answer = diagnose(scratch, name, written, {}, robot);
   std::filesystem::remove(written.log);
   return answer;
 }
@@ -142,16 +150,18 @@ const Json* parameter_of(const Json& cause, const Json& fault) {
   return nullptr;
 }
 
-/// In the class, and better on blocks that the fit had not seen; where it is named itself, with the
-/// right sign.
+/// In the class, and better on blocks that the fit had not seen; where it is named itself, with the right
+/// sign and within twice its 95 % interval or 15 % of its size.
 bool found(const Json& report, const Json& fault) {
   const Json* cause = cause_of(report, fault);
   if (cause == nullptr || !(*cause)["heldout_gain"].is_number()) return false;
   if (!((*cause)["heldout_gain"].get<double>() > 0.0)) return false;
   if (!is_exactly(*cause, fault)) return true;
   const Json* p = parameter_of(*cause, fault);
-  return p != nullptr && (*p)["estimate"].is_number() &&
-         fault["value"].get<double>() * (*p)["estimate"].get<double>() > 0.0;
+  if (p == nullptr || !(*p)["estimate"].is_number() || !(*p)["ci95"][1].is_number()) return false;
+  const double value = fault["value"].get<double>(), estimate = (*p)["estimate"].get<double>();
+  const double half = (*p)["ci95"][1].get<double>() - estimate;
+  return value * estimate > 0.0 && std::abs(value - estimate) <= std::max(2.0 * half, 0.15 * std::abs(value));
 }
 
 /// How the parameters of causes that were named rightly compare with the truth.
@@ -258,7 +268,8 @@ TEST(HiddenEffect, IsFoundBehindFreshSeeds) {
   std::mt19937_64 random(seed());
   const auto number = [&] { return std::to_string(random() % 1'000'000'000); };
   const auto babble = [&](std::vector<std::string> more) {
-    std::vector<std::string> list = {"--babble", std::to_string(static_cast<int>(kLog_s)), "--seed", number()};
+    std::vector<std::string> list = {"--babble", std::to_string(static_cast<int>(kLog_s)), "--seed", number(),
+                                     "--hidden-size", "5"};
     list.insert(list.end(), more.begin(), more.end());
     return list;
   };
@@ -271,8 +282,7 @@ TEST(HiddenEffect, IsFoundBehindFreshSeeds) {
     const auto n = std::to_string(i);
     tasks.push_back({"nothing" + n, babble({}), 0.93,
                      [](const Answer& a) { return text_of(a.report, "verdict") == "none"; }});
-    // Both in 80 %, and something else besides in at most 10 %.
-    tasks.push_back({"two" + n, babble({"--hidden-fault", number(), "--hidden-fault", number()}), 0.70,
+    tasks.push_back({"two" + n, babble({"--hidden-fault", number(), "--hidden-fault", number()}), 0.80,
                      [](const Answer& a) { return all_found(a) && spurious(a) == 0; }});
     tasks.push_back({"outside" + n, babble({"--hidden-fault", number(), "--hidden-outside"}), 0.80,
                      not_taken_for_another});
@@ -304,13 +314,12 @@ bool not_testable(const Json& report, const std::string& name, const std::string
 
 TEST(HiddenEffect, AFrozenJointLeavesTheRestTestable) {
   const Scratch scratch;
-  EXPECT_EQ(once_right(0.90, [&](const std::string& at) -> std::string {
-              const auto answer = ask(scratch, "frozen" + at, {"--babble", "60", "--seed", at, "--freeze", "r_wrist_pitch",
-                                                               "--fault", "encoder_gain:joint=r_elbow,value=4"});
-              if (!answer.error.empty()) return answer.error;
-              EXPECT_TRUE(not_testable(answer.report, "encoder_gain", "r_wrist_pitch"));
-              return all_found(answer) ? "" : sentence_of(answer);
-            }), "") << "repeat with BODYSCHEMA_SEED=" << seed();
+  const std::string at = std::to_string(seed() % 1'000'000'000);
+  const auto answer = ask(scratch, "frozen", {"--babble", "60", "--seed", at, "--freeze", "r_wrist_pitch",
+                                              "--fault", "encoder_gain:joint=r_elbow,value=4"});
+  ASSERT_EQ(answer.error, "");
+  EXPECT_TRUE(not_testable(answer.report, "encoder_gain", "r_wrist_pitch"));
+  EXPECT_TRUE(all_found(answer)) << sentence_of(answer) << "; repeat with BODYSCHEMA_SEED=" << seed();
 }
 
 /// What a play that nobody can test may be called: in one-way motion it is a step of its joint where the
@@ -325,14 +334,35 @@ bool blames_another(const Answer& answer, const std::string& joint) {
 
 TEST(HiddenEffect, OneWayMotionShowsNoBacklashAndBlamesNoOther) {
   const Scratch scratch;
-  // Below what is demanded of other logs: of four logs one blamed a slip of 0.04 deg of another joint.
-  EXPECT_EQ(once_right(0.75, [&](const std::string& at) -> std::string {
+  // What masks and meshes get wrong follows a posture, and time where each comes once: both logs had a cause
+  // before, a slip of 0.03 deg or the acceleration of a joint.
+  EXPECT_EQ(once_right(0.93, [&](const std::string& at) -> std::string {
+              const auto answer = ask(scratch, "one_way_nothing" + at, {"--one-way", "40", "--seed", at});
+              if (!answer.error.empty()) return answer.error;
+              return text_of(answer.report, "verdict") == "none" ? "" : sentence_of(answer);
+            }), "") << "repeat with BODYSCHEMA_SEED=" << seed();
+  EXPECT_EQ(once_right(0.93, [&](const std::string& at) -> std::string {
               const auto answer = ask(scratch, "one_way" + at, {"--one-way", "40", "--seed", at,
                                                                 "--fault", "backlash:joint=r_elbow,value=1"});
               if (!answer.error.empty()) return answer.error;
               EXPECT_EQ(cause_of(answer.report, answer.truth["faults"][0]), nullptr) << sentence_of(answer);
               EXPECT_TRUE(not_testable(answer.report, "backlash", "r_elbow"));
               return blames_another(answer, "r_elbow") ? sentence_of(answer) : "";
+            }), "") << "repeat with BODYSCHEMA_SEED=" << seed();
+}
+
+TEST(HiddenEffect, TheOfficialRobotIsDiagnosedWithItsOwnConfiguration) {
+  SKIP_WITHOUT("icub-models");
+  const Scratch scratch;
+  const std::string configurations = std::string(BODYSCHEMA_SOURCE_DIR) + "/config/";
+  const Robot official{(scratch / "official.yaml").string(), configurations + "icub_v2_5/estimator.yaml"};
+  std::ofstream(official.simulator) << "include: [" << configurations << "icub_v2_5/robot.yaml, " << configurations
+                                    << "bus.yaml]\nsimulator: {motion: {posture_deg: {neck_pitch: -22, eyes_tilt: -18}}}\n";
+  EXPECT_EQ(once_right(0.90, [&](const std::string& at) -> std::string {
+              const auto answer = ask(scratch, "official" + at, {"--babble", "40", "--seed", at, "--fault", "latency:value=40"},
+                                      official);
+              if (!answer.error.empty()) return answer.error;
+              return all_found(answer) && answer.report["causes"].size() == 1 ? "" : sentence_of(answer);
             }), "") << "repeat with BODYSCHEMA_SEED=" << seed();
 }
 
@@ -451,7 +481,7 @@ std::string wrong_with_copies(const Scratch& scratch, const std::string& at) {
 
 TEST(HiddenEffect, DuplicatedFramesSharpenNothingAndShuffledDirectionsShowNoBacklash) {
   const Scratch scratch;
-  EXPECT_EQ(once_right(0.90, [&](const std::string& at) { return wrong_with_copies(scratch, at); }), "")
+  EXPECT_EQ(wrong_with_copies(scratch, std::to_string(seed() % 1'000'000'000)), "")
       << "repeat with BODYSCHEMA_SEED=" << seed();
 }
 

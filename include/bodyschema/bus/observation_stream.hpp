@@ -71,7 +71,6 @@ class ObservationStream {
   [[nodiscard]] BusStatistics statistics() const;
   [[nodiscard]] const Synchroniser& synchroniser() const { return synchroniser_; }
   [[nodiscard]] const Channels& channels() const { return channels_; }
-  [[nodiscard]] Microseconds newest_image() const { return newest_image_; }
 
  private:
   struct CameraFormat {
@@ -106,7 +105,6 @@ class ObservationStream {
   BusStatistics statistics_;
   JointStateMessage joint_state_;
   ImagesView images_;
-  Microseconds newest_image_ = -1;
   std::map<std::pair<std::string, MessageFault>, Complaint> complaints_;
   Complaint missing_joints_;
 };

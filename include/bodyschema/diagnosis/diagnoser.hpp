@@ -32,6 +32,8 @@ struct DiagnosisOptions {
   /// Rms that noise alone leaves, px, and above which no name is trusted; the defaults are for
   /// sources whose noise is not known.
   double noise_rms_px = 1e9, trusted_rms_px = 1e9;
+  /// Share of the outline that must have been found, below which no name is trusted.
+  double trusted_outline = 0.0;
   /// One sigma, as a share of an estimate, of errors that all blocks have in common and that therefore
   /// do not show between them: how a picture's blur and threshold place an outline, what encoders did
   /// between two readings. Widens the intervals of causes.

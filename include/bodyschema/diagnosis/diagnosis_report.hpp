@@ -60,6 +60,7 @@ struct HeldoutError {
   /// Share of the predicted outline that has a counterpart in the pictures; `rms_px` speaks of that
   /// part alone. 1 where the source knows which point belongs to which.
   double outline_found = 1.0;
+  double outline_where_seen = 1.0;  ///< the same in those pictures where enough of it was found to count
 };
 
 /// One bar of the chart of all candidates.

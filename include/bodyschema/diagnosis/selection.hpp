@@ -51,11 +51,14 @@ struct SelectionOptions {
   /// below -1.5); then a cause must stand out from them by its gain.
   std::size_t crowd = 3;
   double crowd_rest_t = 0.0;
-  double crowd_floor = 0.4;
+  double crowd_floor = 0.5;  ///< more than all the others together
   /// Causes that are there from the beginning; a search drops those that the data does not ask for
   /// and adds others. They are many because much is wrong, which makes no crowd of small errors.
   std::vector<std::size_t> given;
   bool search = true;  ///< false: `given` are the causes
+  /// The log passes every posture once: whatever follows an angle follows time as well, and so does what
+  /// masks and meshes get wrong in a posture. Only what takes away more than slow noise counts.
+  bool one_pass = false;
 };
 
 /// How a candidate fared when tested against the model so far.
@@ -85,6 +88,7 @@ struct Selection {
   /// each a little: small errors that live together. With its paired t.
   double rest_gain = 0.0, rest_t = 0.0;
   bool crowded = false;            ///< many small errors live together
+  double gain_floor = 0.0;         ///< the least gain that was asked of a cause, but for a crowd
   std::vector<SelectedCause> set_aside;  ///< causes that did not stand out from the crowd
 };
 
