@@ -106,6 +106,7 @@ struct Estimator::Impl {
 
     const bool in_view = prepare(observation);
     explained = false;
+    cameras_swapped = false;
     if (!in_view) {
       frame_state = fusion.frame_state();
       if (particles_only() || fusion.frames() < 0.5) frame_state.x = state;
@@ -114,7 +115,9 @@ struct Estimator::Impl {
       best_likelihood = 0.0;
     } else {
       score_particles(observation);
-      if (options.mode == EstimatorMode::kPaper) {
+      if (!particles_only() && fusion.frames() < kYoungMemory_frames && starts_swapped()) {
+        wait_for_an_exchange(observation);
+      } else if (options.mode == EstimatorMode::kPaper) {
         weights = 1.0 - distance.array();  // equation (4)
         particle_step();
       } else {
@@ -272,6 +275,58 @@ struct Estimator::Impl {
     return (candidate.evidence.cost - predicted_cost(candidate.evidence, alone)) / variance;
   }
 
+  // --- pictures of the wrong eye --------------------------------------------------------------
+
+  /// Silhouettes of slots 0..n-1 against the pictures of the other eye: the smallest Hammoude distance, 1
+  /// where there are not two pictures of one size.
+  double distance_exchanged(std::size_t n) {
+    const bool both = rig.cameras.size() == 2 && camera_mask == 3u && intrinsics[0].width == intrinsics[1].width &&
+                      intrinsics[0].height == intrinsics[1].height;
+    if (!both) return 1.0;
+    const Eigen::VectorXd as_they_are = distance.head(static_cast<Eigen::Index>(n));
+    std::swap(observed[0], observed[1]);
+    scorer->set_observation(observed);
+    score_slots(n);
+    const double exchanged = distance.head(static_cast<Eigen::Index>(n)).minCoeff();
+    std::swap(observed[0], observed[1]);
+    scorer->set_observation(observed);
+    distance.head(static_cast<Eigen::Index>(n)) = as_they_are;
+    return exchanged;
+  }
+
+  /// Whether some offsets of a joint state fit the pictures far better once these are exchanged: a wrong arm
+  /// moves the hand alike in both pictures, an exchange moves it against its disparity.
+  [[nodiscard]] static bool speaks_for_exchange(double as_they_are, double exchanged) {
+    return exchanged < kMuchBetter * as_they_are;
+  }
+
+  /// With a memory: whether it explains the pictures once they are exchanged, and only then.
+  bool turned_swapped(const Observation& observation, const OffsetFusion& memory) {
+    place(observation, memory.mean(), 0);
+    score_slots(1);
+    const double exchanged = distance_exchanged(1);
+    return exchanged < 2.0 * options.lock_distance && speaks_for_exchange(distance(0), exchanged);
+  }
+
+  /// Without one: whether the best particle asks for an exchange.
+  bool starts_swapped() {
+    const double best = distance.minCoeff();
+    return speaks_for_exchange(best, distance_exchanged(options.filter.particles));
+  }
+
+  /// Nothing is learned from pictures that seem to be exchanged.
+  void wait_for_an_exchange(const Observation& observation) {
+    cameras_swapped = true;
+    current = EstimatorState::kDiverged;
+    contradicted = fusion.frames() > 0.5;
+    state = fusion.frames() > 0.5 ? fusion.mean() : state;
+    frame_state = first_look.frame_state();
+    frame_state.x = state;
+    place(observation, state, 0);
+    score_slots(1);
+    best_likelihood = 1.0 - distance(0);
+  }
+
   /// The memory is about to be dropped for a frame that contradicts it. If it is the frame that is
   /// wrong, the next ones will agree with the memory again.
   void shelve(const PullJudge& usual) {
@@ -321,6 +376,11 @@ struct Estimator::Impl {
         score_slots(1);
         accepted = found->distance > kClearlyBetter * distance(0) || !fits(found->evidence);
       }
+    }
+    if (!accepted && fusion.frames() > 0.5 && turned_swapped(observation, fusion)) {
+      times.refinement_ms += elapsed_ms(start);
+      wait_for_an_exchange(observation);
+      return;
     }
     if (accepted && pulls.doubting()) {
       // Not believed yet: the memory stays as it is.
@@ -467,6 +527,7 @@ struct Estimator::Impl {
       estimate.nuisance = state.tail(state.size() - joints);
       estimate.nuisance_sd = covariance.diagonal().tail(state.size() - joints).cwiseMax(0.0).cwiseSqrt();
     }
+    estimate.cameras_swapped = cameras_swapped;
     look_for_stalls(observation, estimate);
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
       const CameraObservation* seen = nullptr;
@@ -571,6 +632,7 @@ struct Estimator::Impl {
   static constexpr double kSettled_frames = 4.5;  ///< fewer may still hold a wrong minimum
   static constexpr int kShelf_frames = 30;
   static constexpr double kClearlyBetter = 0.8;  ///< Hammoude distance against that of the memory
+  static constexpr double kMuchBetter = 0.6;     ///< ... with exchanged pictures against those as they are
 
   EstimatorOptions options;
   RobotSetup setup;
@@ -603,6 +665,7 @@ struct Estimator::Impl {
   double contour_rms_px = 0.0;
   int surprised_frames = 0;
   bool contradicted = false;
+  bool cameras_swapped = false;  ///< the last frame's pictures
   PullJudge pulls;
   StalledEncoders stalled{0};
   bool explained = false;  ///< the last frame's pictures, by its estimate

@@ -137,6 +137,10 @@ std::optional<std::string> error(const HealthFacts& f) {
     return fmt::format("the encoder of {} stands still while the pictures show the joint move, by {:.0f} deg so far",
                        f.estimate.stalled_joint, degrees(f.estimate.stalled_motion_rad));
   }
+  if (f.estimate.cameras_swapped) {
+    return std::string("the left and right pictures are swapped: each shows what the other eye sees; nothing is learned "
+                       "from them");
+  }
   if (f.estimate.state == EstimatorState::kDiverged) {
     return fmt::format("diverged: the best prediction does not fit the pictures (likelihood {:.2f}); searching again",
                        f.estimate.best_likelihood);

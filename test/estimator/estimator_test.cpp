@@ -271,6 +271,59 @@ TEST_F(EstimatorOnOwnRobot, WhatAStallTaughtDoesNotOutliveIt) {
   EXPECT_GT(converged_after, 10 * kTrials);
 }
 
+/// The pictures of the two eyes exchanged; encoders and times stay.
+Observation exchanged(Observation seen) {
+  std::swap(seen.cameras[0]->mask, seen.cameras[1]->mask);
+  std::swap(seen.cameras[0]->coverage, seen.cameras[1]->coverage);
+  return seen;
+}
+
+// Offsets can be found that fit exchanged pictures somehow, each frame others. That is said at once, and what
+// was learned before counts again with the first pictures that are in order.
+TEST_F(EstimatorOnOwnRobot, PicturesThatGetExchangedAreNoticedAtOnceAndTeachNothing) {
+  constexpr double kFrames = 60.0;
+  constexpr int kSwapped = 30, kRight = 50;
+  Estimator estimator(robot_, setup_, rig_, options_);
+  const Estimate before = follow(estimator, *reach_, 0, kSwapped, kFrames);
+  ASSERT_EQ(before.state, EstimatorState::kConverged);
+  EXPECT_FALSE(before.cameras_swapped);
+  for (int frame = kSwapped; frame < kRight; ++frame) {
+    const Estimate estimate = estimator.step(exchanged(seen(*reach_, frame, kFrames)));
+    EXPECT_TRUE(estimate.cameras_swapped) << frame;
+    EXPECT_EQ(estimate.state, EstimatorState::kDiverged) << frame;
+    EXPECT_EQ(estimate.offset_rad, before.offset_rad) << frame;
+  }
+  const Estimate after = follow(estimator, *reach_, kRight, kRight + 1, kFrames);
+  EXPECT_FALSE(after.cameras_swapped);
+  EXPECT_EQ(after.state, EstimatorState::kConverged);
+  EXPECT_LT((after.offset_rad - before.offset_rad).cwiseAbs().maxCoeff(), radians(0.1));
+}
+
+// Cables or channels that have been mixed up from the beginning.
+TEST_F(EstimatorOnOwnRobot, PicturesThatAreExchangedFromTheBeginningAreNoticed) {
+  constexpr double kFrames = 60.0;
+  const char* given = std::getenv("BODYSCHEMA_SEED");
+  const auto seed = given != nullptr ? static_cast<unsigned>(std::stoul(given)) : std::random_device{}();
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, radians(4.0));
+  for (int trial = 0; trial < 5; ++trial) {
+    SCOPED_TRACE("BODYSCHEMA_SEED=" + std::to_string(seed) + ", trial " + std::to_string(trial));
+    Eigen::VectorXd offset = offset_rad_;
+    if (trial > 0) std::generate(offset.begin(), offset.end(), [&] { return normal(random); });
+    SyntheticReach reach(robot_, setup_, rig_, offset);
+    Estimator estimator(robot_, setup_, rig_, options_);
+    for (int frame = 0; frame < 20; ++frame) {
+      const Estimate estimate = estimator.step(exchanged(seen(reach, frame, kFrames)));
+      EXPECT_TRUE(estimate.cameras_swapped) << frame;
+      EXPECT_NE(estimate.state, EstimatorState::kConverged) << frame;
+    }
+    for (int frame = 20; frame < 40; ++frame) {
+      EXPECT_FALSE(estimator.step(seen(reach, frame, kFrames)).cameras_swapped) << frame;
+    }
+    EXPECT_EQ(follow(estimator, reach, 40, 41, kFrames).state, EstimatorState::kConverged);
+  }
+}
+
 // A single frame that is wrong, as when encoders jump to and fro: what was learned before counts again
 // as soon as the pictures agree with it.
 TEST_F(EstimatorOnOwnRobot, OneFrameWithAWrongEncoderCostsNoKnowledge) {

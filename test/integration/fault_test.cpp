@@ -244,7 +244,7 @@ TEST_F(World, CameraFreezes) {
 
 TEST_F(World, CamerasSwapped) {
   suffer({.name = "left and right swapped", .faults = faults::cameras_swapped(),
-          .words = "diverged", .level = HealthLevel::kError, .notice_s = 10.0});
+          .words = "the left and right pictures are swapped", .level = HealthLevel::kError, .notice_s = 3.0});
 }
 
 TEST_F(World, PicturesDoubled) {

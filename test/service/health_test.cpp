@@ -162,6 +162,13 @@ TEST(Health, AnEncoderStalls) {
          "the encoder of r_elbow stands still while the pictures show the joint move, by 12 deg so far");
 }
 
+TEST(Health, SwappedPictures) {
+  HealthFacts facts = well();
+  facts.estimate.state = EstimatorState::kDiverged;
+  facts.estimate.cameras_swapped = true;
+  expect(facts, HealthLevel::kError, "the left and right pictures are swapped");
+}
+
 TEST(Health, Diverged) {
   HealthFacts facts = well();
   facts.estimate.state = EstimatorState::kDiverged;
