@@ -14,8 +14,9 @@
 #include "bodyschema/estimator/offset_fusion.hpp"
 #include "bodyschema/estimator/pull_judge.hpp"
 #include "bodyschema/estimator/stalled_encoders.hpp"
-#include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/filter/particle_filter.hpp"
+#include "hypothesis_scorer.hpp"
+#include "outline_fitter.hpp"
 
 namespace bodyschema {
 namespace {
@@ -49,11 +50,6 @@ Eigen::VectorXd encoder_sds(const std::vector<Parameter>& parameters, std::size_
   return sd;
 }
 
-/// The cost that the evidence predicts after a change of the state, px^2.
-double predicted_cost(const ContourEvidence& evidence, const Eigen::VectorXd& step) {
-  return evidence.cost - 2.0 * evidence.b.dot(step) + step.dot(evidence.A * step);
-}
-
 }  // namespace
 
 const char* to_string(EstimatorState state) {
@@ -76,23 +72,20 @@ struct Estimator::Impl {
         intrinsics(rig.intrinsics()),
         body(robot_model, setup, rig, parameters),
         alignment(body, silhouettes, intrinsics, options.contour),
+        scorer(body, silhouettes, intrinsics, options.silhouette, options.filter.particles),
         filter(static_cast<Eigen::Index>(setup.estimated_joints.size()), options.filter),
         fusion(prior_sds(parameters),
                encoder_sds(parameters, setup.estimated_joints.size(), options.encoder_sd_rad)),
-        first_look(fusion) {
+        first_look(fusion),
+        fitter(alignment, scorer, first_look, static_cast<Eigen::Index>(setup.estimated_joints.size()), options) {
     for (const auto& name : setup.estimated_joints) joint_index.push_back(robot_model->joint_index(name));
-    scorer = make_silhouette_scorer(silhouettes, intrinsics, options.silhouette, &engine_reason);
     joints = static_cast<Eigen::Index>(setup.estimated_joints.size());
     state = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
     reading.resize(joints);
     stalled = StalledEncoders(joints);
     frame_state = fusion.frame_state();
-    const std::size_t batch = options.filter.particles;
-    X_CB.resize(batch * rig.cameras.size() * body.part_count());
-    counts.resize(batch * rig.cameras.size());
-    distance.resize(static_cast<Eigen::Index>(batch));
-    weights.resize(static_cast<Eigen::Index>(batch));
-    observed.resize(rig.cameras.size());
+    distance.resize(static_cast<Eigen::Index>(options.filter.particles));
+    weights.resize(static_cast<Eigen::Index>(options.filter.particles));
   }
 
   // --- one step -------------------------------------------------------------------------------
@@ -104,7 +97,7 @@ struct Estimator::Impl {
     estimate.utime = observation.utime;
     estimate.joint_names = setup.estimated_joints;
 
-    const bool in_view = prepare(observation);
+    const bool in_view = scorer.observe(observation, options.min_mask_px);
     explained = false;
     cameras_swapped = false;
     if (!in_view) {
@@ -114,9 +107,9 @@ struct Estimator::Impl {
       contradicted = false;
       best_likelihood = 0.0;
     } else {
-      score_particles(observation);
+      score_particles();
       if (!particles_only() && fusion.frames() < kYoungMemory_frames && starts_swapped()) {
-        wait_for_an_exchange(observation);
+        learn_nothing();
       } else if (options.mode == EstimatorMode::kPaper) {
         weights = 1.0 - distance.array();  // equation (4)
         particle_step();
@@ -130,70 +123,21 @@ struct Estimator::Impl {
       }
     }
     report(observation, estimate);
+    times.scoring_ms = scorer.take_scoring_ms();
     estimate.times = times;
     estimate.times.total_ms = elapsed_ms(start);
     return estimate;
   }
 
-  /// Hands the observed masks to the scorer. False when there is too little to see.
-  bool prepare(const Observation& observation) {
-    camera_mask = 0;
-    std::size_t seen_px = 0;
-    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-      const bool present = c < observation.cameras.size() && observation.cameras[c] &&
-                           !observation.cameras[c]->mask.empty();
-      if (present) {
-        observed[c].mask = observation.cameras[c]->mask;
-        observed[c].valid = observation.cameras[c]->valid;
-        seen_px += observed[c].mask.count();
-        camera_mask |= 1u << c;
-      } else {
-        observed[c].mask = BinaryMask(intrinsics[c].width, intrinsics[c].height);
-        observed[c].valid = BinaryMask();
-      }
-    }
-    if (camera_mask == 0 || seen_px < options.min_mask_px) return false;
-    scorer->set_observation(observed);
-    return true;
-  }
-
-  /// Part transforms of one hypothesis in all cameras, at `slot` of the batch.
-  void place(const Observation& observation, const Eigen::VectorXd& x, std::size_t slot) {
-    const std::size_t parts = body.part_count();
-    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-      if ((camera_mask & (1u << c)) == 0) continue;
-      body.compute(*observation.cameras[c], x, c,
-                   {X_CB.data() + (slot * rig.cameras.size() + c) * parts, parts});
-    }
-  }
-
-  /// Hammoude distance of slots 0..n-1, equation (3) over both images.
-  void score_slots(std::size_t n) {
-    const std::size_t cameras = rig.cameras.size();
-    const auto start = Clock::now();
-    scorer->score({X_CB.data(), n * cameras * body.part_count()}, {counts.data(), n * cameras},
-                  camera_mask);
-    times.scoring_ms += elapsed_ms(start);
-    for (std::size_t i = 0; i < n; ++i) {
-      std::uint64_t in_union = 0;
-      std::uint64_t in_both = 0;
-      for (std::size_t c = 0; c < cameras; ++c) {
-        in_union += counts[i * cameras + c].union_count();
-        in_both += counts[i * cameras + c].intersection;
-      }
-      distance(static_cast<Eigen::Index>(i)) = hammoude_distance(in_union, in_both);
-    }
-  }
-
-  void score_particles(const Observation& observation) {
+  void score_particles() {
     const auto start = Clock::now();
     Eigen::VectorXd x = state;
     for (std::size_t i = 0; i < options.filter.particles; ++i) {
       x.head(joints) = filter.states().col(static_cast<Eigen::Index>(i));
-      place(observation, x, i);
+      scorer.place(x, i);
     }
     times.kinematics_ms += elapsed_ms(start);
-    score_slots(options.filter.particles);
+    distance = scorer.score(options.filter.particles);
   }
 
   /// The estimate is one of the particles, as in the paper.
@@ -219,113 +163,54 @@ struct Estimator::Impl {
 
   Eigen::VectorXd likelihood(const Observation& observation, const Eigen::MatrixXd& offsets) {
     Eigen::VectorXd result = Eigen::VectorXd::Zero(offsets.cols());
-    if (!prepare(observation)) return result;
+    if (!scorer.observe(observation, options.min_mask_px)) return result;
     const auto batch = static_cast<Eigen::Index>(options.filter.particles);
     Eigen::VectorXd x = Eigen::VectorXd::Zero(state.size());
     for (Eigen::Index begin = 0; begin < offsets.cols(); begin += batch) {
       const Eigen::Index n = std::min(batch, offsets.cols() - begin);
       for (Eigen::Index i = 0; i < n; ++i) {
         x.head(joints) = offsets.col(begin + i);
-        place(observation, x, static_cast<std::size_t>(i));
+        scorer.place(x, static_cast<std::size_t>(i));
       }
-      score_slots(static_cast<std::size_t>(n));
-      result.segment(begin, n) = 1.0 - distance.head(n).array();
+      result.segment(begin, n) = 1.0 - scorer.score(static_cast<std::size_t>(n)).head(n).array();
     }
     return result;
   }
 
   // --- mode best ------------------------------------------------------------------------------
 
-  struct Candidate {
-    Eigen::VectorXd x;
-    ContourEvidence evidence;
-    double distance = 1.0;
-  };
-
-  /// Gauss-Newton onto the observed outline, looking less and less far. `memory` is what earlier
-  /// frames said (or only the prior).
-  void refine(const Observation& observation, const OffsetFusion& memory,
-              std::span<const double> search_px, Candidate& candidate) {
-    const double variance = options.residual_sd_px * options.residual_sd_px;
-    for (const double reach_px : search_px) {
-      alignment.linearise(observation, candidate.x, reach_px, candidate.evidence);
-      Eigen::VectorXd step =
-          memory.solve_with(candidate.evidence, candidate.x, variance) - candidate.x;
-      const double largest = step.head(joints).cwiseAbs().maxCoeff();
-      if (largest > kMaxStep_rad) step *= kMaxStep_rad / largest;
-      candidate.x += step;
-    }
-    alignment.linearise(observation, candidate.x, search_px.back(), candidate.evidence);
-  }
-
-  /// From where the memory puts the arm to where this frame and the memory together see it.
-  Candidate follow(const Observation& observation, const OffsetFusion& memory) {
-    static constexpr double kNear_px[] = {8.0, 4.0};
-    Candidate candidate;
-    candidate.x = memory.mean();
-    refine(observation, memory, kNear_px, candidate);
-    return candidate;
-  }
-
-  /// What the frame could still win against the memory that `candidate` followed, chi-square.
-  [[nodiscard]] double pull_of(const Candidate& candidate) const {
-    const double variance = options.residual_sd_px * options.residual_sd_px;
-    const Eigen::VectorXd alone =
-        first_look.solve_with(candidate.evidence, candidate.x, variance) - candidate.x;
-    return (candidate.evidence.cost - predicted_cost(candidate.evidence, alone)) / variance;
-  }
-
   // --- pictures of the wrong eye --------------------------------------------------------------
 
-  /// Silhouettes of slots 0..n-1 against the pictures of the other eye: the smallest Hammoude distance, 1
-  /// where there are not two pictures of one size.
-  double distance_exchanged(std::size_t n) {
-    const bool both = rig.cameras.size() == 2 && camera_mask == 3u && intrinsics[0].width == intrinsics[1].width &&
-                      intrinsics[0].height == intrinsics[1].height;
-    if (!both) return 1.0;
-    const Eigen::VectorXd as_they_are = distance.head(static_cast<Eigen::Index>(n));
-    std::swap(observed[0], observed[1]);
-    scorer->set_observation(observed);
-    score_slots(n);
-    const double exchanged = distance.head(static_cast<Eigen::Index>(n)).minCoeff();
-    std::swap(observed[0], observed[1]);
-    scorer->set_observation(observed);
-    distance.head(static_cast<Eigen::Index>(n)) = as_they_are;
-    return exchanged;
-  }
-
-  /// Whether some offsets of a joint state fit the pictures far better once these are exchanged: a wrong arm
-  /// moves the hand alike in both pictures, an exchange moves it against its disparity.
+  /// Whether the pictures fit far better once they are exchanged: a wrong arm moves the hand alike in both
+  /// pictures, an exchange moves it against its disparity.
   [[nodiscard]] static bool speaks_for_exchange(double as_they_are, double exchanged) {
     return exchanged < kMuchBetter * as_they_are;
   }
 
   /// With a memory: whether it explains the pictures once they are exchanged, and only then.
-  bool turned_swapped(const Observation& observation, const OffsetFusion& memory) {
-    place(observation, memory.mean(), 0);
-    score_slots(1);
-    const double exchanged = distance_exchanged(1);
-    return exchanged < 2.0 * options.lock_distance && speaks_for_exchange(distance(0), exchanged);
+  bool turned_swapped() {
+    const Eigen::VectorXd known = fusion.mean();
+    const double exchanged = scorer.distance_exchanged(known);
+    return exchanged < 2.0 * options.lock_distance && speaks_for_exchange(scorer.distance(known), exchanged);
   }
 
   /// Without one: whether the best particle asks for an exchange.
   bool starts_swapped() {
-    const double best = distance.minCoeff();
-    return speaks_for_exchange(best, distance_exchanged(options.filter.particles));
+    return speaks_for_exchange(distance.minCoeff(), scorer.smallest_exchanged(options.filter.particles));
   }
 
-  /// Nothing is learned from pictures that seem to be exchanged.
-  void wait_for_an_exchange(const Observation& observation) {
+  /// From pictures that seem to be exchanged.
+  void learn_nothing() {
     cameras_swapped = true;
     current = EstimatorState::kDiverged;
     contradicted = fusion.frames() > 0.5;
-    state = fusion.frames() > 0.5 ? fusion.mean() : state;
+    if (fusion.frames() > 0.5) state = fusion.mean();
     frame_state = first_look.frame_state();
     frame_state.x = state;
-    place(observation, state, 0);
-    score_slots(1);
-    best_likelihood = 1.0 - distance(0);
+    best_likelihood = 1.0 - scorer.distance(state);
   }
+
+  // --- mode best ------------------------------------------------------------------------------
 
   /// The memory is about to be dropped for a frame that contradicts it. If it is the frame that is
   /// wrong, the next ones will agree with the memory again.
@@ -338,8 +223,8 @@ struct Estimator::Impl {
   void reconsider(const Observation& observation) {
     if (stalled.suspected()) shelf.reset();
     if (!shelf) return;
-    const Candidate candidate = follow(observation, shelf->fusion);
-    if (shelf->pulls.judge(pull_of(candidate)) == PullJudge::Verdict::kAgrees && fits(candidate.evidence)) {
+    const OutlineFit fit = fitter.follow(observation, shelf->fusion);
+    if (shelf->pulls.judge(fitter.pull_of(fit)) == PullJudge::Verdict::kAgrees && fitter.fits(fit.evidence)) {
       fusion = shelf->fusion;
       pulls = shelf->pulls;
       surprised_frames = 0;
@@ -356,30 +241,28 @@ struct Estimator::Impl {
     times.filter_ms += elapsed_ms(start);
 
     start = Clock::now();
-    const double variance = options.residual_sd_px * options.residual_sd_px;
-    Candidate best;
-    std::optional<Candidate> found;
+    const double variance = fitter.variance_px2();
+    OutlineFit best;
+    std::optional<OutlineFit> found;
     bool accepted = false;
     double gain = 0.0;
     forget_a_stall(observation);
     reconsider(observation);
     const PullJudge usual = pulls;
     if (fusion.frames() > 0.5) {
-      best = follow(observation, fusion);
-      gain = pull_of(best);
-      accepted = pulls.judge(gain) != PullJudge::Verdict::kContradicts && fits(best.evidence);
+      best = fitter.follow(observation, fusion);
+      gain = fitter.pull_of(best);
+      accepted = pulls.judge(gain) != PullJudge::Verdict::kContradicts && fitter.fits(best.evidence);
       if (accepted && fusion.frames() < kYoungMemory_frames) {
         // A memory of so few frames may hold a wrong minimum, or a frame whose two pictures saw the
         // arm before and after a slip: it must not fit worse than what a new search finds.
         found = search(observation);
-        place(observation, best.x, 0);
-        score_slots(1);
-        accepted = found->distance > kClearlyBetter * distance(0) || !fits(found->evidence);
+        accepted = found->distance > kClearlyBetter * scorer.distance(best.x) || !fitter.fits(found->evidence);
       }
     }
-    if (!accepted && fusion.frames() > 0.5 && turned_swapped(observation, fusion)) {
+    if (!accepted && fusion.frames() > 0.5 && turned_swapped()) {
       times.refinement_ms += elapsed_ms(start);
-      wait_for_an_exchange(observation);
+      learn_nothing();
       return;
     }
     if (accepted && pulls.doubting()) {
@@ -395,10 +278,10 @@ struct Estimator::Impl {
       // Nothing known yet, or what is known no longer fits: look again from the best particles.
       pulls.forget();
       if (!found) {
-        if (fusion.frames() > 0.5) suspect_slips(observation);
+        if (fusion.frames() > 0.5) suspect_slips();
         found = search(observation);
       }
-      const bool good = fits(found->evidence) && found->distance < options.lock_distance;
+      const bool good = fitter.fits(found->evidence) && found->distance < options.lock_distance;
       if (fusion.frames() > 0.5) {
         ++surprised_frames;
         if (good || surprised_frames > 5) {
@@ -419,11 +302,8 @@ struct Estimator::Impl {
     contradicted = fusion.frames() > 0.5 && (pulls.doubting() || surprised_frames > 0);
     frame_state = (contradicted ? first_look : fusion).frame_state(best.evidence, best.x, variance);
     contour_rms_px = best.evidence.rms_px();
-    place(observation, frame_state.x, 0);
-    const Eigen::Index first = 0;
-    score_slots(1);
-    best_likelihood = 1.0 - distance(first);
-    explained = fits(best.evidence) && distance(first) < options.lock_distance;
+    best_likelihood = 1.0 - scorer.distance(frame_state.x);
+    explained = fitter.fits(best.evidence) && 1.0 - best_likelihood < options.lock_distance;
     times.refinement_ms += elapsed_ms(start);
 
     start = Clock::now();
@@ -435,14 +315,9 @@ struct Estimator::Impl {
     times.filter_ms += elapsed_ms(start);
   }
 
-  [[nodiscard]] bool fits(const ContourEvidence& evidence) const {
-    return evidence.sampled > 20 && evidence.matched_share() > 0.6 &&
-           evidence.rms_px() < options.lock_rms_px;
-  }
-
   /// What was known until now no longer fits: most likely one joint slipped. The worse half of the
   /// particles makes way for slips of each joint, both ways and of all sizes up to the largest.
-  void suspect_slips(const Observation& observation) {
+  void suspect_slips() {
     const std::vector<Eigen::Index> order = by_distance();
     const Eigen::Index slips = filter.states().cols() / 2;
     const Eigen::Index sizes = std::max<Eigen::Index>(1, slips / (2 * joints));  // each way
@@ -454,7 +329,7 @@ struct Estimator::Impl {
       x(i % joints) += step % 2 == 0 ? size : -size;
       filter.set_state(order[order.size() - 1 - static_cast<std::size_t>(i)], x);
     }
-    score_particles(observation);
+    score_particles();
   }
 
   /// Particles, the one whose silhouette fits best first.
@@ -466,24 +341,12 @@ struct Estimator::Impl {
     return order;
   }
 
-  /// The best of several hypotheses after refinement without memory.
-  Candidate search(const Observation& observation) {
-    static constexpr double kWide_px[] = {30.0, 20.0, 14.0, 10.0, 7.0, 5.0, 4.0};
+  /// The best of the three most likely particles once they are moved onto the outline.
+  OutlineFit search(const Observation& observation) {
     const std::vector<Eigen::Index> order = by_distance();
-    std::vector<Candidate> candidates(std::min<std::size_t>(3, order.size()));
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      candidates[i].x = state;
-      candidates[i].x.head(joints) = filter.states().col(order[i]);
-      refine(observation, first_look, kWide_px, candidates[i]);
-      place(observation, candidates[i].x, i);
-    }
-    score_slots(candidates.size());
-    std::size_t winner = 0;
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      candidates[i].distance = distance(static_cast<Eigen::Index>(i));
-      if (candidates[i].distance < candidates[winner].distance) winner = i;
-    }
-    return std::move(candidates[winner]);
+    std::vector<Eigen::VectorXd> starts(std::min<std::size_t>(3, order.size()), state);
+    for (std::size_t i = 0; i < starts.size(); ++i) starts[i].head(joints) = filter.states().col(order[i]);
+    return fitter.search(observation, starts);
   }
 
   /// Next frame's particles: resampled survivors, and half of them around the estimate.
@@ -624,7 +487,6 @@ struct Estimator::Impl {
     contradicted = false;
   }
 
-  static constexpr double kMaxStep_rad = 0.2;
   static constexpr double kSearchSpread_rad = 0.0349066;  ///< 2 deg
   static constexpr double kLargestSlip_rad = 0.2094395;   ///< 12 deg; larger ones take more frames
   static constexpr double kUsualPull = 20.0;  ///< chi-square of a frame that agrees with the memory
@@ -642,6 +504,7 @@ struct Estimator::Impl {
   std::vector<PinholeIntrinsics> intrinsics;
   BodyPoseModel body;
   ContourAlignment alignment;
+  HypothesisScorer scorer;
   ParticleFilter filter;
   OffsetFusion fusion;
   struct Shelf {
@@ -651,8 +514,7 @@ struct Estimator::Impl {
   };
   std::optional<Shelf> shelf;  ///< the memory that the last contradiction cost
   const OffsetFusion first_look;  ///< the prior alone
-  std::unique_ptr<SilhouetteScorer> scorer;
-  std::string engine_reason;
+  OutlineFitter fitter;
 
   Eigen::Index joints = 0;
   std::vector<Eigen::Index> joint_index;  ///< of the estimated joints in the RobotModel
@@ -672,11 +534,7 @@ struct Estimator::Impl {
   Eigen::MatrixXd cloud_covariance;
   StageTimes times;
 
-  std::uint32_t camera_mask = 0;
-  std::vector<ObservedSilhouette> observed;
-  std::vector<Eigen::Isometry3f> X_CB;
-  std::vector<SilhouetteCounts> counts;
-  Eigen::VectorXd distance;
+  Eigen::VectorXd distance;  ///< Hammoude, of the particles
   Eigen::VectorXd weights;
 };
 
@@ -703,7 +561,7 @@ BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::
   } else {
     impl_->body.compute(seen.joints.q, impl_->uncorrected(), camera, X_CB);
   }
-  return impl_->scorer->render(X_CB, camera);
+  return impl_->scorer.render(X_CB, camera);
 }
 
 Pose Estimator::hand_pose(const Exposure& at, std::size_t camera, bool corrected) {
@@ -723,8 +581,7 @@ std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& at, std::size
 }
 
 std::string Estimator::engine_description() const {
-  return impl_->scorer->description() +
-         (impl_->engine_reason.empty() ? "" : ": " + impl_->engine_reason);
+  return impl_->scorer.description();
 }
 
 }  // namespace bodyschema

@@ -1,0 +1,106 @@
+#include "hypothesis_scorer.hpp"
+
+#include <chrono>
+#include <utility>
+
+#include "bodyschema/filter/hammoude.hpp"
+
+namespace bodyschema {
+
+HypothesisScorer::HypothesisScorer(BodyPoseModel& body, const SilhouetteModel& silhouettes,
+                                   std::vector<PinholeIntrinsics> cameras, const SilhouetteOptions& options,
+                                   std::size_t slots)
+    : body_(body), cameras_(std::move(cameras)),
+      scorer_(make_silhouette_scorer(silhouettes, cameras_, options, &engine_reason_)), observed_(cameras_.size()),
+      slots_(slots), X_CB_((slots + 1) * cameras_.size() * body.part_count()), counts_(slots * cameras_.size()),
+      distances_(static_cast<Eigen::Index>(slots)), other_distances_(static_cast<Eigen::Index>(slots)) {}
+
+bool HypothesisScorer::observe(const Observation& observation, std::size_t min_mask_px) {
+  observation_ = &observation;
+  camera_mask_ = 0;
+  std::size_t seen_px = 0;
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    const bool present =
+        c < observation.cameras.size() && observation.cameras[c] && !observation.cameras[c]->mask.empty();
+    if (present) {
+      observed_[c].mask = observation.cameras[c]->mask;
+      observed_[c].valid = observation.cameras[c]->valid;
+      seen_px += observed_[c].mask.count();
+      camera_mask_ |= 1u << c;
+    } else {
+      observed_[c].mask = BinaryMask(cameras_[c].width, cameras_[c].height);
+      observed_[c].valid = BinaryMask();
+    }
+  }
+  if (camera_mask_ == 0 || seen_px < min_mask_px) return false;
+  scorer_->set_observation(observed_);
+  return true;
+}
+
+void HypothesisScorer::place(const Eigen::VectorXd& x, std::size_t slot) {
+  const std::size_t parts = body_.part_count();
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    if ((camera_mask_ & (1u << c)) == 0) continue;
+    body_.compute(*observation_->cameras[c], x, c, {X_CB_.data() + (slot * cameras_.size() + c) * parts, parts});
+  }
+}
+
+void HypothesisScorer::score_slots(std::size_t begin, std::size_t n, Eigen::VectorXd& distances) {
+  const auto start = std::chrono::steady_clock::now();
+  const std::size_t cameras = cameras_.size(), per_slot = cameras * body_.part_count();
+  scorer_->score({X_CB_.data() + begin * per_slot, n * per_slot}, {counts_.data(), n * cameras}, camera_mask_);
+  for (std::size_t i = 0; i < n; ++i) {
+    std::uint64_t in_union = 0, in_both = 0;
+    for (std::size_t c = 0; c < cameras; ++c) {
+      in_union += counts_[i * cameras + c].union_count();
+      in_both += counts_[i * cameras + c].intersection;
+    }
+    distances(static_cast<Eigen::Index>(i)) = hammoude_distance(in_union, in_both);
+  }
+  scoring_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+const Eigen::VectorXd& HypothesisScorer::score(std::size_t n) {
+  score_slots(0, n, distances_);
+  return distances_;
+}
+
+double HypothesisScorer::distance(const Eigen::VectorXd& x) {
+  place(x, slots_);
+  score_slots(slots_, 1, other_distances_);
+  return other_distances_(0);
+}
+
+bool HypothesisScorer::can_be_exchanged() const {
+  return cameras_.size() == 2 && camera_mask_ == 3u && cameras_[0].width == cameras_[1].width &&
+         cameras_[0].height == cameras_[1].height;
+}
+
+void HypothesisScorer::exchange() {
+  std::swap(observed_[0], observed_[1]);
+  scorer_->set_observation(observed_);
+}
+
+double HypothesisScorer::smallest_exchanged(std::size_t n) {
+  if (!can_be_exchanged()) return 1.0;
+  exchange();
+  score_slots(0, n, other_distances_);
+  exchange();
+  return other_distances_.head(static_cast<Eigen::Index>(n)).minCoeff();
+}
+
+double HypothesisScorer::distance_exchanged(const Eigen::VectorXd& x) {
+  if (!can_be_exchanged()) return 1.0;
+  exchange();
+  const double result = distance(x);
+  exchange();
+  return result;
+}
+
+std::string HypothesisScorer::description() const {
+  return scorer_->description() + (engine_reason_.empty() ? "" : ": " + engine_reason_);
+}
+
+double HypothesisScorer::take_scoring_ms() { return std::exchange(scoring_ms_, 0.0); }
+
+}  // namespace bodyschema

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bodyschema/estimator/body_pose_model.hpp"
+#include "bodyschema/observation/observation.hpp"
+#include "bodyschema/silhouette/silhouette_scorer.hpp"
+
+namespace bodyschema {
+
+/// Hammoude distances of hypotheses about the state to one frame's masks, equation (3) over all its
+/// pictures. Hypotheses are placed in slots and scored together. One thread.
+class HypothesisScorer {
+ public:
+  /// @param slots  hypotheses that can be scored at once
+  /// Throws gl::ContextError when the engine cannot be had.
+  HypothesisScorer(BodyPoseModel& body, const SilhouetteModel& silhouettes, std::vector<PinholeIntrinsics> cameras,
+                   const SilhouetteOptions& options, std::size_t slots);
+
+  /// The frame that hypotheses are compared with until the next call; it must live as long. A camera without
+  /// a mask is not used. False when fewer than `min_mask_px` pixels of robot are seen in all.
+  bool observe(const Observation& observation, std::size_t min_mask_px);
+
+  void place(const Eigen::VectorXd& x, std::size_t slot);
+  /// Distances of slots 0 to n - 1; valid until the next call.
+  const Eigen::VectorXd& score(std::size_t n);
+  /// The distance of one hypothesis; slots and their distances stay as they are.
+  double distance(const Eigen::VectorXd& x);
+
+  /// The same two against the pictures of the other eye: the smallest of slots 0 to n - 1, or that of one
+  /// hypothesis. 1 where there are not two pictures of one size.
+  double smallest_exchanged(std::size_t n);
+  double distance_exchanged(const Eigen::VectorXd& x);
+
+  /// The predicted silhouette of one pose of all parts in a camera.
+  BinaryMask render(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera) { return scorer_->render(X_CB, camera); }
+  /// The engine, and why it was taken.
+  [[nodiscard]] std::string description() const;
+  /// Wall clock spent drawing and counting since the last call.
+  double take_scoring_ms();
+
+ private:
+  void score_slots(std::size_t begin, std::size_t n, Eigen::VectorXd& distances);
+  [[nodiscard]] bool can_be_exchanged() const;
+  void exchange();
+
+  BodyPoseModel& body_;
+  std::vector<PinholeIntrinsics> cameras_;
+  std::string engine_reason_;
+  std::unique_ptr<SilhouetteScorer> scorer_;
+  const Observation* observation_ = nullptr;
+  std::uint32_t camera_mask_ = 0;  ///< cameras that have a mask
+  std::vector<ObservedSilhouette> observed_;
+  std::size_t slots_;  ///< and one more behind them, for `distance`
+  std::vector<Eigen::Isometry3f> X_CB_;  ///< [slot][camera][part]
+  std::vector<SilhouetteCounts> counts_;
+  Eigen::VectorXd distances_, other_distances_;
+  double scoring_ms_ = 0.0;
+};
+
+}  // namespace bodyschema
