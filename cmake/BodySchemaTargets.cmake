@@ -1,10 +1,10 @@
-# bodyschema_library(<folder> SOURCES ... [LINKS folder...] [PUBLIC lib...] [PRIVATE lib...])
+# bodyschema_library(<folder> SOURCES ... [LINKS folder...] [HEADERS folder...] [PUBLIC lib...] [PRIVATE lib...])
 #   One library per folder of src/, named bodyschema_<folder>, alias bodyschema::<folder>.
-#   LINKS names other folders; linking a storey that is not below is a configure error, so the
-#   dependency rule of docs/architecture.md cannot be broken by accident. Without SOURCES the
-#   library is header-only.
+#   LINKS names other folders, HEADERS those of which headers alone are used; a storey that is not
+#   below, and an #include from one that is not named, are configure errors, so the dependency rule
+#   of docs/architecture.md cannot be broken by accident. Without SOURCES the library is header-only.
 function(bodyschema_library folder)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;HEADERS;PUBLIC;PRIVATE" ${ARGN})
   set(target bodyschema_${folder})
   if(ARG_SOURCES)
     add_library(${target} STATIC ${ARG_SOURCES})
@@ -21,15 +21,33 @@ function(bodyschema_library folder)
   target_include_directories(${target} ${scope}
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   list(FIND BODYSCHEMA_STOREYS ${folder} own_index)
-  foreach(other IN LISTS ARG_LINKS)
+  bodyschema_check_includes(${folder} ${folder} ${ARG_LINKS} ${ARG_HEADERS})
+  foreach(other IN LISTS ARG_LINKS ARG_HEADERS)
     list(FIND BODYSCHEMA_STOREYS ${other} other_index)
-    if(other_index LESS 0 OR other_index GREATER_EQUAL own_index)
+    # Headers do not need their storey to be built (BODYSCHEMA_SILHOUETTE_ONLY).
+    if(other_index GREATER_EQUAL own_index OR (other_index LESS 0 AND other IN_LIST ARG_LINKS))
       message(FATAL_ERROR "src/${folder} may not link ${other}: it is not a storey below (BODYSCHEMA_STOREYS)")
     endif()
-    target_link_libraries(${target} ${scope} bodyschema::${other})
   endforeach()
+  list(TRANSFORM ARG_LINKS PREPEND bodyschema::)
+  target_link_libraries(${target} ${scope} ${ARG_LINKS})
   target_link_libraries(${target} ${scope} ${ARG_PUBLIC})
   set_property(GLOBAL APPEND PROPERTY BODYSCHEMA_LIBRARIES ${target})
+endfunction()
+
+# bodyschema_check_includes(<folder> <allowed folder>...)
+#   Every folder's headers lie in one include/: without this a library could use one it does not name.
+function(bodyschema_check_includes folder)
+  file(GLOB files ${PROJECT_SOURCE_DIR}/src/${folder}/*.[ch]pp ${PROJECT_SOURCE_DIR}/include/bodyschema/${folder}/*.hpp)
+  foreach(file IN LISTS files)
+    file(STRINGS ${file} lines REGEX "^#include \"bodyschema/[a-z0-9_]+/")
+    foreach(line IN LISTS lines)
+      string(REGEX REPLACE "^#include \"bodyschema/([a-z0-9_]+)/.*" "\\1" other "${line}")
+      if(NOT other IN_LIST ARGN)
+        message(FATAL_ERROR "${file} includes from ${other}, which src/${folder}/CMakeLists.txt does not name")
+      endif()
+    endforeach()
+  endforeach()
 endfunction()
 
 function(bodyschema_warnings target)
