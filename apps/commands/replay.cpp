@@ -17,12 +17,15 @@ void add_replay(CLI::App& app) {
     std::string truth;
     int overlays = 3;
     bool masks = false;
-    bool learn_first = false;
+    bool learn_online = false;
+    bool learn_first = false;  // the default now; scripts may still say so
   };
   auto a = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("replay", "Run a recorded log through the estimator");
   command->footer(
-      "Example:\n  bodyschema replay reach.log --config config/icub_right/estimator.yaml --out out/reach");
+      "Example:\n  bodyschema replay reach.log --config config/icub_right/estimator.yaml --out out/reach\n\n"
+      "Exit status: 0 when the log was read to its end, converged or not; the last lines and\n"
+      "summary.json (estimate.state) say how it ended, and bodyschema export refuses the latter.");
   command->add_option("log", a->log, "LCM log")->required();
   command->add_option("-o,--out", a->out, "Folder for estimates.jsonl, summary.json and pictures")
       ->required();
@@ -31,8 +34,10 @@ void add_replay(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));
   command->add_flag("--masks", a->masks, "Write the observed masks too");
-  command->add_flag("--learn-background-first", a->learn_first,
-                    "Learn the background from the whole log before the first estimate");
+  CLI::Option* online = command->add_flag(
+      "--learn-background-online", a->learn_online,
+      "Learn the background from the first pictures, as bodyschemad does, not from the whole log");
+  command->add_flag("--learn-background-first", a->learn_first)->group("")->excludes(online);
   a->common.add_to(*command);
   a->common.add_extended_model_to(*command);
   command->callback([a] {
@@ -47,7 +52,7 @@ void add_replay(CLI::App& app) {
     if (!a->truth.empty()) options.truth = a->truth;
     options.overlays = a->overlays;
     options.masks = a->masks;
-    options.learn_background_first = a->learn_first;
+    options.learn_background_online = a->learn_online;
     std::fputs(replay(configuration, options).c_str(), stdout);
     std::printf("\nresults in %s\n", a->out.c_str());
   });

@@ -1,5 +1,8 @@
 #include "bodyschema/diagnosis/log_diagnosis.hpp"
 
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -21,6 +24,21 @@ namespace {
 constexpr int kMostStartFrames = 150;
 constexpr int kFramesAfterConvergence = 10;
 
+const char* in_words(DropReason reason) {
+  switch (reason) {
+    case DropReason::kUnpaired: return "without partner from the other camera";
+    case DropReason::kNoEncoders: return "without encoder readings before and after";
+    case DropReason::kMissingJoint: return "without readings of a joint";
+    case DropReason::kEncoderGap: return "in a gap of the encoder readings";
+    case DropReason::kEncoderJump: return "where encoders jumped";
+    case DropReason::kClockStep: return "where the clock stepped back";
+    case DropReason::kOverload: return "beyond what may wait";
+    case DropReason::kOutOfOrder: return "with a stamp before the last one's";
+    case DropReason::kDuplicate: return "with the same stamp as another";
+  }
+  return "for another reason";
+}
+
 using diagnosis::JointStream;
 using diagnosis::LogPictures;
 
@@ -40,6 +58,10 @@ class LogDiagnosis {
   DiagnosisReport run() {
     learn();
     read();
+    // Said at once: it may well be why the log is refused.
+    if (const auto turn = describe(pipeline_.background_turn()); !turn.empty()) {
+      spdlog::warn("{}: {}", options_.log.string(), turn);
+    }
     refuse_unusable();
     auto diagnosis = options_.diagnosis;
     if (diagnosis.nuisances.empty()) diagnosis.nuisances = usual_nuisances(measurement_.roles());
@@ -90,6 +112,10 @@ class LogDiagnosis {
 
   /// What no regression says: which motion is missing altogether.
   void add_remarks(DiagnosisReport& report) const {
+    if (auto turn = describe(pipeline_.background_turn()); !turn.empty()) {
+      report.warnings.insert(report.warnings.begin(), turn + "; nothing found here holds until then");
+    }
+    if (auto lost = lost_pictures(facts_.bus, kTolerableLoss); !lost.empty()) report.warnings.push_back(std::move(lost));
     const auto& roles = measurement_.roles();
     if (!roles.head.empty() && largest_range(measurement_.views(), roles.head) < kStill_rad) {
       report.warnings.push_back(
@@ -200,6 +226,7 @@ class LogDiagnosis {
   /// Models of the recording's own parts find 86 to 99 % of their outlines, the official hand on it 67 %.
   static constexpr double kTrustedOutline = 0.75;
   static constexpr double kShapeError_px = 0.8;  ///< ... and where this is left, parts have another shape
+  static constexpr double kTolerableLoss = 0.05;  ///< of all pictures
   static constexpr double kStill_rad = 0.5 * kPi / 180.0;
   static constexpr double kStill_rad_s = 0.5 * kPi / 180.0;
   static constexpr const char* kAdvice =
@@ -218,6 +245,35 @@ class LogDiagnosis {
 };
 
 }  // namespace
+
+std::string lost_pictures(const BusStatistics& bus, double tolerable_share) {
+  std::vector<std::pair<std::uint64_t, std::string>> reasons;
+  std::uint64_t lost = 0;
+  const auto add = [&](std::uint64_t count, const char* why) {
+    if (count > 0) reasons.emplace_back(count, why);
+    lost += count;
+  };
+  const auto& sync = bus.synchroniser;
+  for (std::size_t i = 0; i < kDropReasonCount; ++i) add(sync.images_dropped[i], in_words(static_cast<DropReason>(i)));
+  std::uint64_t of_pictures = 0;  // the other faults may be of encoder messages as well
+  for (const auto& [fault, why] : {std::pair{MessageFault::kWrongSize, "another size than configured"},
+                                   {MessageFault::kUnsupportedFormat, "not gray, RGB or JPEG"},
+                                   {MessageFault::kBrokenPicture, "a broken JPEG"},
+                                   {MessageFault::kOtherKind, "gray among coloured ones or the reverse"}}) {
+    const auto count = bus.faults[static_cast<std::size_t>(fault)];
+    add(count, why);
+    of_pictures += count;
+  }
+  if (bus.images_malformed > of_pictures) add(bus.images_malformed - of_pictures, "malformed");
+  const std::uint64_t all = sync.images + bus.images_malformed;
+  if (all == 0 || static_cast<double>(lost) <= tolerable_share * static_cast<double>(all)) return "";
+  std::stable_sort(reasons.begin(), reasons.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::string text = fmt::format("{} of {} pictures are not used: ", lost, all);
+  for (std::size_t i = 0; i < reasons.size(); ++i) {
+    text += fmt::format("{}{} {}", i > 0 ? ", " : "", reasons[i].first, reasons[i].second);
+  }
+  return text;
+}
 
 DiagnosisReport diagnose_log(const Configuration& configuration, const LogDiagnosisOptions& options) {
   return LogDiagnosis(configuration, options).run();

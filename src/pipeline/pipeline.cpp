@@ -61,6 +61,12 @@ std::string digest_of(const RobotSetup& setup, const RobotModel& robot,
   return digest.text();
 }
 
+std::vector<std::string> links_of(const StereoRig& rig) {
+  std::vector<std::string> links;
+  for (const auto& camera : rig.cameras) links.push_back(camera.link);
+  return links;
+}
+
 /// The robot, with every camera on one of its links.
 std::shared_ptr<const RobotModel> load(const RobotSetup& setup, const StereoRig& rig) {
   auto robot = setup.load();
@@ -83,6 +89,8 @@ Pipeline::Pipeline(const Configuration& configuration)
       robot_(load(setup_, StereoRig::from(configuration.section("cameras")))),
       error_model_(load_error_model(setup_, robot_, StereoRig::from(configuration.section("cameras")))),
       rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
+      background_watch_(robot_, links_of(rig_)),
+      background_turned_rad_(rig_.cameras.size(), 0.0),
       estimator_(robot_, setup_, rig_, options_),
       configuration_hash_(configuration.hash()),
       model_hash_(digest_of(setup_, *robot_, error_model_)) {
@@ -118,12 +126,14 @@ void Pipeline::take_background_from(Pipeline& other) {
     }
   }
   for (std::size_t c = 0; c < eyes_.size(); ++c) eyes_[c].segmenter = std::move(other.eyes_[c].segmenter);
+  background_watch_.take_from(other.background_watch_);
 }
 
 void Pipeline::learn_from(const Observation& observation) {
   for (std::size_t c = 0; c < eyes_.size(); ++c) {
     if (!observation.cameras[c]) continue;
     const Image& image = observation.cameras[c]->image;
+    background_watch_.learned(c, observation.cameras[c]->joints.q);
     eyes_[c].segmenter.learn_from(eyes_[c].undistorter ? eyes_[c].undistorter->apply(image) : image);
   }
 }
@@ -194,6 +204,7 @@ bool Pipeline::segment(Observation& observation) {
     seen.coverage = std::move(look.coverage);
     learning_ = learning_ || look.learning;
     if (frozen(look.change)) continue;
+    watch_background(observation, c, look.learning);
     std::optional<BinaryMask> predicted;
     if (tracking_ && vision_.method == SegmentationMethod::kLearnedBackground) {
       predicted = estimator_.predicted_silhouette(observation, c, true);
@@ -208,6 +219,21 @@ bool Pipeline::segment(Observation& observation) {
   segmentation_ms_ =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   return !learning_;
+}
+
+/// Only methods that compare with a background that was known before.
+void Pipeline::watch_background(const Observation& observation, std::size_t camera, bool learning) {
+  if (vision_.method != SegmentationMethod::kLearnedBackground &&
+      vision_.method != SegmentationMethod::kBackgroundPicture) {
+    return;
+  }
+  const CameraObservation& seen = *observation.cameras[camera];
+  background_watch_.learned(camera, seen.joints.q);
+  if (learning) return;
+  const double turned_rad = background_watch_.turned(camera, seen.joints.q);
+  BinaryMask robot;
+  if (turned_rad > 0.0) robot = estimator_.predicted_silhouette(observation, camera, true);
+  background_turned_rad_[camera] = background_watch_.count(turned_rad, seen.mask, seen.valid, robot) ? turned_rad : 0.0;
 }
 
 Estimate Pipeline::estimate(const Observation& observation) {

@@ -95,7 +95,7 @@ class Replay {
   }
 
   std::string run() {
-    if (options_.learn_background_first) {
+    if (pipeline_.learns_background() && !options_.learn_background_online) {
       for_each("learning the background", [&](Observation& o, const Observation*) { pipeline_.learn_from(o); });
       pipeline_.finish_learning();
     }
@@ -262,10 +262,38 @@ class Replay {
     }
     table += "weakest direction: " + last_.weakest.text + '\n';
     if (truth_) table += truth_table(summary);
+    table += closing_lines(summary);
     std::ofstream file(options_.out / "summary.json");
     file << summary.dump(2) << '\n';
     if (!file.flush()) throw FileError((options_.out / "summary.json").string() + ": cannot be written");
     return table;
+  }
+
+  /// How it ended, and what is wrong with the log as a whole.
+  std::string closing_lines(Json& summary) const {
+    std::string lines;
+    if (last_.state != EstimatorState::kConverged) {
+      lines = fmt::format("\nNOT CONVERGED: the log ended in state '{}': {}\n", to_string(last_.state),
+                          why_not_converged());
+    }
+    if (const std::string turn = describe(pipeline_.background_turn()); !turn.empty()) {
+      lines += "\nWARNING: " + turn + '\n';
+      summary["warnings"].push_back(turn);
+    }
+    return lines;
+  }
+
+  [[nodiscard]] std::string why_not_converged() const {
+    switch (last_.state) {
+      case EstimatorState::kDiverged:
+        return fmt::format("the best prediction does not fit the pictures (likelihood {:.2f}); do not use these offsets",
+                           last_.best_likelihood);
+      case EstimatorState::kHandNotInView:
+        return last_view_ ? "the arm had left the pictures; the offsets are those of before" : "the arm is in no picture";
+      case EstimatorState::kLearningBackground: return "it holds too few pictures to learn the background from";
+      default: return fmt::format("the offsets have not settled, the hand is known to {:.1f} mm; do not use them yet",
+                                  1e3 * last_.hand_sd_m);
+    }
   }
 
   std::string truth_table(Json& summary) {

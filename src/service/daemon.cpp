@@ -382,6 +382,7 @@ class Daemon {
       if (!picture.repeated || since_us < 0) since_us = now;
       facts.unchanged_ms = ms_between(since_us, now);
       facts.moved_meanwhile_rad = picture.moved_rad;
+      facts.background_turned_rad = session_->pipeline->background_turned_rad(c);
     }
   }
 

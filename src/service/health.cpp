@@ -164,6 +164,18 @@ std::optional<std::string> camera_warning(const HealthFacts& f) {
   return std::nullopt;
 }
 
+/// The background is another one than was learned, because the head has turned.
+std::string turned_away(const HealthFacts& f) {
+  double turned_rad = 0.0;
+  for (const auto& camera : f.cameras) {
+    if (camera.age_ms >= 0.0 && camera.age_ms < kStale_ms) turned_rad = std::max(turned_rad, camera.background_turned_rad);
+  }
+  if (turned_rad <= 0.0) return "";
+  return fmt::format("the head has turned by {:.1f} deg from where the background was learned, masks are wrong: set "
+                     "vision.method: statistics",
+                     degrees(turned_rad));
+}
+
 std::optional<std::string> warning(const HealthFacts& f) {
   if (f.refused.messages > 0) {
     return fmt::format("{} messages of a second source on {}, {}, refused in the last second", f.refused.messages,
@@ -173,6 +185,7 @@ std::optional<std::string> warning(const HealthFacts& f) {
     return std::string("the clock of the time stamps stepped back; started anew");
   }
   if (const auto camera = camera_warning(f)) return camera;
+  if (auto turned = turned_away(f); !turned.empty()) return turned;
   if (f.estimate.state == EstimatorState::kLearningBackground) {
     return std::string("learning the background: keep the arm out of view or moving");
   }
@@ -228,6 +241,10 @@ Health verdict(const HealthFacts& facts) {
 
 Health assess(const HealthFacts& facts) {
   Health health = verdict(facts);
+  // Said beside what it brings about: estimates that diverge, an arm not found.
+  if (const std::string turned = turned_away(facts); !turned.empty() && health.sentence != turned) {
+    health.sentence += "; " + turned;
+  }
   // A file that ends is said beside whatever else there is to say: it would not be missed otherwise until
   // it is needed.
   const auto add = [&](const char* what, const std::string& failure) {

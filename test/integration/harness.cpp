@@ -373,7 +373,8 @@ std::map<Microseconds, std::string> replay_estimates(const fs::path& log, const 
                                                      const std::vector<std::string>& more) {
   fs::create_directories(out);
   std::vector<std::string> command = {"bodyschema", "replay", log.string(), "--config", reach_configuration(),
-                                      "--overlays", "0", "--out", out.string()};
+                                      "--overlays", "0", "--learn-background-online", "--out",
+                                      out.string()};
   command.insert(command.end(), more.begin(), more.end());
   Process replay(command, out);
   const auto status = replay.wait(Seconds(200));

@@ -134,6 +134,64 @@ TEST_F(ReplayTest, ARigWithARightCameraAloneIsSimulatedAndReplayedUnderItsName) 
   EXPECT_LT(summary["errors"]["right"]["last_frames"]["position_mm"]["after"].get<double>(), 5.0);
 }
 
+/// The arm is in view from the first picture on: learned from the first pictures it would be background.
+TEST_F(ReplayTest, LearnsTheBackgroundFromTheWholeLogUnlessToldOtherwise) {
+  const Configuration c = Configuration::load(kConfig);
+  const RobotSetup setup = RobotSetup::from(c.section("robot"));
+  auto settings = simulator::SimulatorSettings::from(c.section("simulator"));
+  settings.background_frames = 0;
+  settings.entry_frames = 0;
+  simulator::SimulationPlan plan;
+  plan.seed = 1;
+  plan.frames = 100;
+  plan.offsets_deg = {{"r_shoulder_pitch", 5}, {"r_shoulder_roll", 4}, {"r_elbow", -2}, {"r_wrist_pitch", -7}};
+  ReplayOptions o = options("in_view");
+  o.log = folder_ / "in_view.log";
+  o.truth = folder_ / "in_view.json";
+  o.overlays = 0;
+  {
+    simulator::Simulator simulator(setup.load(), setup, StereoRig::from(c.section("cameras")), settings, plan);
+    LogWriter log(o.log);
+    simulator::FramePublisher publisher(simulator.joint_names(), {});
+    simulator::TruthWriter truth(*o.truth, simulator, setup);
+    while (auto frame = simulator.next()) {
+      publisher.publish(*frame, log);
+      truth.add(*frame);
+    }
+    truth.close();
+  }
+  const auto largest_error_mm = [&](int from) {
+    std::ifstream lines(o.out / "estimates.jsonl");
+    double largest = 0.0;
+    std::string line;
+    for (int i = 0; std::getline(lines, line); ++i) {
+      if (i < from) continue;
+      largest = std::max(largest, nlohmann::json::parse(line)["error_left"]["position_mm"].get<double>());
+    }
+    return largest;
+  };
+  constexpr int kLearning = 20;
+  for (const auto& [mode, from, bound_mm] : {std::tuple<std::string, int, double>{"best", 3, 2.0}, {"paper", 60, 15.0}}) {
+    replay(configuration({"estimator.mode=" + mode}), o);
+    EXPECT_LT(largest_error_mm(from), bound_mm) << mode;
+    std::printf("%s, learned from the whole log: %.2f mm at most\n", mode.c_str(), largest_error_mm(from));
+  }
+  o.learn_background_online = true;
+  replay(configuration(), o);
+  EXPECT_GT(largest_error_mm(kLearning), 4.0);
+  std::printf("best, learned from the first pictures: %.2f mm at most\n", largest_error_mm(kLearning));
+}
+
+TEST_F(ReplayTest, SaysSoWhenItEndsWithoutHavingConverged) {
+  ReplayOptions o = options("cut");
+  o.learn_background_online = true;
+  o.overlays = 0;
+  EXPECT_THAT(replay(configuration({"vision.learning_frames=1000"}), o),
+              HasSubstr("\nNOT CONVERGED: the log ended in state 'learning_background': it holds too few pictures"));
+  const std::string good = replay(configuration(), o);
+  EXPECT_THAT(good, ::testing::Not(HasSubstr("NOT CONVERGED")));
+}
+
 TEST_F(ReplayTest, TwoReplaysAreIdenticalWhateverTheThreads) {
   replay(configuration({"silhouette.threads=1"}), options("a"));
   for (const char* threads : {"silhouette.threads=2", "silhouette.threads=3"}) {

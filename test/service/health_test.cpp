@@ -64,6 +64,19 @@ TEST(Health, EncodersFellSilent) {
   expect(facts, HealthLevel::kStale, "no encoder readings on ICUB_JOINT_STATE for 61 s");
 }
 
+TEST(Health, TheHeadHasTurnedFromItsBackground) {
+  HealthFacts facts = well();
+  facts.cameras[1].background_turned_rad = 0.21;
+  expect(facts, HealthLevel::kWarn,
+         "the head has turned by 12.0 deg from where the background was learned, masks are wrong: set "
+         "vision.method: statistics");
+  facts.estimate.state = EstimatorState::kDiverged;
+  expect(facts, HealthLevel::kError, "diverged: ");
+  expect(facts, HealthLevel::kError, "; the head has turned by 12.0 deg");
+  facts.cameras[1].age_ms = 5000.0;  // not known of what it sees now
+  EXPECT_THAT(assess(facts).sentence, testing::Not(HasSubstr("head")));
+}
+
 TEST(Health, EncodersLateButUsed) {
   HealthFacts facts = well();
   facts.encoder_lag_ms = 140.0;

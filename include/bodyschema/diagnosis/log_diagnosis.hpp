@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "bodyschema/bus/observation_stream.hpp"
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/diagnosis/diagnoser.hpp"
 
@@ -16,6 +17,10 @@ struct LogDiagnosisOptions {
   bool quiet = false;              ///< no progress bars
   DiagnosisOptions diagnosis;      ///< `nuisances` empty: the usual ones
 };
+
+/// How many of a log's pictures were not used and why, in one sentence; empty where that is at most this
+/// share of all.
+[[nodiscard]] std::string lost_pictures(const BusStatistics& bus, double tolerable_share);
 
 /// Diagnoses a recorded log: encoders and pictures in, report.json, report.html and
 /// extended_model.yaml out.

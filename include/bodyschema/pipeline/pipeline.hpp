@@ -12,6 +12,7 @@
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/effects/error_model.hpp"
 #include "bodyschema/estimator/estimator.hpp"
+#include "bodyschema/pipeline/background_watch.hpp"
 #include "bodyschema/pipeline/frozen_picture.hpp"
 #include "bodyschema/robot/robot_model.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
@@ -54,6 +55,8 @@ class Pipeline {
   /// `finish_learning`.
   void learn_from(const Observation& observation);
   void finish_learning();
+  /// Whether the background is learned from pictures (`vision.method: learned_background`).
+  [[nodiscard]] bool learns_background() const { return vision_.method == SegmentationMethod::kLearnedBackground; }
 
   [[nodiscard]] const RobotModel& robot() const { return *robot_; }
   [[nodiscard]] std::shared_ptr<const RobotModel> shared_robot() const { return robot_; }
@@ -67,6 +70,11 @@ class Pipeline {
   [[nodiscard]] Estimator& estimator() { return estimator_; }
   /// Whether a camera repeats its picture, as of the last observation that had one of it.
   [[nodiscard]] const PictureChange& picture(std::size_t camera) const { return changes_[camera]; }
+  /// How far a camera has turned from where its background was learned, where the background changed with
+  /// it; 0: it did not. As of the last observation that had a picture of it.
+  [[nodiscard]] double background_turned_rad(std::size_t camera) const { return background_turned_rad_[camera]; }
+  /// The same over all observations so far.
+  [[nodiscard]] const BackgroundTurn& background_turn() const { return background_watch_.total(); }
   /// Time that the last `process` or `segment` spent on masks before it could estimate, ms.
   [[nodiscard]] double segmentation_ms() const { return segmentation_ms_; }
   [[nodiscard]] const std::string& configuration_hash() const { return configuration_hash_; }
@@ -95,6 +103,7 @@ class Pipeline {
   [[nodiscard]] static bool frozen(const PictureChange& change);
   Looks look(const Observation& observation);
   Looks looks_at(const Observation& observation);
+  void watch_background(const Observation& observation, std::size_t camera, bool learning);
 
   RobotSetup setup_;
   VisionSetup vision_;
@@ -105,6 +114,8 @@ class Pipeline {
   StereoRig rig_;
   std::vector<Eye> eyes_;  ///< those of the other thread while it looks ahead
   std::vector<PictureChange> changes_;
+  BackgroundWatch background_watch_;
+  std::vector<double> background_turned_rad_;
   Estimator estimator_;
   std::string configuration_hash_;
   std::string model_hash_;

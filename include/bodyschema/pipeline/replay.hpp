@@ -14,9 +14,10 @@ struct ReplayOptions {
   std::optional<std::filesystem::path> truth;   ///< adds errors; never seen by the estimator
   int overlays = 3;                             ///< overlay pictures spread over the log
   bool masks = false;                           ///< write the masks beside them
-  /// Learn the background from all pictures of the log before the first estimate. The daemon
-  /// cannot look ahead, so estimates then differ from its own.
-  bool learn_background_first = false;
+  /// Learn the background (`vision.method: learned_background`) from the first pictures, as the daemon
+  /// does, which cannot look ahead: with the arm in them it would be learned as background. Otherwise it
+  /// is learned from all pictures of the log before the first estimate.
+  bool learn_background_online = false;
 };
 
 /// Runs a recorded log through the same code as the daemon, as fast as it can, and writes

@@ -26,6 +26,7 @@ struct CameraFacts {
   double brightness = 255.0;     ///< mean of its last picture, 0 to 255
   double unchanged_ms = 0.0;     ///< how long its pictures have been the same, bit for bit
   double moved_meanwhile_rad = 0.0;  ///< largest joint motion in that time
+  double background_turned_rad = 0.0;  ///< Pipeline::background_turned_rad()
 };
 
 /// Whether its pictures have stayed the same although the arm moved.

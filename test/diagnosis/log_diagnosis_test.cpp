@@ -1,0 +1,80 @@
+#include "bodyschema/diagnosis/log_diagnosis.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "bodyschema/bus/log.hpp"
+#include "bodyschema/simulator/recording.hpp"
+
+namespace bodyschema {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(LostPictures, AreSaidWithTheReasonsMostFrequentFirst) {
+  BusStatistics bus;
+  bus.synchroniser.images = 95;
+  bus.images_malformed = 5;
+  EXPECT_EQ(lost_pictures(bus, 0.05), "") << "5 of 100";
+  bus.faults[static_cast<std::size_t>(MessageFault::kWrongSize)] = 4;
+  bus.faults[static_cast<std::size_t>(MessageFault::kNotFinite)] = 40;  // of encoders
+  bus.synchroniser.images_dropped[static_cast<std::size_t>(DropReason::kNoEncoders)] = 20;
+  EXPECT_EQ(lost_pictures(bus, 0.05),
+            "25 of 100 pictures are not used: 20 without encoder readings before and after, 4 another size than "
+            "configured, 1 malformed");
+  EXPECT_EQ(lost_pictures({}, 0.05), "");
+}
+
+/// A log of 25 s whose head looks about in a room, with `missing_share` of its encoder readings missing.
+void record(const fs::path& file, bool clutter, double missing_share) {
+  const Configuration c = Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml");
+  const RobotSetup setup = RobotSetup::from(c.section("robot"));
+  auto settings = simulator::SimulatorSettings::from(c.section("simulator"));
+  settings.clutter = clutter;
+  settings.head_moves = true;
+  settings.supersampling = 1;
+  settings.camera_rate_hz = 4.0;
+  simulator::SimulationPlan plan;
+  plan.seed = 5;
+  plan.motion = simulator::Motion::kBabble;
+  plan.seconds = 25.0;
+  simulator::Simulator simulator(setup.load(), setup, StereoRig::from(c.section("cameras")), settings, plan);
+  LogWriter log(file);
+  simulator::FramePublisher publisher(simulator.joint_names(), {});
+  for (int i = 0; auto frame = simulator.next(); ++i) {
+    if (i > (1.0 - missing_share) * simulator.frame_count()) frame->encoders.clear();
+    publisher.publish(*frame, log);
+  }
+}
+
+DiagnosisReport diagnosis(const fs::path& log) {
+  Configuration c = Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml",
+                                        {"silhouette.engine=contour", "filter.particles=50",
+                                         "bus.max_image_gap_ms=1000", "bus.max_encoder_gap_ms=1000"});
+  LogDiagnosisOptions options;
+  options.log = log;
+  options.quiet = true;
+  return diagnose_log(c, options);
+}
+
+TEST(LogDiagnosis, WarnsOfATurnedHeadBeforeARoomAndOfPicturesNotUsed) {
+  const fs::path log = fs::temp_directory_path() / ("log_diagnosis_" + std::to_string(getpid()) + ".lcmlog");
+  record(log, true, 0.2);
+  const auto room = diagnosis(log);
+  EXPECT_THAT(room.warnings, Contains(HasSubstr("set vision.method: statistics")));
+  EXPECT_THAT(room.warnings, Contains(HasSubstr("pictures are not used: ")));
+  record(log, false, 0.0);
+  const auto wall = diagnosis(log);
+  EXPECT_THAT(wall.warnings, Not(Contains(HasSubstr("vision.method"))));
+  EXPECT_THAT(wall.warnings, Not(Contains(HasSubstr("not used"))));
+  fs::remove(log);
+}
+
+}  // namespace
+}  // namespace bodyschema
