@@ -254,13 +254,16 @@ void Player::work(const std::stop_token& stop) {
   }
 }
 
-Robot::Robot(const std::string& lcm_url, const fs::path& log, double speed) : link_(lcm_url), speed_(speed) {
+Robot::Robot(const std::string& lcm_url, const fs::path& log, double speed, std::size_t every)
+    : link_(lcm_url), speed_(speed) {
   LogReader reader(log);
+  std::size_t pictures = 0;
   for (LogEvent event; reader.next(event);) {
     Message message;
     message.time_us = event.time_us;
     const int size = static_cast<int>(event.data.size());
     if (event.channel == "ICUB_CAMERAS") {
+      if (pictures++ % every != 0) continue;
       message.pictures.emplace().decode(event.data.data(), 0, size);
     } else if (event.channel == "ICUB_JOINT_STATE") {
       message.joints.emplace().decode(event.data.data(), 0, size);

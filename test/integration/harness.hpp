@@ -142,7 +142,8 @@ class Robot {
     std::function<bool(bot_core::images_t&, LcmLink&)> pictures;
     std::function<bool(bot_core::joint_state_t&, LcmLink&)> joints;
   };
-  Robot(const std::string& lcm_url, const std::filesystem::path& log, double speed = 1.0);
+  /// @param speed  times real time; @param every  of so many picture messages one goes out
+  Robot(const std::string& lcm_url, const std::filesystem::path& log, double speed = 1.0, std::size_t every = 1);
   ~Robot();
   Robot(const Robot&) = delete;
   Robot& operator=(const Robot&) = delete;

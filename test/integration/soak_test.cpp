@@ -15,7 +15,9 @@
 /// The real daemon at 30 Hz for as long as one likes, faults of the world at random: no crash, memory
 /// flat, no drift of what a frame costs, every picture accounted for. scripts/soak runs it; ctest only
 /// with -C soak.
-///   BODYSCHEMA_SOAK_S (s), BODYSCHEMA_SEED, BODYSCHEMA_SOAK_RATE_HZ (30)
+///   BODYSCHEMA_SOAK_S (s on the clock), BODYSCHEMA_SEED, BODYSCHEMA_SOAK_RATE_HZ (30 pictures a second on the
+///   clock), BODYSCHEMA_SOAK_CAMERA_HZ (30 pictures a second of the robot's time, 30 / n): 5 Hz played at 30 Hz are
+///   six times as many simulated seconds
 namespace bodyschema::integration {
 namespace {
 
@@ -119,7 +121,11 @@ TEST(Soak, DaemonLivesThroughFaultsAtRandom) {
   const double length_s = number_of("BODYSCHEMA_SOAK_S", 120.0);
   const double rate_hz = number_of("BODYSCHEMA_SOAK_RATE_HZ", 30.0);
   const auto seed = static_cast<unsigned>(number_of("BODYSCHEMA_SEED", std::random_device{}()));
-  std::printf("%.0f s at %.0f Hz, BODYSCHEMA_SEED=%u\n", length_s, rate_hz, seed);
+  const auto every = static_cast<std::size_t>(std::lround(30.0 / number_of("BODYSCHEMA_SOAK_CAMERA_HZ", 30.0)));
+  ASSERT_GE(every, 1u);
+  const double speed = rate_hz * static_cast<double>(every) / 30.0;
+  std::printf("%.0f s at %.0f Hz, %.0f simulated seconds, BODYSCHEMA_SEED=%u\n", length_s, rate_hz, speed * length_s,
+              seed);
   std::mt19937 random(seed);
   const auto between = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
@@ -135,7 +141,7 @@ TEST(Soak, DaemonLivesThroughFaultsAtRandom) {
     std::this_thread::sleep_for(std::chrono::seconds(3));
   }
   Listener listener(url);
-  Robot robot(url, reach_log(), rate_hz / 30.0);
+  Robot robot(url, reach_log(), speed, every);
 
   const auto stall = std::make_shared<faults::Stall>();
   const std::vector<faults::Named> faults = faults::all(seed, stall);
