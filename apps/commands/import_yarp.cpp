@@ -25,7 +25,8 @@ void add_import_yarp(CLI::App& app) {
   command->footer(
       "Example:\n  bodyschema import-yarp recording/yarp --config config/icub_unity/estimator.yaml "
       "--out recording.log\n\nThe recording holds one folder per port with data.log and info.log; the "
-      "section\nyarp_import of the configuration says which column is which joint.");
+      "section\nyarp_import of the configuration says which column is which joint. Bad lines and "
+      "pictures\nare left out and counted, up to 5 % of a folder's.");
   command->add_option("recording", a->recording, "Folder of the recording")->required();
   command->add_option("-c,--config", a->config, "Configuration file with the section yarp_import")
       ->required();
@@ -59,6 +60,12 @@ void add_import_yarp(CLI::App& app) {
       std::printf("%llu rows left out: their stamp was not after the one before\n",
                   static_cast<unsigned long long>(summary.rows_out_of_order));
     }
+    if (summary.bad_lines + summary.bad_pictures > 0) {
+      std::printf("%llu bad lines and %llu bad pictures left out; the first: %s\n",
+                  static_cast<unsigned long long>(summary.bad_lines),
+                  static_cast<unsigned long long>(summary.bad_pictures), summary.first_bad.c_str());
+    }
+    for (const auto& warning : summary.warnings) std::printf("warning: %s\n", warning.c_str());
   });
 }
 

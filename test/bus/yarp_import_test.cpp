@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <set>
 
 #include "bodyschema/bus/log.hpp"
@@ -68,6 +69,7 @@ yarp_import:
     return import_yarp(directory_, options(), Channels::with_prefix("ICUB"), directory_ / "out.log");
   }
   std::string error() {
+    std::filesystem::remove(directory_ / "out.log");  // of an import before
     try {
       import();
     } catch (const FileError& e) {
@@ -169,10 +171,189 @@ TEST_F(YarpImport, NamesFileAndLineOfWhatIsWrong) {
               AllOf(HasSubstr("left/data.log:2"), HasSubstr("2x2"), HasSubstr("4x2")));
 }
 
+/// `rows` arm rows with a picture beside every tenth; `bad` replaces row 7.
+std::string arm_rows(int rows, const std::string& bad) {
+  std::string text;
+  for (int i = 1; i <= rows; ++i) {
+    text += i == 7 ? bad : "-1 " + std::to_string(100.0 + 0.01 * i) + " 90 7 6\n";
+  }
+  return text;
+}
+
+TEST_F(YarpImport, LeavesOutAFewBadLinesAndCountsThem) {
+  for (const std::string bad : {"-1 100.07 90 7\n", "-1 100.07 90 7 nan\n", "-1 100.07 90 7 6x\n", "-1 10",
+                                "-1 soon 90 7 6\n", "x 100.07 90 7 6\n", "-1 100.07 90 7 6 5\n"}) {
+    write_recording();
+    // Cut: two rows run into one.
+    write("arm/data.log", arm_rows(40, bad));
+    const auto summary = import();
+    EXPECT_EQ(summary.bad_lines, 1u) << bad;
+    EXPECT_EQ(summary.encoder_rows, bad.back() == '\n' ? 41u : 40u) << bad;
+    EXPECT_THAT(summary.first_bad, HasSubstr("arm/data.log:7: ")) << bad;
+    write("arm/data.log", arm_rows(19, bad));
+    EXPECT_THAT(error(), HasSubstr("arm/data.log:7: ")) << bad << ": 1 of 19 is more than 5 %";
+  }
+  write_recording();
+  write("arm/data.log", arm_rows(40, std::string(100'000, '1') + "\n"));
+  EXPECT_EQ(import().bad_lines, 1u);
+}
+
+TEST_F(YarpImport, LeavesOutAFewBadPicturesAndCountsThem) {
+  write_recording();
+  std::string lines;
+  for (int i = 0; i < 40; ++i) {
+    lines += "-1 " + std::to_string(100.0 + 0.01 * i) + (i == 5 ? " gone.ppm\n" : i == 6 ? " small.ppm\n" : " a.ppm\n");
+  }
+  write("left/small.ppm", ppm(2, 2, 's'));
+  write("left/data.log", lines);
+  const auto summary = import();
+  EXPECT_EQ(summary.left_pictures, 38u);
+  EXPECT_EQ(summary.bad_pictures, 2u);
+  EXPECT_EQ(summary.bad_lines, 0u);
+  EXPECT_THAT(summary.first_bad, AllOf(HasSubstr("left/data.log:6"), HasSubstr("gone.ppm is missing")));
+  write("left/data.log", lines + "-1 100.5 gone.ppm\n");
+  EXPECT_THAT(error(), AllOf(HasSubstr("left/data.log:6"), HasSubstr("the first of 3 bad pictures of 41")));
+}
+
+/// What yarpdatadumper writes with --txTime, --rxTime, both or neither, with and without stamps in the messages.
+TEST_F(YarpImport, TakesOneStampOrTwoAsTheyAreWritten) {
+  const auto first_stamp_of = [&](const std::string& info, const std::string& rows) {
+    write_recording();
+    std::filesystem::remove_all(directory_ / "left");
+    write("left/data.log", "0 1600000000.500000 1600000000.600000 a.ppm [rgb]\n");
+    write("left/info.log", info);
+    write("left/a.ppm", ppm(4, 2, 'L'));
+    write("right/data.log", "0 1600000000.500000 b.ppm [mono]\n");
+    write("arm/info.log", info);
+    write("arm/data.log", rows);
+    write("head/data.log", "-1 1600000000.000000 10.0 4.0\n-1 1600000002.000000 10.0 4.0\n");
+    import();
+    LogReader reader(directory_ / "out.log");
+    LogEvent event;
+    while (reader.next(event)) {
+      JointStateMessage joints;
+      if (event.channel == "ICUB_JOINT_STATE" && decode(event.data, joints).ok() && joints.names[0] == "tip") {
+        EXPECT_NEAR(joints.position_rad[1], radians(90.0), 1e-5);
+        return event.time_us - 1'600'000'000'000'000;
+      }
+    }
+    return std::int64_t{-1};
+  };
+  const std::string tx = "7 1600000000.100000 ", rx = "7 1600000000.300000 ";
+  const std::string values = "90 7 6\n";
+  EXPECT_EQ(first_stamp_of("Type: Bottle;\nStamp: tx;\n", tx + values), 100'000);
+  EXPECT_EQ(first_stamp_of("Type: Bottle;\nStamp: rx;\n", rx + values), 300'000);
+  EXPECT_EQ(first_stamp_of("Type: Bottle;\nStamp: tx+rx;\n", tx + "1600000000.300000 " + values), 100'000);
+  // --txTime where messages carry no stamp: the sender's is 0, and info.log speaks of one.
+  EXPECT_EQ(first_stamp_of("Type: Bottle;\nStamp: tx;\n", "-1 0.000000 1600000000.300000 " + values), 300'000);
+  EXPECT_EQ(first_stamp_of("Type: Bottle;\nStamp: tx+rx;\n", "-1 0.000000 1600000000.300000 " + values), 300'000);
+  EXPECT_EQ(first_stamp_of("", tx + "1600000000.300000 " + values), 100'000) << "no info.log";
+}
+
+TEST_F(YarpImport, ReadsPngAndJpegPictures) {
+  // What `--type image_png` and `--type image_jpg` write; 4x2 px, every pixel (200, 100, 50).
+  Image picture(4, 2, 3);
+  for (std::size_t i = 0; i < 8; ++i) {
+    picture.data[3 * i] = 200;
+    picture.data[3 * i + 1] = 100;
+    picture.data[3 * i + 2] = 50;
+  }
+  cv::Mat bgr(2, 4, CV_8UC3, cv::Scalar(50, 100, 200));
+  const auto file = [&](const std::string& name) { return (directory_ / name).string(); };
+  const auto first_pixel = [&] {
+    LogReader reader(directory_ / "out.log");
+    LogEvent event;
+    while (reader.next(event)) {
+      ImagesView view;
+      Image image;
+      if (event.channel != "ICUB_CAMERAS" || !decode(event.data, view).ok() ||
+          view.images[0].type != bot_core::images_t::LEFT || !unpack(view.images[0], image).ok()) {
+        continue;
+      }
+      EXPECT_EQ(image.width, 4);
+      EXPECT_EQ(image.height, 2);
+      return std::vector<int>(image.data.begin(), image.data.begin() + image.channels);
+    }
+    return std::vector<int>();
+  };
+  for (const std::string name : {"00000000.png", "00000000.jpg"}) {
+    write_recording();
+    write("left/data.log", "0 100.0 " + name + " [rgb]\n");
+    ASSERT_TRUE(cv::imwrite(file("left/" + name), bgr));
+    import();
+    const auto pixel = first_pixel();
+    ASSERT_EQ(pixel.size(), 3u) << name;
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(pixel[c], picture.data[c], 3) << name;
+    std::filesystem::resize_file(directory_ / "left" / name, std::filesystem::file_size(file("left/" + name)) - 14);
+    EXPECT_THAT(error(), HasSubstr(name)) << "cut short";
+    std::filesystem::resize_file(directory_ / "left" / name, 10);
+    EXPECT_THAT(error(), HasSubstr(name)) << "cut in its header";
+  }
+  write_recording();
+  write("left/data.log", "0 100.0 frame_00000000\n");
+  EXPECT_THAT(error(), HasSubstr("is a frame of a video"));
+}
+
+TEST_F(YarpImport, WarnsOfReadingsThatLookLikeTheOtherUnit) {
+  write_recording();
+  EXPECT_TRUE(import().warnings.empty());
+  auto in_radians = options();
+  in_radians.encoders_in_degrees = false;
+  const auto import_with = [&](const YarpImportOptions& o) {
+    return import_yarp(directory_, o, Channels::with_prefix("ICUB"), directory_ / "out.log");
+  };
+  EXPECT_THAT(import_with(in_radians).warnings, ElementsAre(HasSubstr("yarp_import.encoder_unit: deg")));
+  write("head/data.log", "-1 100.0 0.17 0.07\n-1 100.02 0.17 0.07\n");
+  write("arm/data.log", "-1 100.0 1.57 120 -2.5\n-1 100.01 1.58 120 -2.5\n");  // the second column is not used
+  EXPECT_THAT(import().warnings, ElementsAre(AllOf(HasSubstr("beyond 2.50"), HasSubstr("yarp_import.encoder_unit: rad"))));
+  EXPECT_TRUE(import_with(in_radians).warnings.empty());
+}
+
+TEST_F(YarpImport, AnArmWithoutFingersMayHaveFewerColumns) {
+  write_recording();
+  write("arm/data.log", "-1 100.001 90.0\n-1 100.011 91.0\n-1 100.021 92.0\n");
+  EXPECT_THAT(error(), HasSubstr("has 1 values, expected 3"));
+  const auto configuration = Configuration::parse(R"(
+yarp_import:
+  encoders: {head: [version, vergence], arm: [elbow, "-", distal]}
+  optional_from: {arm: "-"}
+  combined_joints: {l_pan: {version: 1, vergence: 0.5}, tip: {distal: 0.5}}
+  images: {left: left}
+)");
+  const auto with_hand = YarpImportOptions::from(configuration.section("yarp_import"));
+  configuration.reject_unknown_keys();
+  const auto summary = import_yarp(directory_, with_hand, Channels::with_prefix("ICUB"), directory_ / "out.log");
+  EXPECT_EQ(summary.encoder_rows, 5u);
+  EXPECT_THAT(summary.warnings, ElementsAre(AllOf(HasSubstr("arm: rows end before '-' (1 of 3 columns)"),
+                                                  HasSubstr("robot: {fixed_joints_deg: {tip: 0}}"))));
+  write("arm/data.log", "-1 100.001 90.0 1\n");
+  EXPECT_THROW(import_yarp(directory_, with_hand, Channels::with_prefix("ICUB"), directory_ / "out.log"), FileError);
+  write_recording();
+  EXPECT_TRUE(import_yarp(directory_, with_hand, Channels::with_prefix("ICUB"), directory_ / "out.log").warnings.empty());
+}
+
+TEST_F(YarpImport, FoldersOfAnIncludedFileCanBeTakenOut) {
+  write_recording();
+  write("base.yaml", "yarp_import:\n  encoders: {head: [version, vergence], rightArm: [elbow, '-', distal], leftArm: [x]}\n"
+                     "  optional_from: {rightArm: '-'}\n"
+                     "  combined_joints: {l_pan: {version: 1}, r_pan: {x: 1}}\n"
+                     "  images: {left: images/left, right: images/right}\n");
+  write("mine.yaml", "include: base.yaml\nyarp_import:\n  encoders: {rightArm: [], leftArm: null, arm: [elbow, '-', distal]}\n"
+                     "  combined_joints: {r_pan: null}\n  images: {left: left, right: ''}\n");
+  const auto configuration = Configuration::load(directory_ / "mine.yaml");
+  const auto options = YarpImportOptions::from(configuration.section("yarp_import"));
+  configuration.reject_unknown_keys();
+  const auto summary = import_yarp(directory_, options, Channels::with_prefix("ICUB"), directory_ / "out.log");
+  EXPECT_EQ(summary.encoder_rows, 5u);
+  EXPECT_EQ(summary.left_pictures, 1u);
+  EXPECT_EQ(summary.right_pictures, 0u);
+}
+
 TEST_F(YarpImport, NamesWhatIsMissing) {
   write_recording();
   std::filesystem::remove_all(directory_ / "arm");
-  EXPECT_THAT(error(), AllOf(HasSubstr("no such folder"), HasSubstr("yarp_import.encoders.arm")));
+  EXPECT_THAT(error(), AllOf(HasSubstr("no such folder"), HasSubstr("yarp_import.encoders.arm"),
+                             HasSubstr("it holds head, left, right")));
   EXPECT_THROW(import_yarp(directory_ / "nowhere", options(), Channels::with_prefix("A"), directory_ / "out.log"), FileError);
   write_recording();
   EXPECT_THROW(import_yarp(directory_, options(), Channels::with_prefix("A"), directory_ / "no/folder/out.log"), FileError);
@@ -192,6 +373,9 @@ TEST_F(YarpImport, ConfigurationErrorsNameTheKey) {
   EXPECT_THAT(error_in("yarp_import: {encoders: {a: [x, x]}, images: {left: l}}"), HasSubstr("'x' only once"));
   EXPECT_THAT(error_in("yarp_import: {encoders: {a: [version]}, images: {left: l}, combined_joints: {pan: {verson: 1}}}"),
               HasSubstr("did you mean 'version'"));
+  EXPECT_THAT(error_in("yarp_import: {encoders: {a: [x, y]}, optional_from: {a: x}, images: {left: l}}"),
+              HasSubstr("a column of this folder, not its first"));
+  EXPECT_THAT(error_in("yarp_import: {encoders: {a: []}, images: {left: l}}"), HasSubstr("encoders"));
   EXPECT_THAT(error_in("yarp_import: {encoders: {a: [x], b: [y]}, images: {left: l}, combined_joints: {s: {x: 1, y: 1}}}"),
               HasSubstr("columns of one folder"));
 }

@@ -1,4 +1,5 @@
-// A YARP recording. The input is cut at NUL bytes into an encoder log, a picture log and a picture.
+// A YARP recording. The input is cut at NUL bytes into an encoder log, a picture log and a picture
+// (PPM, PGM, PNG or JPEG).
 #include <array>
 
 #include "bodyschema/bus/yarp_import.hpp"
@@ -9,11 +10,12 @@ using namespace bodyschema;
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::array<std::string_view, 3> parts;
   std::string_view rest = fuzz::as_text(data, size);
-  for (auto& part : parts) {
+  for (std::size_t i = 0; i < 2; ++i) {
     const std::size_t end = std::min(rest.find('\0'), rest.size());
-    part = rest.substr(0, end);
+    parts[i] = rest.substr(0, end);
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
+  parts[2] = rest;  // a picture holds NUL bytes of its own
   const auto put = [](std::string_view text, const char* name) {
     return fuzz::as_file(reinterpret_cast<const std::uint8_t*>(text.data()), text.size(), name);
   };
