@@ -242,7 +242,8 @@ Health verdict(const HealthFacts& facts) {
 Health assess(const HealthFacts& facts) {
   Health health = verdict(facts);
   // Said beside what it brings about: estimates that diverge, an arm not found.
-  if (const std::string turned = turned_away(facts); !turned.empty() && health.sentence != turned) {
+  if (const std::string turned = turned_away(facts);
+      !turned.empty() && health.sentence != turned && health.level != HealthLevel::kStale) {
     health.sentence += "; " + turned;
   }
   // A file that ends is said beside whatever else there is to say: it would not be missed otherwise until

@@ -73,6 +73,10 @@ TEST(Health, TheHeadHasTurnedFromItsBackground) {
   facts.estimate.state = EstimatorState::kDiverged;
   expect(facts, HealthLevel::kError, "diverged: ");
   expect(facts, HealthLevel::kError, "; the head has turned by 12.0 deg");
+  facts.picture_age_ms = 3200.0;
+  EXPECT_THAT(assess(facts).sentence, testing::Not(HasSubstr("head"))) << "nothing is seen any more";
+  facts = well();
+  facts.cameras[1].background_turned_rad = 0.21;
   facts.cameras[1].age_ms = 5000.0;  // not known of what it sees now
   EXPECT_THAT(assess(facts).sentence, testing::Not(HasSubstr("head")));
 }
