@@ -135,7 +135,9 @@ class DataLog {
       if (words.empty()) continue;
       ++lines;
       try {
-        if (too_long) throw FileError(where(number) + ": line of more than " + std::to_string(kMaxLineBytes) + " bytes");
+        if (too_long) {
+          throw FileError(where(number) + ": line of more than " + std::to_string(kMaxLineBytes) + " bytes");
+        }
         take(words, number);
       } catch (const FileError& error) {
         bad_.add(error);
@@ -191,7 +193,9 @@ class DataLog {
         throw FileError(where(number) + ": has " + std::to_string(words.size() - (two_stamps_ ? 3 : 2)) +
                         " values, expected " + std::to_string(columns_) + " (yarp_import." + key_ + ")");
       }
-      for (std::size_t i = 1 + stamps; i < words.size(); ++i) line.values.push_back(parse_number(words[i], where(number)));
+      for (std::size_t i = 1 + stamps; i < words.size(); ++i) {
+        line.values.push_back(parse_number(words[i], where(number)));
+      }
     }
     line.utime = parse_stamp(words[1], where(number));
     if (stamps == 2 && line.utime == 0) line.utime = parse_stamp(words[2], where(number));
@@ -453,7 +457,8 @@ YarpImportOptions YarpImportOptions::from(const Configuration& yarp_import) {
       auto& port = options.encoders.back();
       const auto first = std::find(port.columns.begin(), port.columns.end(), optional.text(folder));
       if (first == port.columns.end() || first == port.columns.begin()) {
-        optional.fail(folder, "a column of this folder, not its first: " + nearest_name(optional.text(folder), port.columns));
+        optional.fail(folder, "a column of this folder, not its first; did you mean '" +
+                                  nearest_name(optional.text(folder), port.columns) + "'?");
       }
       port.fewest = static_cast<std::size_t>(first - port.columns.begin());
     }

@@ -115,7 +115,9 @@ class LogDiagnosis {
     if (auto turn = describe(pipeline_.background_turn()); !turn.empty()) {
       report.warnings.insert(report.warnings.begin(), turn + "; nothing found here holds until then");
     }
-    if (auto lost = lost_pictures(facts_.bus, kTolerableLoss); !lost.empty()) report.warnings.push_back(std::move(lost));
+    if (auto lost = lost_pictures(facts_.bus, kTolerableLoss); !lost.empty()) {
+      report.warnings.push_back(std::move(lost));
+    }
     const auto& roles = measurement_.roles();
     if (!roles.head.empty() && largest_range(measurement_.views(), roles.head) < kStill_rad) {
       report.warnings.push_back(

@@ -286,10 +286,10 @@ class Replay {
   [[nodiscard]] std::string why_not_converged() const {
     switch (last_.state) {
       case EstimatorState::kDiverged:
-        return fmt::format("the best prediction does not fit the pictures (likelihood {:.2f}); do not use these offsets",
+        return fmt::format("the best prediction does not fit the pictures (likelihood {:.2f}); do not use the offsets",
                            last_.best_likelihood);
       case EstimatorState::kHandNotInView:
-        return last_view_ ? "the arm had left the pictures; the offsets are those of before" : "the arm is in no picture";
+        return last_view_ ? "the arm had left the pictures; the offsets are of before" : "the arm is in no picture";
       case EstimatorState::kLearningBackground: return "it holds too few pictures to learn the background from";
       default: return fmt::format("the offsets have not settled, the hand is known to {:.1f} mm; do not use them yet",
                                   1e3 * last_.hand_sd_m);

@@ -168,7 +168,8 @@ std::optional<std::string> camera_warning(const HealthFacts& f) {
 std::string turned_away(const HealthFacts& f) {
   double turned_rad = 0.0;
   for (const auto& camera : f.cameras) {
-    if (camera.age_ms >= 0.0 && camera.age_ms < kStale_ms) turned_rad = std::max(turned_rad, camera.background_turned_rad);
+    if (camera.age_ms < 0.0 || camera.age_ms >= kStale_ms) continue;
+    turned_rad = std::max(turned_rad, camera.background_turned_rad);
   }
   if (turned_rad <= 0.0) return "";
   return fmt::format("the head has turned by {:.1f} deg from where the background was learned, masks are wrong: set "
