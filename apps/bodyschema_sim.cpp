@@ -40,6 +40,7 @@ struct Arguments {
   bool reach = false;
   double babble_s = 0.0;
   double one_way_s = 0.0;
+  int poses = 0;
   int frames = 100;
   std::optional<int> background_frames;
   bool head_moves = false;
@@ -155,6 +156,9 @@ void run(const Arguments& a) {
   } else if (a.one_way_s > 0.0) {
     plan.motion = sim::Motion::kOneWay;
     plan.seconds = a.one_way_s;
+  } else if (a.poses > 0) {
+    plan.motion = sim::Motion::kPoses;
+    plan.poses = a.poses;
   }
   plan.frozen_joints = a.frozen;
   plan.offsets_deg = read_offsets(a.offsets, a.seed, setup.estimated_joints);
@@ -248,8 +252,11 @@ int main(int argc, char** argv) {
                      ->check(CLI::Range(1.0, 3600.0))->group("Motion");
   auto* one_way = app.add_option("--one-way", a.one_way_s, "One slow reach of this many seconds, never turning back")
                       ->check(CLI::Range(1.0, 3600.0))->group("Motion");
-  reach->excludes(babble)->excludes(one_way);
-  babble->excludes(one_way);
+  auto* poses = app.add_option("--poses", a.poses, "Stop and go: this many postures, each held still for a second")
+                    ->check(CLI::Range(2, 3600))->group("Motion");
+  reach->excludes(babble)->excludes(one_way)->excludes(poses);
+  babble->excludes(one_way)->excludes(poses);
+  one_way->excludes(poses);
   app.add_option("--frames", a.frames, "Frames of a reach (default 100)")->check(CLI::Range(2, 100000))->group("Motion");
   app.add_option("--background-frames", a.background_frames, "Empty frames before the arm comes in")
       ->check(CLI::Range(0, 10000))->group("Motion");

@@ -353,6 +353,18 @@ Trajectory MotionPlanner::babble(double duration_s) {
   return motion;
 }
 
+Trajectory MotionPlanner::poses(int count) {
+  constexpr double kHeld_s = 1.0, kShortestMove_s = 0.05;
+  Trajectory motion(visible_posture());
+  motion.hold(kHeld_s);
+  for (int i = 1; i < count; ++i) {
+    const Eigen::VectorXd from = motion.last(), to = next_posture(from);
+    motion.move_to(to, std::max(kShortestMove_s, degrees((to - from).cwiseAbs().maxCoeff()) / settings_.fast_deg_s));
+    motion.hold(kHeld_s);
+  }
+  return motion;
+}
+
 Eigen::VectorXd MotionPlanner::rest_posture(const Eigen::VectorXd& like) {
   Eigen::VectorXd best;
   double best_cost = std::numeric_limits<double>::max();

@@ -49,6 +49,11 @@ Schedule schedule(const std::shared_ptr<const RobotModel>& model, const RobotSet
       case Motion::kBabble:
         motion_frames = static_cast<int>(std::lround(plan.seconds * settings.camera_rate_hz));
         return planner.babble(plan.seconds);
+      case Motion::kPoses: {
+        auto poses = planner.poses(plan.poses);
+        motion_frames = static_cast<int>(std::lround(poses.duration_s() * settings.camera_rate_hz));
+        return poses;
+      }
       case Motion::kGiven:
         if (!plan.given) throw std::invalid_argument("SimulationPlan: no trajectory given");
         motion_frames = static_cast<int>(std::floor(plan.given->duration_s() * settings.camera_rate_hz + 1e-9)) + 1;

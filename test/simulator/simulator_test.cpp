@@ -315,6 +315,34 @@ TEST(Simulator, BabblingVisitsItsFirstPosturesAgainStandsStillAndGoesBothWays) {
   EXPECT_TRUE(forward && backward);
 }
 
+TEST(Simulator, StandsStillInEveryPostureOfStopAndGo) {
+  const auto& stage = icub_right();
+  auto plan = joints_only(5);
+  plan.motion = Motion::kPoses;
+  plan.poses = 12;
+  Simulator simulator = stage.simulator(plan);
+  const auto& robot = simulator.robot();
+  const double begin = robot.site().begin_s, end = robot.site().end_s;
+  EXPECT_GT(end - begin, 11.0);
+  EXPECT_LT(end - begin, 40.0);
+  std::vector<Eigen::VectorXd> postures;
+  double still_s = 0.0, together_s = 0.0;
+  constexpr double kStep_s = 0.02;
+  Eigen::VectorXd before = robot.joints(begin);
+  for (double t = begin + kStep_s; t < end; t += kStep_s) {
+    const auto q = robot.joints(t);
+    const bool still = (q - before).cwiseAbs().maxCoeff() < 1e-9;
+    still_s = still ? still_s + kStep_s : 0.0;
+    together_s += still ? kStep_s : 0.0;
+    if (still_s > 0.9 && (postures.empty() || (q - postures.back()).cwiseAbs().maxCoeff() > 1e-6)) postures.push_back(q);
+    before = q;
+  }
+  EXPECT_EQ(postures.size(), 12u);
+  EXPECT_NEAR(together_s, 12.0, 0.8);
+  MotionPlanner planner(stage.model, stage.setup, stage.rig, stage.settings.motion, 5);
+  for (const auto& q : postures) EXPECT_TRUE(planner.view(q).whole_hand);
+}
+
 TEST(Simulator, IsTheSameForOneSeedAndAnyNumberOfThreads) {
   auto stage = icub_right();
   stage.settings.clutter = true;

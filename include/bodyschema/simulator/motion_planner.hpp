@@ -47,6 +47,9 @@ class MotionPlanner {
   /// back at the beginning and again in the middle and at the end, and a static hold (the last three
   /// when there is time: 40 s or more).
   Trajectory babble(double duration_s);
+  /// Stop and go: so many postures with the hand in view, each held still for a second, fast moves between
+  /// them.
+  Trajectory poses(int count);
   /// A posture with the arm out of both views; head as in `like`.
   Eigen::VectorXd rest_posture(const Eigen::VectorXd& like);
   /// An arm posture with the hand in view, head at its usual place.

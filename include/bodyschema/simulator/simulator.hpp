@@ -17,7 +17,7 @@
 
 namespace bodyschema::simulator {
 
-enum class Motion { kReach, kBabble, kOneWay, kGiven };
+enum class Motion { kReach, kBabble, kOneWay, kPoses, kGiven };
 enum class Phase { kBackground, kEntry, kMotion };
 /// "background", "entry", "motion".
 const char* name_of(Phase phase);
@@ -35,6 +35,7 @@ struct SimulationPlan {
   Motion motion = Motion::kReach;
   int frames = 100;       ///< of a reach (camera frames from its first to its last posture)
   double seconds = 60.0;  ///< of babbling or of the one-way move
+  int poses = 70;         ///< postures of Motion::kPoses
   /// Motor angles over time for Motion::kGiven; time 0 is the beginning of the motion.
   std::optional<Trajectory> given;
   std::map<std::string, double> offsets_deg;  ///< encoder = true + offset, by joint
