@@ -89,27 +89,36 @@ class GenericFeatures {
   Eigen::Index joint_;
 };
 
-/// How often the arm's joints come: messages of head and arm may come at different rates, and a joint says
-/// something new only when it moves. The quicker quarter of the times between changes; the mean period of
-/// all messages while nothing changes.
-double arm_period_s(std::span<const JointSample> stream, const JointRoles& roles) {
-  if (stream.size() < 2) return 1e9;
-  std::vector<double> periods;
+double quantile(std::vector<double> values, double share) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+struct ArmReadings {
+  /// How often the arm's joints come: messages of head and arm may come at different rates, and a joint says
+  /// something new only when it moves. The quicker quarter of the times between changes; the mean period of
+  /// all messages while nothing changes.
+  double period_s = 1e9;
+  double step_rad = 0.0;  ///< from one change to the next, of the joint that moved most; median
+};
+
+ArmReadings arm_readings(std::span<const JointSample> stream, const JointRoles& roles) {
+  if (stream.size() < 2) return {};
+  std::vector<double> periods, steps;
   std::size_t last = 0;
   for (std::size_t i = 1; i < stream.size(); ++i) {
-    const bool changed = std::any_of(roles.arm.begin(), roles.arm.end(), [&](const auto joint) {
-      return stream[i].q[joint] != stream[last].q[joint];
-    });
-    if (!changed) continue;
+    double step = 0.0;
+    for (const auto joint : roles.arm) step = std::max(step, std::abs(stream[i].q[joint] - stream[last].q[joint]));
+    if (step == 0.0) continue;
     periods.push_back(seconds(stream[i].utime - stream[last].utime));
+    steps.push_back(step);
     last = i;
   }
   if (periods.size() < 4) {
-    return seconds(stream.back().utime - stream.front().utime) / static_cast<double>(stream.size() - 1);
+    return {seconds(stream.back().utime - stream.front().utime) / static_cast<double>(stream.size() - 1), 0.0};
   }
-  const auto quarter = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 4);
-  std::nth_element(periods.begin(), quarter, periods.end());
-  return *quarter;
+  return {quantile(periods, 0.25), quantile(steps, 0.5)};
 }
 
 /// How often a joint turns round; turning points at least half a degree apart, so that encoder noise is none.
@@ -304,6 +313,7 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
   constexpr double kLeastSpeed = 3.0 * kDeg;       ///< rad/s rms, for causes of timing
   constexpr double kLeastTorque = 0.05;            ///< Nm, change of torque for compliance
   constexpr double kSparseEncoders_s = 0.025;
+  constexpr double kJump = 8.0 * kDeg;  ///< between readings 100 ms apart even a fast arm moves less
   const auto& roles = source.roles();
   const auto views = source.views();
   const auto stream = source.stream();
@@ -345,9 +355,14 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
     exclude_all("compliance", "the robot's URDF has no masses");
     exclude_all("payload", "the robot's URDF has no masses, so the arm's compliance is unknown");
   }
-  if (const double period_s = arm_period_s(stream, roles); period_s > kSparseEncoders_s) {
-    exclude_all("backlash", "the arm's encoders come every " + number(1e3 * period_s, 0) +
-                                " ms; the direction of motion needs 100 Hz or more");
+  if (const auto readings = arm_readings(stream, roles); readings.period_s > kSparseEncoders_s) {
+    // Of an arm that is read from one posture to the next it does not matter how often.
+    exclude_all("backlash", readings.step_rad > kJump
+                                ? "the arm's readings jump from posture to posture, by " +
+                                      number(readings.step_rad / kDeg, 0) + " deg (median); how the joints moved "
+                                      "between them, and in which direction last, was not seen"
+                                : "the arm's encoders come every " + number(1e3 * readings.period_s, 0) +
+                                      " ms; the direction of motion needs 100 Hz or more");
   }
   double speed_square = 0.0;
   for (const auto joint : roles.arm) {

@@ -84,6 +84,29 @@ TEST(Untestable, RareEncodersKnowNoDirection) {
   EXPECT_THAT(item->reason, HasSubstr("every 50 ms"));
 }
 
+/// A robot that publishes its encoders only where a posture is reached: rare messages, or frequent ones that
+/// repeat the last posture. That 100 Hz are missing is not the reason then.
+TEST(Untestable, ReadingsThatJumpKnowNoDirection) {
+  const auto log = make_synthetic_log(test::robot(), {}, 1);
+  for (const std::size_t published : {80u, 1u}) {
+    auto jumping = test::EditedLog::whole(*log);
+    auto& stream = jumping.stream_for_editing();
+    std::vector<JointSample> read;
+    for (std::size_t i = 0; i < stream.size(); i += published) {
+      auto sample = stream[i];
+      sample.q = stream[i - i % 80].q;
+      for (const auto joint : log->roles().arm) sample.q[joint] += i / 80 % 2 == 0 ? 0.2 : -0.2;
+      read.push_back(std::move(sample));
+    }
+    stream = read;
+    const auto list = untestable(jumping, at_zero(jumping));
+    const auto* item = find(list, {"backlash", "r_elbow", ""});
+    ASSERT_NE(item, nullptr);
+    EXPECT_THAT(item->reason, HasSubstr("jump from posture to posture"));
+    EXPECT_THAT(item->reason, testing::Not(HasSubstr(" ms")));
+  }
+}
+
 TEST(Lookalikes, OfAShiftedBaseAreNeckAndEyesWhileTheHeadStandsStill) {
   const auto log = make_synthetic_log(test::robot(), {}, 1);
   auto still = test::EditedLog::whole(*log), moving = test::EditedLog::whole(*log);
