@@ -12,9 +12,9 @@ namespace bodyschema {
 ///
 /// A parabola through the positions within 60 ms on both sides (least squares); where few samples follow the
 /// instant, as beside a running robot, further back instead. Accelerations: within 150 ms, or as far as
-/// samples follow the instant. Encoders slower than some 40 Hz get up to 250 ms. A joint that jumps within the window, as from one hold of a recording to the next, counts as
-/// still, and so does everything where fewer than two samples are near. No throw, no allocation once the
-/// results have their size.
+/// samples follow the instant. Encoders slower than some 40 Hz get up to 250 ms. A joint that jumps within the
+/// window, as from one hold of a recording to the next, counts as still, and so does everything where fewer
+/// than two samples are near. No throw, no allocation once the results have their size.
 /// @param ordered  samples in order of time
 /// @param qdot     out: rad/s, RobotModel order
 /// @param qddot    out: rad/s^2; zero where fewer than five samples are near
