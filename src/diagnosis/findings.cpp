@@ -189,13 +189,15 @@ class Findings {
       report.warnings.push_back("no rest of 3 s or more in the log: the noise's correlation time is "
                                 "not measured, blocks are " + std::to_string(std::lround(plan_.length_s)) + " s");
     }
+    std::string list;
+    for (const auto& cause : found_.selection.set_aside) {
+      list += (list.empty() ? "" : ", ") + found_.set.candidates[cause.candidate].description();
+    }
     if (found_.selection.crowded) {
-      std::string list;
-      for (const auto& cause : found_.selection.set_aside) {
-        list += (list.empty() ? "" : ", ") + found_.set.candidates[cause.candidate].description();
-      }
       report.warnings.push_back("several small errors share what is left" +
                                 (list.empty() ? "" : "; none stands out among " + list));
+    } else if (!list.empty()) {
+      report.warnings.push_back("too small to be told from what else is slightly wrong: " + list);
     }
     if (passes_once(source_)) {
       report.warnings.push_back("every joint moved one way only: what follows an angle looks like what follows "

@@ -62,7 +62,6 @@ class Selector {
       add_causes();
       simplify();
       drop_causes();
-      drop_what_wandering_explains();
       if (options_.given.empty()) stand_out(result);
     }
     for (const auto c : reported()) result.causes.push_back(describe(c));
@@ -169,7 +168,7 @@ class Selector {
 
   [[nodiscard]] bool enters(std::size_t candidate, const CandidateScore& s) const {
     const auto& c = candidates_[candidate];
-    const double least = c.generic() ? std::max(gain_floor_, generic_gain_floor_) : gain_floor_;
+    const double least = share_left() * (c.generic() ? generic_gain_floor_ : gain_floor_);
     const bool large = c.temporal() && s.gain > options_.gain_large;
     const double z = large ? options_.z_large : options_.z_enter;
     return s.testable && s.z > z && s.gain > least && s.t > options_.t_enter &&
@@ -186,7 +185,7 @@ class Selector {
     if (!plain.usable) return false;
     if (!extended.usable) return candidates_[candidate].slip;  // near an end: one group holds it all
     const auto z = wald_z(extended, extended_model, candidate);
-    return z > options_.z_far && (plain.heldout() - extended.heldout()) / baseline_ > gain_floor_;
+    return z > options_.z_far && (plain.heldout() - extended.heldout()) / baseline_ > gain_floor_ * share_left();
   }
 
   [[nodiscard]] std::vector<CandidateScore> score_all() const {
@@ -281,11 +280,11 @@ class Selector {
     }
     if (options_.given.empty()) return;
     refit();
-    if (!options_.search) return;
-    // What they leave is little of what there was; the next cause is measured by it.
-    gain_floor_ *= current_.heldout() / baseline_;
-    generic_gain_floor_ *= current_.heldout() / baseline_;
   }
+
+  /// Held-out loss of the model so far, as a share of the baseline's. Where one cause makes up nearly all of
+  /// that, it is what the next one is measured by.
+  [[nodiscard]] double share_left() const { return std::min(1.0, current_.heldout() / baseline_); }
 
   void add_causes() {
     while (static_cast<int>(causes_.size()) < options_.max_causes) {
@@ -315,36 +314,6 @@ class Selector {
     }
   }
 
-  /// Where a joint moved over time in a way that slip or drift only stands for, what the stand-in leaves
-  /// belongs to that joint: other causes must show beside a free curve of it.
-  void drop_what_wandering_explains() {
-    const auto found = causes_;
-    for (const auto cause : found) {
-      if (!candidates_[cause].temporal() || candidates_[cause].generic()) continue;
-      const auto curve = free_curve(candidates_[cause].target);
-      if (!curve || contains(model_, *curve) || !wanders(candidates_[cause].target)) continue;
-      const auto beside = with(model_, *curve);
-      const auto extended = extended_by(*curve);
-      if (!extended.usable) continue;
-      Ids superfluous;
-      for (const auto other : causes_) {
-        if (other != cause && wald_z(extended, beside, other) < options_.z_enter) superfluous.push_back(other);
-      }
-      for (const auto other : superfluous) remove(other);
-    }
-  }
-
-  /// The candidate that is any curve in time of a joint.
-  [[nodiscard]] std::optional<std::size_t> free_curve(const EffectTarget& joint) const {
-    std::optional<std::size_t> best;
-    for (std::size_t c = 0; c < candidates_.size(); ++c) {
-      const auto& candidate = candidates_[c];
-      if (!candidate.generic() || candidate.variable != "time" || !(candidate.target == joint)) continue;
-      if (!best || candidate.columns.size() > candidates_[*best].columns.size()) best = c;
-    }
-    return best;
-  }
-
   void remove(std::size_t c) {
     std::erase(causes_, c);
     std::erase(model_, c);
@@ -367,24 +336,41 @@ class Selector {
   [[nodiscard]] Ids reported() const {
     Ids list;
     for (const auto c : model_) {
+      // What crowds in on a nuisance once others are set aside is of the crowd as well.
+      if (standing_ && !contains(*standing_, c)) continue;
       if (contains(causes_, c) || (enters(c, test(c).score) && beyond_tolerance(c))) list.push_back(c);
     }
     return list;
   }
 
-  /// Where many small errors live together, the largest of them is a cause like any other on a clean
-  /// log, but not what is wrong with the robot. Sets aside what does not stand out.
+  /// Where many small errors live together, the largest of them is a cause like any other on a clean log, but
+  /// not what is wrong with the robot. Sets aside what does not stand out from all that is smaller.
   void stand_out(Selection& result) {
     find_rest(result);
-    const auto list = reported();
-    result.crowded = list.size() >= options_.crowd || result.rest_t > options_.crowd_rest_t;
-    if (!result.crowded) return;
-    gain_floor_ = options_.crowd_floor;
-    for (const auto c : list) {
-      const auto score = test(c).score;
-      if (score.gain <= gain_floor_) result.set_aside.push_back({c, score, {}, false});
+    std::vector<SelectedCause> list;
+    for (const auto c : reported()) list.push_back({c, test(c).score, {}, false});
+    std::stable_sort(list.begin(), list.end(), [](const auto& a, const auto& b) { return a.score.gain > b.score.gain; });
+    const double left = share_left(), rest = std::max(0.0, result.rest_gain);
+    const bool many = list.size() >= options_.crowd;
+    if (!many && result.rest_t <= options_.crowd_rest_t) return;
+    // The crowd is what stands below the last cause that is large in what the larger ones leave, and larger
+    // than all the smaller ones together. Of one or two causes none needs to be large beside next to nothing.
+    double crowd = rest;
+    while (!list.empty() && result.set_aside.size() < list.size()) {
+      const auto& smallest = list[list.size() - 1 - result.set_aside.size()];
+      const double gain = smallest.score.gain, without_it = left + crowd - rest + gain;
+      const bool alone = !many && crowd <= options_.gain_floor * left;
+      if ((alone || gain > options_.crowd_floor * without_it) && gain > options_.crowd_ratio * crowd) break;
+      crowd += gain;
+      result.set_aside.push_back(smallest);
     }
-    drop_causes();
+    std::reverse(result.set_aside.begin(), result.set_aside.end());
+    standing_.emplace();
+    for (std::size_t k = 0; k < list.size() - result.set_aside.size(); ++k) standing_->push_back(list[k].candidate);
+    for (const auto& cause : result.set_aside) {
+      if (contains(causes_, cause.candidate)) remove(cause.candidate);
+    }
+    result.crowded = crowd > options_.crowd_worth * (left + crowd);
   }
 
   /// One cause outside the baseline can look like several nuisances inside it. Where one candidate
@@ -530,6 +516,7 @@ class Selector {
   Ids model_;    ///< candidates in the fit: nuisances, then causes
   Ids causes_;   ///< those that were added
   Ids dropped_;  ///< and those that were dropped again: not tried twice
+  std::optional<Ids> standing_;  ///< those that stand out, where there is a crowd
   std::optional<NestedFits> nested_;  ///< about model_
   BlockFit current_;
   double baseline_ = 1.0;

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -14,6 +15,8 @@ namespace bodyschema {
 namespace {
 
 constexpr Eigen::Index kRows = 400;
+/// So many that chance takes away less than the least gain of a cause.
+constexpr Eigen::Index kLong = 6000;
 
 Candidate candidate(const std::string& name, Eigen::Index column) {
   Candidate c;
@@ -66,9 +69,9 @@ TEST(Selection, AsksForMoreWhereEveryPostureIsPassedOnce) {
   std::normal_distribution<double> normal;
   // A cause that takes away a tenth of the loss, and one that takes away half.
   for (const auto& [size, found_in_one_pass] : {std::pair{0.35, false}, std::pair{1.0, true}}) {
-    Eigen::MatrixXd X(kRows, 3);
-    Eigen::VectorXd y(kRows);
-    for (Eigen::Index i = 0; i < kRows; ++i) {
+    Eigen::MatrixXd X(kLong, 3);
+    Eigen::VectorXd y(kLong);
+    for (Eigen::Index i = 0; i < kLong; ++i) {
       X.row(i) << 1.0, 0.0, i % 2 == 0 ? 1.0 : -1.0;
       y[i] = 1.0 + size * X(i, 2) + normal(random);
     }
@@ -79,6 +82,78 @@ TEST(Selection, AsksForMoreWhereEveryPostureIsPassedOnce) {
     one_pass.one_pass = true;
     EXPECT_EQ(select_causes(statistics, {{0}}, candidates, usual).causes.size(), 1u) << size;
     EXPECT_EQ(select_causes(statistics, {{0}}, candidates, one_pass).causes.size(), found_in_one_pass ? 1u : 0u) << size;
+  }
+}
+
+/// Causes of these sizes, each of its own shape, in noise of one.
+std::vector<Candidate> several(std::size_t count) {
+  std::vector<Candidate> list;
+  for (std::size_t c = 0; c < count; ++c) list.push_back(candidate("cause", static_cast<Eigen::Index>(c) + 1));
+  for (std::size_t c = 0; c < count; ++c) list[c].target.joint = std::to_string(c);
+  return list;
+}
+BlockStatistics log_with(const std::vector<double>& sizes, std::uint64_t seed) {
+  const auto count = static_cast<Eigen::Index>(sizes.size());
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd X(kLong, count + 1);
+  Eigen::VectorXd y(kLong);
+  for (Eigen::Index i = 0; i < kLong; ++i) {
+    X(i, 0) = 1.0;
+    y[i] = 1.0 + normal(random);
+    for (Eigen::Index c = 0; c < count; ++c) {
+      X(i, c + 1) = normal(random);
+      y[i] += sizes[static_cast<std::size_t>(c)] * X(i, c + 1);
+    }
+  }
+  return test::statistics_of(X, y, 40);
+}
+std::vector<std::size_t> found(const Selection& selection) {
+  std::vector<std::size_t> list;
+  for (const auto& cause : selection.causes) list.push_back(cause.candidate);
+  std::sort(list.begin(), list.end());
+  return list;
+}
+
+TEST(Selection, MeasuresASecondCauseByWhatTheFirstLeaves) {
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    // One that is nearly all there is (0.999 of the loss), and one that takes away a fifth of what it leaves:
+    // two ten-thousandths of all.
+    const auto two = select_causes(log_with({30.0, 0.5, 0.0, 0.0}, test::seed() + i), {{0}}, several(4));
+    EXPECT_EQ(found(two), (std::vector<std::size_t>{0, 1})) << "seed " << test::seed() + i;
+    // With a third that is small beside the second, they are three; the second is no less one.
+    const auto three = select_causes(log_with({30.0, 1.0, 0.25, 0.0}, test::seed() + i), {{0}}, several(4));
+    EXPECT_EQ(found(three), (std::vector<std::size_t>{0, 1})) << "seed " << test::seed() + i;
+  }
+}
+
+TEST(Selection, TellsACrowdFromACauseInACrowd) {
+  const std::vector<double> crowd = {0.3, -0.25, 0.3, 0.25, -0.3, 0.2};
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    const auto none = select_causes(log_with(crowd, test::seed() + i), {{0}}, several(6));
+    EXPECT_TRUE(none.causes.empty());
+    EXPECT_TRUE(none.crowded);
+    EXPECT_GE(none.set_aside.size(), 3u);
+    auto with_one = crowd;
+    with_one[2] = 1.5;
+    const auto one = select_causes(log_with(with_one, test::seed() + i), {{0}}, several(6));
+    EXPECT_EQ(found(one), (std::vector<std::size_t>{2})) << "seed " << test::seed() + i;
+    EXPECT_TRUE(one.crowded);
+  }
+}
+
+/// As where pictures err alike in every block: all others together take away next to nothing, but surely.
+TEST(Selection, AHandfulOfTracesIsNoCrowd) {
+  const std::vector<double> traces = {0.02, -0.03, 0.02, 0.03, -0.02, 0.03};
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    SelectionOptions options;
+    options.crowd_rest_t = -1e9;  // whatever the noise
+    const auto none = select_causes(log_with(traces, test::seed() + i), {{0}}, several(6), options);
+    EXPECT_FALSE(none.crowded);
+    auto with_one = traces;
+    with_one[2] = 0.6;
+    const auto one = select_causes(log_with(with_one, test::seed() + i), {{0}}, several(6), options);
+    EXPECT_EQ(found(one), (std::vector<std::size_t>{2})) << "seed " << test::seed() + i;
   }
 }
 
