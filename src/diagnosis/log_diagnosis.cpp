@@ -175,6 +175,10 @@ class LogDiagnosis {
       throw DataError(log + ": the arm is seen in " + std::to_string(pictures_with_arm_) + " of " +
                       std::to_string(pictures_seen_) + " pictures; record it with the hand in view of both eyes" + kAdvice);
     }
+    if (2 * frames_swapped_ > frames_looked_at_) {
+      throw DataError(log + ": the left and right pictures are swapped: each shows what the other eye sees; exchange "
+                      "them where they are published or imported, and record again");
+    }
   }
 
   void learn() {
@@ -201,6 +205,10 @@ class LogDiagnosis {
         pipeline_.segment(observation);
       } else {
         const auto estimate = pipeline_.process(observation);
+        if (estimate.state != EstimatorState::kHandNotInView) {
+          ++frames_looked_at_;
+          frames_swapped_ += estimate.cameras_swapped;
+        }
         converged += estimate.state == EstimatorState::kConverged;
         started = ++frames >= kMostStartFrames || converged >= kFramesAfterConvergence;
         for (std::size_t j = 0; j < estimate.joint_names.size(); ++j) {
@@ -244,6 +252,7 @@ class LogDiagnosis {
     std::vector<std::string> missing_joints;
   } facts_;  ///< of the last pass over the log
   std::size_t pictures_seen_ = 0, pictures_with_arm_ = 0;
+  std::size_t frames_looked_at_ = 0, frames_swapped_ = 0;  ///< at the beginning
 };
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "bodyschema/estimator/pull_judge.hpp"
 #include "bodyschema/estimator/stalled_encoders.hpp"
 #include "bodyschema/filter/particle_filter.hpp"
+#include "eye_order.hpp"
 #include "hypothesis_scorer.hpp"
 #include "outline_fitter.hpp"
 
@@ -82,6 +83,7 @@ struct Estimator::Impl {
     joints = static_cast<Eigen::Index>(setup.estimated_joints.size());
     state = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
     reading.resize(joints);
+    first_guesses = filter.states();
     stalled = StalledEncoders(joints);
     frame_state = fusion.frame_state();
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
@@ -107,8 +109,10 @@ struct Estimator::Impl {
       contradicted = false;
       best_likelihood = 0.0;
     } else {
-      score_particles();
-      if (!particles_only() && fusion.frames() < kYoungMemory_frames && starts_swapped()) {
+      const bool swapped = starts_swapped();
+      if (!swapped) score_particles();
+      if (swapped) {
+        begin_again();
         learn_nothing();
       } else if (options.mode == EstimatorMode::kPaper) {
         weights = 1.0 - distance.array();  // equation (4)
@@ -181,22 +185,24 @@ struct Estimator::Impl {
 
   // --- pictures of the wrong eye --------------------------------------------------------------
 
-  /// Whether the pictures fit far better once they are exchanged: a wrong arm moves the hand alike in both
-  /// pictures, an exchange moves it against its disparity.
-  [[nodiscard]] static bool speaks_for_exchange(double as_they_are, double exchanged) {
-    return exchanged < kMuchBetter * as_they_are;
-  }
-
   /// With a memory: whether it explains the pictures once they are exchanged, and only then.
   bool turned_swapped() {
     const Eigen::VectorXd known = fusion.mean();
     const double exchanged = scorer.distance_exchanged(known);
-    return exchanged < 2.0 * options.lock_distance && speaks_for_exchange(scorer.distance(known), exchanged);
+    return exchanged < 2.0 * options.lock_distance && EyeOrder::clearly_exchanged(scorer.distance(known), exchanged);
   }
 
-  /// Without one: whether the best particle asks for an exchange.
+  /// Without one: by the guesses that the search began with, which no wrong minimum has led astray.
   bool starts_swapped() {
-    return speaks_for_exchange(distance.minCoeff(), scorer.smallest_exchanged(options.filter.particles));
+    if (particles_only() || eye_order.in_order()) return false;
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(state.size());
+    const auto n = static_cast<std::size_t>(first_guesses.cols());
+    for (std::size_t i = 0; i < n; ++i) {
+      x.head(joints) = first_guesses.col(static_cast<Eigen::Index>(i));
+      scorer.place(x, i);
+    }
+    const double as_they_are = scorer.score(n).minCoeff();
+    return eye_order.exchanged(as_they_are, scorer.smallest_exchanged(n));
   }
 
   /// From pictures that seem to be exchanged.
@@ -473,18 +479,25 @@ struct Estimator::Impl {
   }
 
   void reset() {
+    begin_again();
     filter = ParticleFilter(joints, options.filter);
-    fusion.forget_all();
-    state.setZero();
     frame_state = fusion.frame_state();
     current = EstimatorState::kHandNotInView;
     cloud_covariance.resize(0, 0);
     best_likelihood = effective_size = contour_rms_px = 0.0;
+    contradicted = false;
+    eye_order = {};
+  }
+
+  /// Nothing that was learned holds.
+  void begin_again() {
+    filter.reset(Eigen::VectorXd::Zero(joints));
+    fusion.forget_all();
+    state.setZero();
     surprised_frames = 0;
     pulls.forget();
     stalled = StalledEncoders(joints);
     shelf.reset();
-    contradicted = false;
   }
 
   static constexpr double kSearchSpread_rad = 0.0349066;  ///< 2 deg
@@ -494,7 +507,6 @@ struct Estimator::Impl {
   static constexpr double kSettled_frames = 4.5;  ///< fewer may still hold a wrong minimum
   static constexpr int kShelf_frames = 30;
   static constexpr double kClearlyBetter = 0.8;  ///< Hammoude distance against that of the memory
-  static constexpr double kMuchBetter = 0.6;     ///< ... with exchanged pictures against those as they are
 
   EstimatorOptions options;
   RobotSetup setup;
@@ -528,6 +540,8 @@ struct Estimator::Impl {
   int surprised_frames = 0;
   bool contradicted = false;
   bool cameras_swapped = false;  ///< the last frame's pictures
+  Eigen::MatrixXd first_guesses;  ///< of the joint offsets: the first particles
+  EyeOrder eye_order;
   PullJudge pulls;
   StalledEncoders stalled{0};
   bool explained = false;  ///< the last frame's pictures, by its estimate

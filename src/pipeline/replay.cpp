@@ -189,6 +189,7 @@ class Replay {
     }
     estimates_ << json.dump() << '\n';
     ++state_counts_[to_string(estimate.state)];
+    swapped_frames_ += estimate.cameras_swapped;
     const std::size_t every =
         options_.overlays > 0 ? std::max<std::size_t>(1, expected / static_cast<std::size_t>(options_.overlays)) : 0;
     if (every > 0 && frames_.size() % every == every / 2) {
@@ -276,9 +277,15 @@ class Replay {
       lines = fmt::format("\nNOT CONVERGED: the log ended in state '{}': {}\n", to_string(last_.state),
                           why_not_converged());
     }
-    if (const std::string turn = describe(pipeline_.background_turn()); !turn.empty()) {
-      lines += "\nWARNING: " + turn + '\n';
-      summary["warnings"].push_back(turn);
+    const auto warn = [&](const std::string& text) {
+      if (text.empty()) return;
+      lines += "\nWARNING: " + text + '\n';
+      summary["warnings"].push_back(text);
+    };
+    warn(describe(pipeline_.background_turn()));
+    if (swapped_frames_ > 0) {
+      warn(fmt::format("the left and right pictures are swapped in {} of {} frames; nothing was learned from these",
+                       swapped_frames_, frames_.size()));
     }
     return lines;
   }
@@ -286,6 +293,7 @@ class Replay {
   [[nodiscard]] std::string why_not_converged() const {
     switch (last_.state) {
       case EstimatorState::kDiverged:
+        if (last_.cameras_swapped) return "each picture shows what the other eye sees";
         return fmt::format("the best prediction does not fit the pictures (likelihood {:.2f}); do not use the offsets",
                            last_.best_likelihood);
       case EstimatorState::kHandNotInView:
@@ -341,6 +349,7 @@ class Replay {
   std::vector<SeenFrame> frames_;
   std::vector<std::array<std::optional<std::pair<HandError, HandError>>, 2>> online_;
   std::map<std::string, std::size_t> state_counts_;
+  std::size_t swapped_frames_ = 0;
   std::optional<Observation> last_view_;
   Estimate last_;
   BusStatistics statistics_;

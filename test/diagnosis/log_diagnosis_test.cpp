@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "bodyschema/bus/log.hpp"
+#include "bodyschema/core/error.hpp"
 #include "bodyschema/simulator/recording.hpp"
 
 namespace bodyschema {
@@ -31,8 +32,9 @@ TEST(LostPictures, AreSaidWithTheReasonsMostFrequentFirst) {
   EXPECT_EQ(lost_pictures({}, 0.05), "");
 }
 
-/// A log of 25 s whose head looks about in a room, with `missing_share` of its encoder readings missing.
-void record(const fs::path& file, bool clutter, double missing_share) {
+/// A log of 25 s whose head looks about in a room, with `missing_share` of its encoder readings missing, or with
+/// left and right exchanged.
+void record(const fs::path& file, bool clutter, double missing_share, bool swapped = false) {
   const Configuration c = Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml");
   const RobotSetup setup = RobotSetup::from(c.section("robot"));
   auto settings = simulator::SimulatorSettings::from(c.section("simulator"));
@@ -49,6 +51,7 @@ void record(const fs::path& file, bool clutter, double missing_share) {
   simulator::FramePublisher publisher(simulator.joint_names(), {});
   for (int i = 0; auto frame = simulator.next(); ++i) {
     if (i > (1.0 - missing_share) * simulator.frame_count()) frame->encoders.clear();
+    if (swapped) std::swap(frame->cameras[0]->image, frame->cameras[1]->image);
     publisher.publish(*frame, log);
   }
 }
@@ -73,6 +76,14 @@ TEST(LogDiagnosis, WarnsOfATurnedHeadBeforeARoomAndOfPicturesNotUsed) {
   const auto wall = diagnosis(log);
   EXPECT_THAT(wall.warnings, Not(Contains(HasSubstr("vision.method"))));
   EXPECT_THAT(wall.warnings, Not(Contains(HasSubstr("not used"))));
+  fs::remove(log);
+}
+
+TEST(LogDiagnosis, RefusesSwappedPictures) {
+  const fs::path log = fs::temp_directory_path() / ("log_diagnosis_swapped_" + std::to_string(getpid()) + ".lcmlog");
+  record(log, false, 0.0, true);
+  EXPECT_THAT([&] { (void)diagnosis(log); },
+              ::testing::ThrowsMessage<DataError>(HasSubstr("the left and right pictures are swapped")));
   fs::remove(log);
 }
 

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "bodyschema/bus/log.hpp"
+#include "bodyschema/bus/messages.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/simulator/recording.hpp"
@@ -190,6 +191,29 @@ TEST_F(ReplayTest, SaysSoWhenItEndsWithoutHavingConverged) {
               HasSubstr("\nNOT CONVERGED: the log ended in state 'learning_background': it holds too few pictures"));
   const std::string good = replay(configuration(), o);
   EXPECT_THAT(good, ::testing::Not(HasSubstr("NOT CONVERGED")));
+}
+
+TEST_F(ReplayTest, SaysSoWhenLeftAndRightAreSwapped) {
+  ReplayOptions o = options("swapped");
+  o.log = folder_ / "swapped.log";
+  o.overlays = 0;
+  {
+    LogReader reader(folder_ / "reach.log");
+    LogWriter log(o.log);
+    for (LogEvent event; reader.next(event);) {
+      if (event.channel == "ICUB_CAMERAS") {
+        bot_core::images_t pictures;
+        pictures.decode(event.data.data(), 0, static_cast<int>(event.data.size()));
+        std::swap(pictures.images.at(0).data, pictures.images.at(1).data);
+        log.publish_message(event.channel, event.time_us, pictures);
+      } else {
+        log.publish(event.channel, event.time_us, event.data);
+      }
+    }
+  }
+  const std::string table = replay(configuration(), o);
+  EXPECT_THAT(table, HasSubstr("\nNOT CONVERGED: the log ended in state 'diverged': each picture shows what the other eye"));
+  EXPECT_THAT(table, HasSubstr("\nWARNING: the left and right pictures are swapped in "));
 }
 
 TEST_F(ReplayTest, TwoReplaysAreIdenticalWhateverTheThreads) {
