@@ -44,10 +44,10 @@ class Diagnoser {
       fitter_.accumulate_on({}, before_);
       found = nearer ? search(nearer->first, nearer->second) : search(before_.at, baseline_);
     }
-    if (searches() && found.after.at.rms_px() > options_.noise_rms_px) look_nearer(found);
+    if (searches() && (found.after.at.rms_px() > options_.noise_rms_px || much_at_once(found))) look_nearer(found);
     leave_out_causes(found);
     auto report = findings(source_, options_.selection, layout_, fitter_.plan(), found, baseline_, before_, excluded_,
-                           options_.systematic_share);
+                           options_.systematic_share, options_.systematic_error);
     word_verdict(report, options_);
     progress(1.0);
     return report;
@@ -259,6 +259,10 @@ class Diagnoser {
     const double outline = outline_points(before_.at);
     const double before = misfit(before_.at, outline), after = misfit(found.after.at, outline);
     return searches() && !found.selection.causes.empty() && far(before_.at) && after < kBetter * before;
+  }
+  /// Several large causes, and small ones beside them: they may share what one that was not tried takes away.
+  [[nodiscard]] bool much_at_once(const Found& found) const {
+    return found.selection.crowded && found.selection.causes.size() >= options_.selection.crowd;
   }
   [[nodiscard]] bool searches() const { return options_.selection.search && !options_.fixed_causes; }
   [[nodiscard]] static bool far(const Linearisation& at) {
