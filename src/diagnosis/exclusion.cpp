@@ -83,7 +83,7 @@ std::vector<ExclusionLimit> limits_of(const Candidate& candidate, const BlockFit
     const auto column = first + static_cast<Eigen::Index>(limits.size());
     const double size = std::abs(fit.estimate[column]);
     limits.push_back({name_of(candidate), p.name, p.unit,
-                      (size + rule.half(fit, column, size)) * p.typical / p.si_per_unit});
+                      (size + rule.half(fit, column, size, rule.placed(candidate.name, p))) * p.typical / p.si_per_unit});
   }
   return limits;
 }
@@ -97,7 +97,7 @@ std::vector<ExclusionLimit> limits_inside(const Effect& effect, const CauseName&
     if (&found.extended[ref.effect] != &effect) continue;
     const auto& p = effect.parameters()[ref.parameter];
     const double size = std::abs(p.value) / p.typical;
-    const double half = rule.half(found.after.fit, static_cast<Eigen::Index>(c), size);
+    const double half = rule.half(found.after.fit, static_cast<Eigen::Index>(c), size, rule.placed(name.name, p));
     limits.push_back({name, p.name, p.unit, (size + half) * p.typical / p.si_per_unit});
   }
   return limits;

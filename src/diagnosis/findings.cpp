@@ -56,10 +56,11 @@ class Findings {
  public:
   Findings(MeasurementSource& source, const SelectionOptions& rules, const CoordinateLayout& layout,
            const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before,
-           double systematic_share)
+           double systematic_share, const std::map<std::string, double>& systematic_error)
       : source_(source), rules_(rules), layout_(layout), plan_(plan), found_(found),
         baseline_(baseline), before_(before),
-        rule_(found.after.fit, plan.block_count(), systematic_share), jacobians_(source.views().size()) {}
+        rule_(found.after.fit, plan.block_count(), systematic_share, systematic_error),
+        jacobians_(source.views().size()) {}
 
   DiagnosisReport report(const std::vector<NotTestable>& excluded) {
     DiagnosisReport report;
@@ -83,8 +84,10 @@ class Findings {
 
  private:
   /// @param common  of the value, what all blocks err in alike
-  [[nodiscard]] std::array<double, 2> interval(Eigen::Index column, const EffectParameter& p, double common) const {
-    const double half = rule_.half(found_.after.fit, column, common / p.typical) * p.typical;
+  [[nodiscard]] std::array<double, 2> interval(Eigen::Index column, const Effect& effect, const EffectParameter& p,
+                                               double common) const {
+    const double placed = rule_.placed(effect.name(), p);
+    const double half = rule_.half(found_.after.fit, column, common / p.typical, placed) * p.typical;
     return {p.value - half, p.value + half};
   }
 
@@ -132,7 +135,7 @@ class Findings {
         const auto& ref = found_.after.parameters[c];
         if (cause_of(found_.extended[ref.effect]) != cause.cause) continue;
         const auto& p = found_.extended[ref.effect].parameters()[ref.parameter];
-        const auto ci = interval(static_cast<Eigen::Index>(c), p, std::abs(p.value));
+        const auto ci = interval(static_cast<Eigen::Index>(c), found_.extended[ref.effect], p, std::abs(p.value));
         cause.parameters.push_back({p.name, p.unit, p.in_unit(),
                                     {ci[0] / p.si_per_unit, ci[1] / p.si_per_unit}});
       }
@@ -179,7 +182,7 @@ class Findings {
       const auto& effect = found_.extended[ref.effect];
       if (effect.name() != "joint_offset") continue;
       const auto& p = effect.parameters()[ref.parameter];
-      const auto ci = interval(static_cast<Eigen::Index>(c), p, 0.0);
+      const auto ci = interval(static_cast<Eigen::Index>(c), effect, p, 0.0);
       report.offsets_ci95_deg[effect.target().joint] = {degrees(ci[0]), degrees(ci[1])};
     }
   }
@@ -338,8 +341,10 @@ CauseName name_of(const Candidate& candidate) {
 DiagnosisReport findings(MeasurementSource& source, const SelectionOptions& rules,
                          const CoordinateLayout& layout, const BlockPlan& plan, const Found& found,
                          const ErrorModel& baseline, const ModelFit& before,
-                         const std::vector<NotTestable>& excluded, double systematic_share) {
-  return Findings(source, rules, layout, plan, found, baseline, before, systematic_share).report(excluded);
+                         const std::vector<NotTestable>& excluded, double systematic_share,
+                         const std::map<std::string, double>& systematic_error) {
+  return Findings(source, rules, layout, plan, found, baseline, before, systematic_share, systematic_error)
+      .report(excluded);
 }
 
 }  // namespace bodyschema::diagnosis

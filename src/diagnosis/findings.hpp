@@ -24,6 +24,7 @@ CauseName name_of(const Candidate& candidate);
 DiagnosisReport findings(MeasurementSource& source, const SelectionOptions& rules,
                          const CoordinateLayout& layout, const BlockPlan& plan, const Found& found,
                          const ErrorModel& baseline, const ModelFit& before,
-                         const std::vector<NotTestable>& excluded, double systematic_share);
+                         const std::vector<NotTestable>& excluded, double systematic_share,
+                         const std::map<std::string, double>& systematic_error);
 
 }  // namespace bodyschema::diagnosis

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace bodyschema::diagnosis {
@@ -28,15 +29,21 @@ double inflation(const BlockFit& fit) {
 
 }  // namespace
 
-IntervalRule::IntervalRule(const BlockFit& final_fit, std::size_t blocks, double systematic_share)
+IntervalRule::IntervalRule(const BlockFit& final_fit, std::size_t blocks, double systematic_share,
+                           std::map<std::string, double> systematic_error)
     : inflation_(inflation(final_fit)), student_(student95(static_cast<double>(blocks) - 1.0)),
-      systematic_share_(systematic_share) {}
+      systematic_share_(systematic_share), systematic_error_(std::move(systematic_error)) {}
 
-double IntervalRule::half(const BlockFit& fit, Eigen::Index column, double common) const {
+double IntervalRule::half(const BlockFit& fit, Eigen::Index column, double common, double placed) const {
   if (!fit.usable) return std::numeric_limits<double>::infinity();
   const double floor = 0.7 * inflation_ * fit.model_variance[column];
   const double sd = std::sqrt(std::max(fit.covariance(column, column), floor));
-  return std::hypot(student_ * sd, 1.96 * systematic_share_ * common);
+  return std::hypot(student_ * sd, 1.96 * systematic_share_ * common, 1.96 * placed);
+}
+
+double IntervalRule::placed(const std::string& effect, const EffectParameter& p) const {
+  const auto at = systematic_error_.find(effect);
+  return at == systematic_error_.end() ? 0.0 : at->second * p.si_per_unit / p.typical;
 }
 
 }  // namespace bodyschema::diagnosis

@@ -20,6 +20,28 @@ const ExclusionLimit* limit_of(const DiagnosisReport& report, const TrialFault& 
   return at == report.exclusion_limits.end() ? nullptr : &*at;
 }
 
+/// How pictures place an outline is no matter of the cause's own size, and shows between no blocks.
+TEST(Intervals, IncludeWhatAllPicturesPlaceAlike) {
+  constexpr double kPlaced_px = 0.1;
+  TrialOptions options;
+  options.duration_s = 30.0;
+  options.faults = {{{"silhouette_bias", "", ""}, 1.2, 0.0, 0.23}};
+  const auto log = make_synthetic_log(test::robot(), options, test::log_seed());
+  auto rules = test::usual_options(*log);
+  const auto by_blocks = diagnose(*log, rules);
+  rules.systematic_error = {{"silhouette_bias", kPlaced_px}};
+  const auto with_placing = diagnose(*log, rules);
+  ASSERT_EQ(by_blocks.causes.size(), 1u) << by_blocks.sentence;
+  ASSERT_EQ(with_placing.causes.size(), 1u) << with_placing.sentence;
+  const auto &narrow = by_blocks.causes[0].parameters.at(0), &wide = with_placing.causes[0].parameters.at(0);
+  EXPECT_EQ(wide.estimate, narrow.estimate);
+  EXPECT_NEAR(wide.ci95[1] - wide.estimate, std::hypot(narrow.ci95[1] - narrow.estimate, 1.96 * kPlaced_px), 1e-9);
+  // Of another cause nothing changes.
+  const auto limit = [](const DiagnosisReport& report) { return limit_of(report, {{"mesh_scale", "", ""}, 0, 0, 0}); };
+  ASSERT_NE(limit(by_blocks), nullptr);
+  EXPECT_EQ(limit(by_blocks)->limit, limit(with_placing)->limit);
+}
+
 TEST(ExclusionLimits, HoldWhatWasTooSmallToBeFound) {
   // A third of what can be detected: of half of it 24 of 40 logs were found out, and have no limit.
   constexpr int kLogs = 24;
