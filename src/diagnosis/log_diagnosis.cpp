@@ -75,8 +75,8 @@ class LogDiagnosis {
     diagnosis.trusted_rms_px = kShapeError_px;
     diagnosis.trusted_outline = kTrustedOutline;
     diagnosis.systematic_share = kSystematicShare;
-    // What five simulated logs with nothing wrong showed (rms), always of one sign: blur, threshold and pixels
-    // place an outline some 0.03 px inside the true one, most where it bends, as at fingertips.
+    // What five simulated logs with nothing wrong showed (rms), always of one sign; probably how blur, threshold
+    // and pixels place an outline where it bends.
     diagnosis.systematic_error = {
         {"silhouette_bias", 0.04}, {"finger_posture", 0.03}, {"mesh_scale", 0.06}, {"focal_length", 0.11}};
     diagnosis.selection.crowd_rest_t = kCrowdThroughPictures;

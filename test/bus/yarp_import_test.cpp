@@ -182,7 +182,7 @@ std::string arm_rows(int rows, const std::string& bad) {
 
 TEST_F(YarpImport, LeavesOutAFewBadLinesAndCountsThem) {
   for (const std::string bad : {"-1 100.07 90 7\n", "-1 100.07 90 7 nan\n", "-1 100.07 90 7 6x\n", "-1 10",
-                                "-1 soon 90 7 6\n", "x 100.07 90 7 6\n", "-1 100.07 90 7 6 5\n"}) {
+                                "-1 soon 90 7 6\n", "x 100.07 90 7 6\n", "-1 100.07 90 7 6 5\n", "-1 99999 90 7 6\n"}) {
     write_recording();
     // Cut: two rows run into one.
     write("arm/data.log", arm_rows(40, bad));
