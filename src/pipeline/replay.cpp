@@ -210,8 +210,31 @@ class Replay {
                           estimate.state != EstimatorState::kLearningBackground;
     frames_.push_back(std::move(frame));
     last_ = estimate;
+    remember_convergence();
     if (complete) last_view_ = std::move(observation);
     if (truth_) online_error(estimate);
+  }
+
+  /// Whether the hand is told to a millimetre is a matter of the frame as well: at the edge of the picture the
+  /// offsets are as well known as before, the hand is not.
+  void remember_convergence() {
+    if (last_.state == EstimatorState::kConverged) {
+      converged_ = last_;
+      frames_since_ = 0;
+    } else if (last_.state == EstimatorState::kConverging) {
+      ++frames_since_;
+    } else if (last_.state == EstimatorState::kDiverged) {
+      converged_.reset();
+    }
+  }
+  /// A log that ends so has converged: with the offsets of the last frame that said so.
+  void end_where_it_converged() {
+    constexpr std::size_t kFew_frames = 30;
+    constexpr double kSame_rad = 0.25 * kPi / 180.0;
+    if (last_.state == EstimatorState::kConverged || !converged_ || frames_since_ > kFew_frames) return;
+    if ((last_.offset_rad - converged_->offset_rad).cwiseAbs().maxCoeff() > kSame_rad) return;
+    ended_after_ = last_.state;
+    last_ = *converged_;
   }
 
   /// Error of the estimate each frame had at its time, last frames only, see finish().
@@ -229,6 +252,7 @@ class Replay {
   }
 
   std::string finish() {
+    end_where_it_converged();
     Json summary;
     summary["log"] = options_.log.filename().string();
     summary["frames"] = frames_.size();
@@ -276,6 +300,9 @@ class Replay {
     if (last_.state != EstimatorState::kConverged) {
       lines = fmt::format("\nNOT CONVERGED: the log ended in state '{}': {}\n", to_string(last_.state),
                           why_not_converged());
+    } else if (ended_after_) {
+      lines = fmt::format("\nThe last frames ({}) tell the hand less well: these are the offsets at {:.3f} s, the last "
+                          "that were 'converged'.\n", to_string(*ended_after_), seconds(last_.utime));
     }
     const auto warn = [&](const std::string& text) {
       if (text.empty()) return;
@@ -352,6 +379,9 @@ class Replay {
   std::size_t swapped_frames_ = 0;
   std::optional<Observation> last_view_;
   Estimate last_;
+  std::optional<Estimate> converged_;  ///< the last that was, nothing having contradicted it since
+  std::size_t frames_since_ = 0;
+  std::optional<EstimatorState> ended_after_;  ///< the log's last state, where the offsets are those of before
   BusStatistics statistics_;
   std::string complaint_;
 };

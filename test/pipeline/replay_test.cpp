@@ -193,6 +193,43 @@ TEST_F(ReplayTest, SaysSoWhenItEndsWithoutHavingConverged) {
   EXPECT_THAT(good, ::testing::Not(HasSubstr("NOT CONVERGED")));
 }
 
+/// At the end of most recordings the arm leaves the pictures. What was known is known.
+TEST_F(ReplayTest, ALogWhoseArmLeavesThePicturesAtTheEndHasConverged) {
+  ReplayOptions o = options("leaves");
+  o.log = folder_ / "leaves.log";
+  o.overlays = 0;
+  std::vector<LogEvent> events;
+  LogReader reader(folder_ / "reach.log");
+  for (LogEvent event; reader.next(event);) events.push_back(event);
+  std::vector<std::size_t> pictures;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    if (events[i].channel == "ICUB_CAMERAS") pictures.push_back(i);
+  }
+  const auto decoded = [&](std::size_t i) {
+    bot_core::images_t message;
+    message.decode(events[i].data.data(), 0, static_cast<int>(events[i].data.size()));
+    return message;
+  };
+  const bot_core::images_t empty_room = decoded(pictures.front());
+  {
+    LogWriter log(o.log);
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      const auto from_end = std::find(pictures.end() - 4, pictures.end(), i);
+      if (from_end == pictures.end()) {
+        log.publish(events[i].channel, events[i].time_us, events[i].data);
+        continue;
+      }
+      bot_core::images_t message = decoded(i);
+      for (std::size_t c = 0; c < message.images.size(); ++c) message.images[c].data = empty_room.images.at(c).data;
+      log.publish_message(events[i].channel, events[i].time_us, message);
+    }
+  }
+  const std::string table = replay(configuration(), o);
+  EXPECT_THAT(table, ::testing::Not(HasSubstr("NOT CONVERGED")));
+  EXPECT_THAT(table, HasSubstr("The last frames (hand_not_in_view) tell the hand less well"));
+  EXPECT_EQ(nlohmann::json::parse(content(o.out / "summary.json"))["estimate"]["state"], "converged");
+}
+
 TEST_F(ReplayTest, SaysSoWhenLeftAndRightAreSwapped) {
   ReplayOptions o = options("swapped");
   o.log = folder_ / "swapped.log";
