@@ -16,20 +16,41 @@ constexpr std::size_t kShown = 3;
 constexpr int kHalfPart_px = 75;
 constexpr int kEnlargement = 3;
 
+/// A silhouette of a pinhole camera as a lens with radial distortion k1 shows it.
+BinaryMask bent(const BinaryMask& straight, const PinholeIntrinsics& k, double k1) {
+  BinaryMask result(straight.width(), straight.height());
+  for (int v = 0; v < straight.height(); ++v) {
+    for (int u = 0; u < straight.width(); ++u) {
+      const Eigen::Vector2d seen((u - k.cx) / k.fx, (v - k.cy) / k.fy);
+      Eigen::Vector2d x = seen;
+      for (int i = 0; i < 5; ++i) x = seen / (1.0 + k1 * x.squaredNorm());
+      const auto su = static_cast<int>(std::lround(k.fx * x.x() + k.cx));
+      const auto sv = static_cast<int>(std::lround(k.fy * x.y() + k.cy));
+      const bool inside = su >= 0 && sv >= 0 && su < straight.width() && sv < straight.height();
+      if (inside && straight.at(su, sv)) result.set(u, v);
+    }
+  }
+  return result;
+}
+
 /// Predicted silhouettes of one error model, asked for in order of time.
 class ModelSilhouettes {
  public:
   ModelSilhouettes(const Pipeline& pipeline, const ErrorModel& model, std::span<const JointSample> stream)
       : online_(pipeline.shared_robot(), pipeline.setup(), model), offsets_(model.offsets()), stream_(stream),
         corrections_(offsets_.size()),
-        body_(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(), {}) {
+        body_(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(), {}), rig_(model.corrected(pipeline.rig())) {
     SilhouetteModel silhouettes;
     silhouettes.culling = pipeline.setup().culling;
     for (const auto& part : pipeline.robot().meshes()) silhouettes.parts.push_back(part.mesh);
     SilhouetteOptions options;
     options.engine = "contour";
     options.threads = 1;
-    scorer_ = make_silhouette_scorer(silhouettes, model.corrected(pipeline.rig()).intrinsics(), options);
+    scorer_ = make_silhouette_scorer(silhouettes, rig_.intrinsics(), options);
+    for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
+      // Of the configured distortion the pictures are free.
+      k1_.push_back(rig_.cameras[c].distortion[0] - pipeline.rig().cameras[c].distortion[0]);
+    }
   }
 
   BinaryMask at(const JointSample& joints, std::size_t camera) {
@@ -40,7 +61,8 @@ class ModelSilhouettes {
     const Eigen::VectorXd q = joints.q - offsets_;
     std::vector<Eigen::Isometry3f> X_CB(body_.part_count());
     body_.compute({q, &corrections_}, Eigen::VectorXd(), camera, X_CB);
-    return scorer_->render(X_CB, camera);
+    BinaryMask silhouette = scorer_->render(X_CB, camera);
+    return k1_[camera] == 0.0 ? silhouette : bent(silhouette, rig_.cameras[camera].intrinsics, k1_[camera]);
   }
 
  private:
@@ -52,6 +74,8 @@ class ModelSilhouettes {
   std::size_t next_ = 0;
   Corrections corrections_;
   BodyPoseModel body_;
+  StereoRig rig_;
+  std::vector<double> k1_;  ///< what the model adds to each camera's
   std::unique_ptr<SilhouetteScorer> scorer_;
 };
 
