@@ -168,7 +168,7 @@ class Selector {
 
   [[nodiscard]] bool enters(std::size_t candidate, const CandidateScore& s) const {
     const auto& c = candidates_[candidate];
-    const double least = share_left() * (c.generic() ? generic_gain_floor_ : gain_floor_);
+    const double least = measure_of(c) * (c.generic() ? generic_gain_floor_ : gain_floor_);
     const bool large = c.temporal() && s.gain > options_.gain_large;
     const double z = large ? options_.z_large : options_.z_enter;
     return s.testable && s.z > z && s.gain > least && s.t > options_.t_enter &&
@@ -185,7 +185,7 @@ class Selector {
     if (!plain.usable) return false;
     if (!extended.usable) return candidates_[candidate].slip;  // near an end: one group holds it all
     const auto z = wald_z(extended, extended_model, candidate);
-    return z > options_.z_far && (plain.heldout() - extended.heldout()) / baseline_ > gain_floor_ * share_left();
+    return z > options_.z_far && (plain.heldout() - extended.heldout()) / baseline_ > gain_floor_ * measure_of(candidates_[candidate]);
   }
 
   [[nodiscard]] std::vector<CandidateScore> score_all() const {
@@ -285,6 +285,9 @@ class Selector {
   /// Held-out loss of the model so far, as a share of the baseline's. Where one cause makes up nearly all of
   /// that, it is what the next one is measured by.
   [[nodiscard]] double share_left() const { return std::min(1.0, current_.heldout() / baseline_); }
+  /// What a candidate's gain must be a share of. Beside a large cause all there was, for causes in time: what is
+  /// not quite right in the large one's own shape comes and goes with the motion, and looks like a small slip.
+  [[nodiscard]] double measure_of(const Candidate& c) const { return c.temporal() ? 1.0 : share_left(); }
 
   void add_causes() {
     while (static_cast<int>(causes_.size()) < options_.max_causes) {
