@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bodyschema/geometry/pose.hpp"
+
 namespace bodyschema {
 
 namespace {
 constexpr double kShortestStep_s = 0.010;
 /// Readings this close are the same: a joint at rest.
 constexpr double kStill_rad = 2e-4;
+constexpr Microseconds kRestless = 100'000;
 }
 
 JointHistory::JointHistory(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad,
@@ -67,6 +70,24 @@ JointHistory::Arrival JointHistory::add(const JointStateMessage& message) {
   return Arrival::kFresh;
 }
 
+bool JointHistory::too_far(double way_rad, const Sample& before, const Sample& after) const {
+  const double step_s = seconds(after.utime - before.utime);
+  return std::abs(way_rad) > options_.max_speed_rad_s * std::max(step_s, kShortestStep_s);
+}
+
+/// Whether readings up to sample `last` have jumped to and fro shortly before the instant: then none of them
+/// is to be relied on, however smooth the two next to it are. A full turn is no jump here: the arm is the
+/// same, and a joint may hover about the place where its encoder wraps.
+bool JointHistory::is_restless(const Ring& ring, std::size_t last, Microseconds utime) const {
+  bool to = false, fro = false;
+  for (std::size_t i = last; i > 0 && ring.at(i - 1).utime > utime - kRestless; --i) {
+    const Sample &before = ring.at(i - 1), &after = ring.at(i);
+    const double way_rad = std::remainder(after.q - before.q, 2.0 * kPi);
+    if (too_far(way_rad, before, after)) (way_rad > 0.0 ? to : fro) = true;
+  }
+  return to && fro;
+}
+
 JointHistory::Verdict JointHistory::interpolate(const Ring& ring, Microseconds utime, double& q, double& qdot) const {
   if (ring.count == 0) {
     q = ring.fixed_rad;
@@ -91,7 +112,8 @@ JointHistory::Verdict JointHistory::interpolate(const Ring& ring, Microseconds u
   const double step_s = seconds(after.utime - before.utime);
   const bool still = std::abs(after.q - before.q) <= kStill_rad;
   const bool gap = after.utime - before.utime > (still ? options_.max_still_gap : options_.max_gap);
-  const bool jump = std::abs(after.q - before.q) > options_.max_speed_rad_s * std::max(step_s, kShortestStep_s);
+  const bool jump = too_far(after.q - before.q, before, after);
+  if (is_restless(ring, low, utime)) return Verdict::kJump;
   q = after.q;
   qdot = after.qdot;
   if (after.utime != utime) {

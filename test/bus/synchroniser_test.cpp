@@ -7,6 +7,8 @@
 #include <cmath>
 #include <random>
 
+#include "bodyschema/geometry/pose.hpp"
+
 namespace bodyschema {
 namespace {
 
@@ -331,6 +333,27 @@ TEST_F(SynchroniserTest, NothingIsInterpolatedAcrossAJump) {
   EXPECT_THAT(q, ElementsAre(testing::DoubleNear(0.1, 1e-6), testing::DoubleNear(1.1, 1e-6),
                              testing::DoubleNear(1.1, 1e-6)));
   EXPECT_EQ(dropped(DropReason::kEncoderJump), 1u);
+}
+
+// Readings that jump to and fro: between two pictures they may do so any number of times and look smooth at
+// each. An estimate learned 60 deg of offset from such.
+TEST_F(SynchroniserTest, NothingIsTakenFromReadingsThatJumpToAndFro) {
+  make(1);
+  const auto at = [&](int ms, double q) {
+    sync_->add(joints(ms * kMs, {{"arm", static_cast<float>(q)}, {"neck", 0.0F}}));
+  };
+  for (int i = 0; i < 100; ++i) at(10 * i, i / 2 % 2 == 0 ? 0.1 : 1.15);
+  for (const int ms : {305, 505, 700, 900}) picture(0, ms * kMs);
+  EXPECT_FALSE(sync_->next().has_value());
+  EXPECT_EQ(dropped(DropReason::kEncoderJump), 4u);
+  // Quiet for 100 ms, and well again.
+  for (int i = 100; i < 150; ++i) at(10 * i, 0.1);
+  picture(0, 1205 * kMs);
+  EXPECT_TRUE(sync_->next().has_value());
+  // Hovering about the place where it wraps.
+  for (int i = 150; i < 200; ++i) at(10 * i, i / 2 % 2 == 0 ? 3.14 : 3.14 - 2.0 * kPi);
+  picture(0, 1905 * kMs);
+  EXPECT_TRUE(sync_->next().has_value());
 }
 
 TEST_F(SynchroniserTest, PictureOlderThanAllEncodersIsDropped) {

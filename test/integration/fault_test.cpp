@@ -317,7 +317,7 @@ TEST_F(World, OneJointMissing) {
 
 TEST_F(World, EncoderJumpsToAndFro) {
   suffer({.name = "encoder jumps by 60 deg", .faults = faults::encoder_jumps("r_elbow"),
-          .words = "the encoder of r_elbow jumped"});
+          .words = "the encoder of r_elbow jumped", .level = HealthLevel::kError});
 }
 
 TEST_F(World, EncoderWraps) {

@@ -16,6 +16,7 @@
 
 #include "bodyschema/bus/bus_options.hpp"
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/service/start_up_checks.hpp"
 
 namespace bodyschema::integration {
 namespace {
@@ -171,7 +172,9 @@ std::string why_no_lcm() {
   }
 }
 
-Listener::Listener(const std::string& lcm_url) : link_(lcm_url) {
+// Every picture of the network passes through its socket: one of a hundred offsets was lost in the 200 KiB that a
+// socket has by default.
+Listener::Listener(const std::string& lcm_url) : link_(with_receive_buffer(lcm_url)) {
   const Channels channels = Channels::with_prefix("ICUB");
   link_.subscribe(channels.joint_offsets, 1000, [this](const std::string&, Bytes message, std::int64_t) {
     joint_offsets_t decoded;

@@ -17,7 +17,8 @@ struct JointHistoryOptions {
   /// unless the joint reads the same on both sides and they are no further apart than this.
   Microseconds max_still_gap = 1'000'000;
   /// Neighbouring samples that differ by more than this speed allows (taken over at least 10 ms, for
-  /// the noise of closely spaced samples) are a jump, across which nothing is interpolated either.
+  /// the noise of closely spaced samples) are a jump, across which nothing is interpolated either; after
+  /// one to and one fro nothing is for 100 ms.
   double max_speed_rad_s = 20.0;
   /// Where joint velocities come from: the messages, or the slope between the two neighbours, for
   /// publishers that leave velocities at zero.
@@ -79,6 +80,8 @@ class JointHistory {
   };
   void map_names(const std::vector<std::string>& names);
   Verdict interpolate(const Ring& ring, Microseconds utime, double& q, double& qdot) const;
+  [[nodiscard]] bool too_far(double way_rad, const Sample& before, const Sample& after) const;
+  [[nodiscard]] bool is_restless(const Ring& ring, std::size_t last, Microseconds utime) const;
 
   std::vector<std::string> names_;
   std::map<std::string, Eigen::Index> index_;
