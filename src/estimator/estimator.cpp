@@ -194,7 +194,7 @@ struct Estimator::Impl {
 
   /// Without one: by the guesses that the search began with, which no wrong minimum has led astray.
   bool starts_swapped() {
-    if (particles_only() || eye_order.in_order()) return false;
+    if (particles_only() || eye_order.settled() || !scorer.can_be_exchanged()) return false;
     Eigen::VectorXd x = Eigen::VectorXd::Zero(state.size());
     const auto n = static_cast<std::size_t>(first_guesses.cols());
     for (std::size_t i = 0; i < n; ++i) {

@@ -6,6 +6,7 @@
 namespace bodyschema {
 
 bool EyeOrder::exchanged(double as_they_are, double exchanged) {
+  frames_ = std::min(frames_ + 1, kPatience);
   constexpr double kLeast = 1e-3;  // of a distance
   // What no guess comes near is hardly the whole hand: an arm that is just coming in fits somehow.
   constexpr double kNear = 0.4, kVeryNear = 0.3;

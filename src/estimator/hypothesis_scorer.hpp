@@ -32,8 +32,10 @@ class HypothesisScorer {
   /// The distance of one hypothesis; slots and their distances stay as they are.
   double distance(const Eigen::VectorXd& x);
 
+  /// Whether the frame has two pictures of one size.
+  [[nodiscard]] bool can_be_exchanged() const;
   /// The same two against the pictures of the other eye: the smallest of slots 0 to n - 1, or that of one
-  /// hypothesis. 1 where there are not two pictures of one size.
+  /// hypothesis. 1 where they cannot be exchanged.
   double smallest_exchanged(std::size_t n);
   double distance_exchanged(const Eigen::VectorXd& x);
 
@@ -46,7 +48,6 @@ class HypothesisScorer {
 
  private:
   void score_slots(std::size_t begin, std::size_t n, Eigen::VectorXd& distances);
-  [[nodiscard]] bool can_be_exchanged() const;
   void exchange();
 
   BodyPoseModel& body_;

@@ -324,6 +324,20 @@ TEST_F(EstimatorOnOwnRobot, PicturesThatAreExchangedFromTheBeginningAreNoticed) 
   }
 }
 
+// Frames of one eye say nothing about which is which: the other camera may come later.
+TEST_F(EstimatorOnOwnRobot, ASwapIsNoticedAlsoWhereOneCameraBeganAlone) {
+  constexpr double kFrames = 60.0;
+  Estimator estimator(robot_, setup_, rig_, options_);
+  for (int frame = 0; frame < 4; ++frame) {
+    Observation one = exchanged(seen(*reach_, frame, kFrames));
+    one.cameras[1].reset();
+    estimator.step(one);
+  }
+  for (int frame = 4; frame < 24; ++frame) {
+    EXPECT_TRUE(estimator.step(exchanged(seen(*reach_, frame, kFrames))).cameras_swapped) << frame;
+  }
+}
+
 // A single frame that is wrong, as when encoders jump to and fro: what was learned before counts again
 // as soon as the pictures agree with it.
 TEST_F(EstimatorOnOwnRobot, OneFrameWithAWrongEncoderCostsNoKnowledge) {
