@@ -29,6 +29,21 @@ std::string content(const fs::path& file) {
   return text.str();
 }
 
+/// Plays a plan into a log, with what was true beside it.
+void record(const Configuration& configuration, const simulator::SimulatorSettings& settings,
+            const simulator::SimulationPlan& plan, const fs::path& file, const fs::path& truth_file) {
+  const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
+  simulator::Simulator simulator(setup.load(), setup, StereoRig::from(configuration.section("cameras")), settings, plan);
+  LogWriter log(file);
+  simulator::FramePublisher publisher(simulator.joint_names(), {});
+  simulator::TruthWriter truth(truth_file, simulator, setup);
+  while (auto frame = simulator.next()) {
+    publisher.publish(*frame, log);
+    truth.add(*frame);
+  }
+  truth.close();
+}
+
 /// A short reach of our own robot, recorded once for all tests of this file.
 class ReplayTest : public ::testing::Test {
  protected:
@@ -36,22 +51,12 @@ class ReplayTest : public ::testing::Test {
     folder_ = fs::temp_directory_path() / ("replay_test_" + std::to_string(getpid()));
     fs::create_directories(folder_);
     const Configuration configuration = Configuration::load(kConfig);
-    const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
-    const StereoRig rig = StereoRig::from(configuration.section("cameras"));
     simulator::SimulationPlan plan;
     plan.seed = 3;
     plan.frames = 20;
     plan.offsets_deg = {{"r_shoulder_pitch", 5}, {"r_elbow", -2}, {"r_wrist_pitch", -7}};
-    simulator::Simulator simulator(setup.load(), setup, rig,
-                                   simulator::SimulatorSettings::from(configuration.section("simulator")), plan);
-    LogWriter log(folder_ / "reach.log");
-    simulator::FramePublisher publisher(simulator.joint_names(), {});
-    simulator::TruthWriter truth(folder_ / "truth.json", simulator, setup);
-    while (auto frame = simulator.next()) {
-      publisher.publish(*frame, log);
-      truth.add(*frame);
-    }
-    truth.close();
+    record(configuration, simulator::SimulatorSettings::from(configuration.section("simulator")), plan,
+           folder_ / "reach.log", folder_ / "truth.json");
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
 
@@ -104,9 +109,7 @@ TEST_F(ReplayTest, ARigWithARightCameraAloneIsSimulatedAndReplayedUnderItsName) 
   ASSERT_NE(left, std::string::npos);
   yaml.erase(left, yaml.find("right: {", left) - left);
   const Configuration right_only = Configuration::parse(yaml, kConfig.parent_path());
-  const RobotSetup setup = RobotSetup::from(right_only.section("robot"));
-  const StereoRig rig = StereoRig::from(right_only.section("cameras"));
-  ASSERT_EQ(rig.cameras.size(), 1u);
+  ASSERT_EQ(StereoRig::from(right_only.section("cameras")).cameras.size(), 1u);
   simulator::SimulationPlan plan;
   plan.seed = 3;
   plan.frames = 12;
@@ -115,18 +118,7 @@ TEST_F(ReplayTest, ARigWithARightCameraAloneIsSimulatedAndReplayedUnderItsName) 
   o.log = folder_ / "right.log";
   o.out = folder_ / "right";
   o.truth = folder_ / "right.json";
-  {
-    simulator::Simulator simulator(setup.load(), setup, rig,
-                                   simulator::SimulatorSettings::from(right_only.section("simulator")), plan);
-    LogWriter log(o.log);
-    simulator::FramePublisher publisher(simulator.joint_names(), {});
-    simulator::TruthWriter truth(*o.truth, simulator, setup);
-    while (auto frame = simulator.next()) {
-      publisher.publish(*frame, log);
-      truth.add(*frame);
-    }
-    truth.close();
-  }
+  record(right_only, simulator::SimulatorSettings::from(right_only.section("simulator")), plan, o.log, *o.truth);
   const std::string table = replay(right_only, o);
   EXPECT_THAT(table, HasSubstr("right eye, last"));
   EXPECT_THAT(table, ::testing::Not(HasSubstr("left eye")));
@@ -138,7 +130,6 @@ TEST_F(ReplayTest, ARigWithARightCameraAloneIsSimulatedAndReplayedUnderItsName) 
 /// The arm is in view from the first picture on: learned from the first pictures it would be background.
 TEST_F(ReplayTest, LearnsTheBackgroundFromTheWholeLogUnlessToldOtherwise) {
   const Configuration c = Configuration::load(kConfig);
-  const RobotSetup setup = RobotSetup::from(c.section("robot"));
   auto settings = simulator::SimulatorSettings::from(c.section("simulator"));
   settings.background_frames = 0;
   settings.entry_frames = 0;
@@ -150,17 +141,7 @@ TEST_F(ReplayTest, LearnsTheBackgroundFromTheWholeLogUnlessToldOtherwise) {
   o.log = folder_ / "in_view.log";
   o.truth = folder_ / "in_view.json";
   o.overlays = 0;
-  {
-    simulator::Simulator simulator(setup.load(), setup, StereoRig::from(c.section("cameras")), settings, plan);
-    LogWriter log(o.log);
-    simulator::FramePublisher publisher(simulator.joint_names(), {});
-    simulator::TruthWriter truth(*o.truth, simulator, setup);
-    while (auto frame = simulator.next()) {
-      publisher.publish(*frame, log);
-      truth.add(*frame);
-    }
-    truth.close();
-  }
+  record(c, settings, plan, o.log, *o.truth);
   const auto largest_error_mm = [&](int from) {
     std::ifstream lines(o.out / "estimates.jsonl");
     double largest = 0.0;
