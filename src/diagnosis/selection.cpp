@@ -363,7 +363,9 @@ class Selector {
       const auto& smallest = list[list.size() - 1 - result.set_aside.size()];
       const double gain = smallest.score.gain, without_it = left + crowd - rest + gain;
       const bool alone = !many && crowd <= options_.gain_floor * left;
-      if ((alone || gain > options_.crowd_floor * without_it) && gain > options_.crowd_ratio * crowd) break;
+      const double floor =
+          candidates_[smallest.candidate].temporal() ? options_.crowd_floor_in_time : options_.crowd_floor;
+      if ((alone || gain > floor * without_it) && gain > options_.crowd_ratio * crowd) break;
       crowd += gain;
       result.set_aside.push_back(smallest);
     }

@@ -155,6 +155,22 @@ TEST(Selection, TellsACrowdFromACauseInACrowd) {
   }
 }
 
+/// In a log with fifteen small errors a slip of a third of what can be detected took a quarter of the loss.
+TEST(Selection, AsksMoreOfACauseInTimeThatStandsInACrowd) {
+  // The last takes away a quarter of the loss, and seven times what the others do; or half of it.
+  for (const auto& [size, in_time] : {std::pair{0.6, false}, std::pair{1.1, true}}) {
+    for (std::uint64_t i = 0; i < 10; ++i) {
+      const auto log = log_with({0.12, -0.12, 0.12, 0.12, -0.12, size}, test::seed() + i);
+      auto candidates = several(6);
+      EXPECT_EQ(found(select_causes(log, {{0}}, candidates)), (std::vector<std::size_t>{5})) << "seed " << test::seed() + i;
+      candidates[5].name = "drift";
+      const auto drift = select_causes(log, {{0}}, candidates);
+      EXPECT_EQ(!drift.causes.empty(), in_time) << "seed " << test::seed() + i;
+      if (!in_time) EXPECT_TRUE(drift.crowded) << "seed " << test::seed() + i;
+    }
+  }
+}
+
 /// As where pictures err alike in every block: all others together take away next to nothing, but surely.
 TEST(Selection, AHandfulOfTracesIsNoCrowd) {
   const std::vector<double> traces = {0.02, -0.03, 0.02, 0.03, -0.02, 0.03};

@@ -56,6 +56,9 @@ struct SelectionOptions {
   /// at most twice the others; a gain error of 4 % on a recording with small ones on every other joint took
   /// 0.2 and 2.6 times the others.
   double crowd_floor = 0.15;
+  /// ... of one in time: it happens once, so all errors that fit the postures before it worse than those after
+  /// add to it. A slip of a third of what can be detected took 0.25.
+  double crowd_floor_in_time = 0.3;
   double crowd_ratio = 2.5;
   double crowd_worth = 0.05;  ///< a crowd that takes away less is not worth a word
   /// Causes that are there from the beginning; a search drops those that the data does not ask for
