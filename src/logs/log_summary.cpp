@@ -24,6 +24,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kGapPeriods = 3.0;
 constexpr double kTurn_rad = radians(0.5);
 constexpr Microseconds kSpeedWindow = 50'000;
+constexpr std::size_t kMostPorts = 8;  // listed for people
 
 /// Stamps as they come, and what they say when all are there.
 class Stamps {
@@ -172,7 +173,13 @@ class Summariser {
 
   bool take_joints(const LogEvent& event) {
     if (!decode(event.data, joint_state_).ok()) return false;
-    joint_stamps_.add(joint_state_.utime);
+    // Arm and head of a YARP recording come in turns; only each by itself has a rate.
+    const auto [port, is_new_port] = encoder_index_.try_emplace(joint_state_.names, encoder_stamps_.size());
+    if (is_new_port) {
+      summary_.encoders.push_back({joint_state_.names, {}});
+      encoder_stamps_.emplace_back();
+    }
+    encoder_stamps_[port->second].add(joint_state_.utime);
     auto& channels = summary_.joint_channels;
     if (std::find(channels.begin(), channels.end(), event.channel) == channels.end())
       channels.push_back(event.channel);
@@ -208,7 +215,8 @@ class Summariser {
       summary_.pictures.push_back(
           {channel, camera_name(type), encoding_name(format), width, height, stamps.regularity()});
     }
-    summary_.joint_readings = joint_stamps_.regularity();
+    for (std::size_t e = 0; e < encoder_stamps_.size(); ++e)
+      summary_.encoders[e].stamps = encoder_stamps_[e].regularity();
     for (auto& joint : joints_)
       summary_.joints.push_back(std::move(joint.motion));
   }
@@ -217,7 +225,8 @@ class Summariser {
   LogSummary summary_;
   std::map<std::string, Channel> channels_;
   std::map<std::tuple<std::string, int, int, int, std::int32_t>, Stamps> pictures_;
-  Stamps joint_stamps_;
+  std::map<std::vector<std::string>, std::size_t> encoder_index_;
+  std::vector<Stamps> encoder_stamps_;
   std::map<std::string, std::size_t> joint_index_;
   std::vector<JointWatcher> joints_;
   JointStateMessage joint_state_;
@@ -281,8 +290,15 @@ std::string LogSummary::text() const {
                        p.stamps.rate_hz, gaps_text(p.stamps));
   }
   if (joints.empty()) return out;
-  out += fmt::format("\nencoders: {} joints at {:.1f} Hz, {}\n", joints.size(),
-                     joint_readings.rate_hz, gaps_text(joint_readings));
+  out += "\n";
+  for (std::size_t e = 0; e < std::min(encoders.size(), kMostPorts); ++e) {
+    const auto& [names, stamps] = encoders[e];
+    const std::string which = encoders.size() > 1 && !names.empty() ? fmt::format(" ({}, ...)", names.front()) : "";
+    out += fmt::format("encoders: {}{} at {:.1f} Hz, {}\n", plural(names.size(), "joint"), which, stamps.rate_hz,
+                       gaps_text(stamps));
+  }
+  if (encoders.size() > kMostPorts)
+    out += fmt::format("encoders: {} other sets of joints\n", encoders.size() - kMostPorts);
   out += fmt::format("{:<28} {:>10} {:>10} {:>12} {:>6}\n", "joint that moved", "from deg",
                      "to deg", "deg/s at most", "turns");
   std::size_t still = 0;
@@ -322,7 +338,10 @@ std::string LogSummary::json() const {
                              {"height", p.height},
                              {"stamps", regularity_json(p.stamps)}});
   }
-  j["joint_readings"] = regularity_json(joint_readings);
+  j["encoders"] = Json::array();
+  for (const auto& e : encoders) {
+    j["encoders"].push_back({{"joints", e.joints}, {"stamps", regularity_json(e.stamps)}});
+  }
   j["joints"] = Json::array();
   for (const auto& m : joints) {
     j["joints"].push_back({{"joint", m.name},

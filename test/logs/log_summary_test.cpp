@@ -57,6 +57,31 @@ TEST(LogSummary, TellsHowJointsMoved) {
   EXPECT_THAT(text, HasSubstr("1 gap, the longest 1100 ms"));
 }
 
+// Arm and head of a YARP recording, half a millisecond apart: together they came at 200 Hz and with a gap after
+// every head reading.
+TEST(LogSummary, CountsEncodersThatComeInTurnsEachByThemselves) {
+  const auto file = testing_logs::scratch_file("ports.lcmlog");
+  {
+    LogWriter writer(file);
+    for (Microseconds t = 0; t < 2'000'000; t += 10'000) {
+      auto arm = testing_logs::joints(kBegin + t, 0.1F, 0.2F);
+      auto head = testing_logs::joints(kBegin + t + 500, 0.3F, 0.4F);
+      head.joint_name = {"tilt", "pan"};
+      if (t < 1'000'000 || t >= 1'500'000) writer.publish("ICUB_JOINT_STATE", arm.utime, encode(arm));
+      writer.publish("ICUB_JOINT_STATE", head.utime, encode(head));
+    }
+  }
+  const auto summary = summarise_log(file);
+  ASSERT_EQ(summary.encoders.size(), 2u);
+  EXPECT_THAT(summary.encoders[1].joints, testing::ElementsAre("tilt", "pan"));
+  EXPECT_NEAR(summary.encoders[1].stamps.rate_hz, 100.0, 0.01);
+  EXPECT_EQ(summary.encoders[0].stamps.gaps, 1u);
+  EXPECT_EQ(summary.encoders[1].stamps.gaps, 0u);
+  EXPECT_THAT(summary.text(), HasSubstr("encoders: 2 joints (elbow, ...) at 74.9 Hz, 1 gap, the longest 510 ms\n"
+                                        "encoders: 2 joints (tilt, ...) at 100.0 Hz, no gaps\n"));
+  EXPECT_EQ(nlohmann::json::parse(summary.json())["encoders"][1]["joints"][0], "tilt");
+}
+
 TEST(LogSummary, CountsWhatCannotBeReadAndKeepsOtherPeoplesMessages) {
   const auto file = testing_logs::scratch_file("damaged.lcmlog");
   {

@@ -35,6 +35,12 @@ struct PicturesSummary {
   Regularity stamps;
 };
 
+/// Encoders that come together, as those of one port of a YARP recording do.
+struct EncodersSummary {
+  std::vector<std::string> joints;
+  Regularity stamps;
+};
+
 /// How a joint moved, as its encoder told.
 struct JointMotion {
   std::string name;
@@ -57,7 +63,7 @@ struct LogSummary {
   std::vector<PicturesSummary>
       pictures;  ///< by channel and camera; one entry per size and encoding
   std::vector<std::string> joint_channels;
-  Regularity joint_readings;        ///< stamps of all joint messages
+  std::vector<EncodersSummary> encoders;  ///< in the order of their first appearance
   std::vector<JointMotion> joints;  ///< in the order of their first appearance
 
   /// For people.
