@@ -318,4 +318,13 @@ double equivalent_z(double wald, Eigen::Index dof) {
   return wald <= join ? std::max(0.0, z(wald)) : kJoin * std::sqrt(wald / join);
 }
 
+double z_of_few(double z, std::size_t blocks, std::size_t usual) {
+  if (blocks >= usual) return z;
+  if (blocks < 2) return 0.0;
+  const double few = static_cast<double>(blocks) - 1.0, many = static_cast<double>(usual) - 1.0;
+  const auto shrink = [](double dof) { return (8.0 * dof + 1.0) / (8.0 * dof + 3.0); };
+  const double normal = shrink(few) * std::sqrt(few * std::log1p(z * z / few)) / shrink(many);
+  return std::min(z, std::sqrt(many * std::expm1(normal * normal / many)));
+}
+
 }  // namespace bodyschema

@@ -171,7 +171,7 @@ class Selector {
     const double least = measure_of(c) * (c.generic() ? generic_gain_floor_ : gain_floor_);
     const bool large = c.temporal() && s.gain > options_.gain_large;
     const double z = large ? options_.z_large : options_.z_enter;
-    return s.testable && s.z > z && s.gain > least && s.t > options_.t_enter &&
+    return s.testable && z_of_few(s.z, statistics_.block_count(), options_.usual_blocks) > z && s.gain > least && s.t > options_.t_enter &&
            (!c.temporal() || s.gain > options_.gain_far || lasts(candidate));
   }
 
@@ -184,7 +184,9 @@ class Selector {
     const auto extended = fit(extended_model, options_.far_group);
     if (!plain.usable) return false;
     if (!extended.usable) return candidates_[candidate].slip;  // near an end: one group holds it all
-    const auto z = wald_z(extended, extended_model, candidate);
+    const auto groups = [&](std::size_t blocks) { return (blocks + options_.far_group - 1) / options_.far_group; };
+    const auto z = z_of_few(wald_z(extended, extended_model, candidate), groups(statistics_.block_count()),
+                            groups(options_.usual_blocks));
     return z > options_.z_far && (plain.heldout() - extended.heldout()) / baseline_ > gain_floor_ * measure_of(candidates_[candidate]);
   }
 

@@ -147,6 +147,16 @@ TEST(EquivalentZ, AgreesWithChiSquareTables) {
   EXPECT_GT(equivalent_z(100.0, 6), 6.0);
 }
 
+TEST(ZOfFew, IsAsUnlikelyAsOfMany) {
+  EXPECT_DOUBLE_EQ(z_of_few(4.5, 30, 30), 4.5);
+  EXPECT_DOUBLE_EQ(z_of_few(4.5, 300, 30), 4.5);
+  EXPECT_DOUBLE_EQ(z_of_few(0.0, 5, 30), 0.0);
+  // Two-sided 1 % of Student's t: 4.604 with 4 degrees of freedom, 3.250 with 9, 2.756 with 29.
+  EXPECT_NEAR(z_of_few(4.604, 5, 30), 2.756, 0.05);
+  EXPECT_NEAR(z_of_few(3.250, 10, 30), 2.756, 0.03);
+  EXPECT_EQ(z_of_few(100.0, 1, 30), 0.0);
+}
+
 TEST(PairedT, IsTheUsualOne) {
   Eigen::VectorXd a(4), b = Eigen::VectorXd::Zero(4);
   a << 1, 2, 3, 4;

@@ -100,4 +100,8 @@ double paired_t(const Eigen::VectorXd& a, const Eigen::VectorXd& b);
 /// The z at which a chi-square of `dof` degrees is as unlikely as `wald`, up to the far tail.
 double equivalent_z(double wald, Eigen::Index dof);
 
+/// What `z`, whose standard error comes from `blocks` blocks, is worth in a log of `usual` ones: there as
+/// unlikely (Student's t; Wallace's approximation, 1959). Unchanged where there are as many or more.
+double z_of_few(double z, std::size_t blocks, std::size_t usual);
+
 }  // namespace bodyschema

@@ -29,6 +29,8 @@ struct Candidate {
 
 struct SelectionOptions {
   double z_enter = 4.5;
+  /// What z is asked for holds for so many blocks (a minute of usual noise); fewer know their spread worse.
+  std::size_t usual_blocks = 30;
   double gain_floor = 0.006;   ///< of the held-out loss that the model so far leaves
   double generic_gain_floor = 0.015;  ///< a free curve has more ways to follow noise
   double t_enter = 1.5;        ///< paired over blocks
