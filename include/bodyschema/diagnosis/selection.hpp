@@ -29,7 +29,8 @@ struct Candidate {
 
 struct SelectionOptions {
   double z_enter = 4.5;
-  /// What z is asked for holds for so many blocks (a minute of usual noise); fewer know their spread worse.
+  /// What z is asked for holds for so many blocks; fewer know their spread worse. (A minute with a rest has 24,
+  /// so 4.7 is asked instead of 4.5; a minute of slow noise ten.)
   std::size_t usual_blocks = 30;
   double gain_floor = 0.006;   ///< of the held-out loss that the model so far leaves
   double generic_gain_floor = 0.015;  ///< a free curve has more ways to follow noise
