@@ -28,8 +28,10 @@ Json json_of(const CauseName& c) {
 }
 
 Json json_of(const EstimatedParameter& p) {
-  return {{"parameter", p.parameter}, {"unit", p.unit}, {"estimate", number(p.estimate)},
-          {"ci95", {number(p.ci95[0]), number(p.ci95[1])}}};
+  Json j = {{"parameter", p.parameter}, {"unit", p.unit}, {"estimate", number(p.estimate)},
+            {"ci95", {number(p.ci95[0]), number(p.ci95[1])}}};
+  if (p.from) j["from_utime"] = *p.from;
+  return j;
 }
 
 Json json_of(const DiagnosedCause& c) {
@@ -91,7 +93,7 @@ std::string DiagnosisReport::to_json() const {
   for (const auto& [joint, ci] : offsets_ci95_deg) {
     j["offsets_ci95_deg"][joint] = {number(ci[0]), number(ci[1])};
   }
-  j["log"] = {{"duration_s", number(duration_s)}, {"views", views}, {"blocks", blocks},
+  j["log"] = {{"begin_utime", begin_utime}, {"duration_s", number(duration_s)}, {"views", views}, {"blocks", blocks},
               {"block_s", number(block_s)}, {"noise_correlation_s", number(noise_correlation_s)}};
   j["warnings"] = warnings;
   return j.dump(2) + "\n";

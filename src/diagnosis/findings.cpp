@@ -22,6 +22,11 @@ CauseName cause_of(const Effect& effect) {
   return {effect.name(), effect.target().joint, effect.target().source};
 }
 
+std::optional<Microseconds> begin_of(const Effect& effect) {
+  if (effect.name() != "slip") return std::nullopt;
+  return microseconds(effect.parameters()[1].value);
+}
+
 /// Views [first, last) of one instant, one a camera, in whatever order they are stamped: nearer to each
 /// other than half the time to a camera's next picture.
 std::vector<std::pair<std::size_t, std::size_t>> instants_of(std::span<const ViewInput> views) {
@@ -92,6 +97,7 @@ class Findings {
   }
 
   void add_facts(DiagnosisReport& report) const {
+    report.begin_utime = source_.views().front().joints.utime;
     report.z_threshold = rules_.z_enter;
     report.gain_threshold = found_.selection.gain_floor;
     report.duration_s = seconds(source_.views().back().joints.utime -
@@ -137,7 +143,8 @@ class Findings {
         const auto& p = found_.extended[ref.effect].parameters()[ref.parameter];
         const auto ci = interval(static_cast<Eigen::Index>(c), found_.extended[ref.effect], p, std::abs(p.value));
         cause.parameters.push_back({p.name, p.unit, p.in_unit(),
-                                    {ci[0] / p.si_per_unit, ci[1] / p.si_per_unit}});
+                                    {ci[0] / p.si_per_unit, ci[1] / p.si_per_unit},
+                                    begin_of(found_.extended[ref.effect])});
       }
       const bool listed = std::any_of(report.causes.begin(), report.causes.end(), [&](const auto& c) {
         return c.cause == cause.cause && c.variable == cause.variable;

@@ -97,7 +97,6 @@ void LogPictures::offer(const Observation& observation) {
 void LogPictures::place_hand(const Pipeline& pipeline, std::span<const ViewInput> views, DiagnosisReport& report) {
   const Eigen::VectorXd offsets = report.extended_model->offsets();
   BodyPoseModel body(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(), {});
-  if (!views.empty()) report.begin_utime = views.front().joints.utime;
   for (std::size_t v = 0; v < views.size() && v < report.samples.size(); ++v) {
     report.samples[v].utime = views[v].joints.utime;
     const auto& k = pipeline.rig().cameras[views[v].camera].intrinsics;

@@ -11,19 +11,20 @@ namespace {
 
 bool is_known(const EstimatedParameter& p) { return std::isfinite(p.ci95[0]) && std::isfinite(p.ci95[1]); }
 
-std::string text_of(const EstimatedParameter& p) {
+std::string text_of(const EstimatedParameter& p, Microseconds begin) {
   if (!is_known(p)) return fmt::format(" {} of a size that this log does not tell", p.parameter);
-  return fmt::format(" {} {:.3g}{} [{:.3g}, {:.3g}]", p.parameter, p.estimate,
-                     p.unit == "1" ? "" : " " + p.unit, p.ci95[0], p.ci95[1]);
+  const std::string when = p.from ? fmt::format(" {:.1f} s into the log", seconds(*p.from - begin)) : "";
+  return fmt::format(" {} {:.3g}{} [{:.3g}, {:.3g}]{}", p.parameter, p.estimate,
+                     p.unit == "1" ? "" : " " + p.unit, p.ci95[0], p.ci95[1], when);
 }
 
-std::string text_of(const DiagnosedCause& cause) {
+std::string text_of(const DiagnosedCause& cause, Microseconds begin) {
   if (cause.cause.name == "unexplained") {
     return fmt::format("something that follows the {} of {} and that no known cause explains",
                        cause.variable, cause.cause.joint);
   }
   std::string text = cause.cause.text();
-  for (const auto& p : cause.parameters) text += text_of(p);
+  for (const auto& p : cause.parameters) text += text_of(p, begin);
   if (cause.same.size() < 2) return text;
   text += " (or";
   for (std::size_t i = 1; i < cause.same.size(); ++i) {
@@ -38,7 +39,7 @@ void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options) {
   const auto is_unexplained = [](const DiagnosedCause& c) { return c.cause.name == "unexplained"; };
   const auto& causes = report.causes;
   std::string list;
-  for (const auto& cause : causes) list += (list.empty() ? "" : "; ") + text_of(cause);
+  for (const auto& cause : causes) list += (list.empty() ? "" : "; ") + text_of(cause, report.begin_utime);
   const double left = report.after.rms_px;
 
   if (left > options.trusted_rms_px) {

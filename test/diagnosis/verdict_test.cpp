@@ -41,6 +41,18 @@ TEST(Verdict, NamesACauseWithItsInterval) {
   EXPECT_EQ(report.sentence, "The log asks for: encoder_gain of r_elbow gain 4 % [3.5, 4.5].");
 }
 
+TEST(Verdict, SaysWhenAJointSlipped) {
+  DiagnosedCause cause;
+  cause.cause = {"slip", "r_elbow", ""};
+  cause.parameters = {{"step", "deg", 2.0, {1.9, 2.1}, Microseconds{1'600'000'048'700'000}}};
+  cause.same = {cause.cause};
+  auto report = report_of(0.3, {cause});
+  report.begin_utime = 1'600'000'000'000'000;
+  word_verdict(report, picture_options());
+  EXPECT_EQ(report.sentence, "The log asks for: slip of r_elbow step 2 deg [1.9, 2.1] 48.7 s into the log.");
+  EXPECT_THAT(report.to_json(), HasSubstr("\"from_utime\": 1600000048700000"));
+}
+
 TEST(Verdict, SaysAClassWhereSeveralFit) {
   auto cause = gain_of_elbow();
   cause.same.push_back({"eccentricity", "r_elbow", ""});

@@ -25,6 +25,7 @@ struct EstimatedParameter {
   std::string unit;
   double estimate = 0.0;
   std::array<double, 2> ci95{};
+  std::optional<Microseconds> from{};  ///< of a slip: when it happened, us since the Unix epoch
 };
 
 struct DiagnosedCause {
@@ -106,7 +107,7 @@ struct DiagnosisReport {
   std::vector<CandidateBar> bars;
   double z_threshold = 0.0, gain_threshold = 0.0;
   std::vector<ResidualSample> samples;
-  Microseconds begin_utime = 0;
+  Microseconds begin_utime = 0;  ///< first picture
   double duration_s = 0.0, block_s = 0.0, noise_correlation_s = 0.0;
   std::size_t views = 0, blocks = 0;
 
