@@ -79,6 +79,18 @@ TEST(LogDiagnosis, WarnsOfATurnedHeadBeforeARoomAndOfPicturesNotUsed) {
   fs::remove(log);
 }
 
+/// A longer log knew the wrist's pitch to 0.015 deg, and erred by 0.04, like every other log.
+TEST(LogDiagnosis, IntervalsOfOffsetsIncludeWhatAllPicturesPlaceAlike) {
+  const fs::path log = fs::temp_directory_path() / ("log_diagnosis_offsets_" + std::to_string(getpid()) + ".lcmlog");
+  record(log, false, 0.0);
+  const auto report = diagnosis(log);
+  ASSERT_EQ(report.offsets_ci95_deg.size(), 7u);
+  for (const auto& [joint, ci] : report.offsets_ci95_deg) {
+    EXPECT_GT(0.5 * (ci[1] - ci[0]), 1.96 * 0.03) << joint;
+  }
+  fs::remove(log);
+}
+
 TEST(LogDiagnosis, RefusesSwappedPictures) {
   const fs::path log = fs::temp_directory_path() / ("log_diagnosis_swapped_" + std::to_string(getpid()) + ".lcmlog");
   record(log, false, 0.0, true);
