@@ -22,10 +22,11 @@ std::string network_advice(const std::string& url) {
 
 struct LcmLink::Subscriber {
   Handler handler;
-  /// Called by C code: nothing may be thrown out of it.
-  void receive(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+  /// Called by C code: nothing may be thrown out of it. Not a member function: GCC 12 with
+  /// -fsanitize=undefined calls LCM's pointer to one on a null object.
+  static void receive(const lcm::ReceiveBuffer* buffer, const std::string& channel, Subscriber* self) {
     try {
-      handler(channel, Bytes(static_cast<const std::uint8_t*>(buffer->data), buffer->data_size), buffer->recv_utime);
+      self->handler(channel, Bytes(static_cast<const std::uint8_t*>(buffer->data), buffer->data_size), buffer->recv_utime);
     } catch (const std::exception& e) {
       spdlog::error("{}: message could not be handled: {}", channel, e.what());
     } catch (...) {
@@ -54,7 +55,7 @@ void LcmLink::subscribe(const std::string& channel, int queue_messages, Handler 
   if (guarded_) return guarded_->subscribe(channel, queue_messages, std::move(handler));
   auto subscriber = std::make_unique<Subscriber>(Subscriber{std::move(handler)});
   // LCM takes a pattern; ours are names of letters, digits, '_' and '-', which stand for themselves.
-  lcm::Subscription* subscription = lcm_->subscribe(channel, &Subscriber::receive, subscriber.get());
+  lcm::Subscription* subscription = lcm_->subscribeFunction(channel, &Subscriber::receive, subscriber.get());
   if (subscription == nullptr) {
     throw DeviceError("LCM cannot receive on '" + url_ + "'" + network_advice(url_));
   }
