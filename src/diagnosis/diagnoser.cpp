@@ -272,7 +272,7 @@ class Diagnoser {
   void set_tolerances(CandidateSet& set) const {
     for (auto& candidate : set.candidates) {
       const auto at = options_.tolerances.find(candidate.name);
-      if (!candidate.nuisance || at == options_.tolerances.end()) continue;
+      if (!(candidate.nuisance || candidate.slip) || at == options_.tolerances.end()) continue;
       const auto effect = make_effect(candidate.name, candidate.target, source_.roles());
       const auto& p = std::as_const(*effect).parameters()[0];
       candidate.tolerance = at->second * p.si_per_unit / p.typical;

@@ -175,12 +175,17 @@ class Selector {
            (!c.temporal() || s.gain > options_.gain_far || lasts(candidate));
   }
 
-  /// Whether a cause in time also predicts stretches that lie far from what its fit has seen. Slow
+  /// Whether a slip is larger than what one puts up with, and a cause in time also predicts stretches that lie far from what its fit has seen. Slow
   /// noise follows any smooth curve into the next block, but not further.
   [[nodiscard]] bool lasts(std::size_t candidate) const {
     const auto rest = without(model_, candidate);
-    const auto plain = fit(rest, options_.far_group);
     const auto extended_model = with(rest, candidate);
+    if (candidates_[candidate].slip) {
+      const auto all = fit(extended_model);
+      const double step = all.usable ? all.estimate[position(extended_model, candidate)] : 0.0;
+      if (std::abs(step) < candidates_[candidate].tolerance) return false;
+    }
+    const auto plain = fit(rest, options_.far_group);
     const auto extended = fit(extended_model, options_.far_group);
     if (!plain.usable) return false;
     if (!extended.usable) return candidates_[candidate].slip;  // near an end: one group holds it all

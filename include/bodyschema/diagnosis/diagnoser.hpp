@@ -20,7 +20,7 @@ struct DiagnosisOptions {
   int refit_iterations = 4;
   /// Effects that every real robot has and that the baseline fits beside the offsets.
   std::vector<CauseName> nuisances;
-  /// Sizes of nuisances, by effect name in the unit of its parameter, that are put up with: a
+  /// Sizes of nuisances and of slips, by effect name in the unit of its parameter, that are put up with: a
   /// picture's blur and threshold alone make a mask 0.1 px fatter, and not everywhere alike. The same
   /// 0.1 px at the fingertips, a hand's length from the origin of their link at 0.3 m, is 0.1 % of the
   /// mesh, at a forearm's flanks 0.4 %. (Detectable is 0.6 %.)

@@ -19,7 +19,9 @@ struct Candidate {
   /// the offsets has none.
   std::vector<std::size_t> parameters;
   bool nuisance = false;   ///< part of the baseline fit; reported when it is significant
-  double tolerance = 0.0;  ///< a nuisance below this (in units of its column) is not worth a word
+  /// In units of its column: a nuisance below this is not worth a word; a slip below it is hardly one, unless it
+  /// takes away much.
+  double tolerance = 0.0;
   bool slip = false;       ///< `columns` has one entry, switched on at its block
   /// Whether it is a matter of time, which slow noise looks like.
   [[nodiscard]] bool temporal() const { return slip || name == "drift" || variable == "time"; }
