@@ -83,6 +83,7 @@ class LogDiagnosis {
     // Not every posture is off alike: the last seconds of a log in another one look like a small slip.
     diagnosis.tolerances["slip"] = 3.0 * diagnosis.systematic_error.at("slip");
     diagnosis.selection.crowd_rest_t = kCrowdThroughPictures;
+    diagnosis.selection.shape_error = kSystematicShare;
     auto report = diagnosed(diagnosis);
     add_remarks(report);
     LogPictures::place_hand(pipeline_, measurement_.views(), report);

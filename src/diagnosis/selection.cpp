@@ -168,15 +168,16 @@ class Selector {
 
   [[nodiscard]] bool enters(std::size_t candidate, const CandidateScore& s) const {
     const auto& c = candidates_[candidate];
-    const double least = measure_of(c) * (c.generic() ? generic_gain_floor_ : gain_floor_);
+    const double floor = c.generic() ? generic_gain_floor_ : gain_floor_;
+    const double least = std::max(floor * measure_of(c), unshapely());
     const bool large = c.temporal() && s.gain > options_.gain_large;
     const double z = large ? options_.z_large : options_.z_enter;
-    return s.testable && z_of_few(s.z, statistics_.block_count(), options_.usual_blocks) > z && s.gain > least && s.t > options_.t_enter &&
-           (!c.temporal() || s.gain > options_.gain_far || lasts(candidate));
+    return s.testable && z_of_few(s.z, statistics_.block_count(), options_.usual_blocks) > z && s.gain > least &&
+           s.t > options_.t_enter && (!c.temporal() || s.gain > options_.gain_far || lasts(candidate));
   }
 
-  /// Whether a slip is larger than what one puts up with, and a cause in time also predicts stretches that lie far from what its fit has seen. Slow
-  /// noise follows any smooth curve into the next block, but not further.
+  /// Whether a slip is larger than what one puts up with, and a cause in time also predicts stretches that lie
+  /// far from what its fit has seen. Slow noise follows any smooth curve into the next block, but not further.
   [[nodiscard]] bool lasts(std::size_t candidate) const {
     const auto rest = without(model_, candidate);
     const auto extended_model = with(rest, candidate);
@@ -295,6 +296,11 @@ class Selector {
   /// What a candidate's gain must be a share of. Beside a large cause all there was, for causes in time: what is
   /// not quite right in the large one's own shape comes and goes with the motion, and looks like a small slip.
   [[nodiscard]] double measure_of(const Candidate& c) const { return c.temporal() ? 1.0 : share_left(); }
+
+  /// Held-out loss that causes leave because their shapes are not quite right (three sigma).
+  [[nodiscard]] double unshapely() const {
+    return 9.0 * options_.shape_error * options_.shape_error * (1.0 - share_left());
+  }
 
   void add_causes() {
     while (static_cast<int>(causes_.size()) < options_.max_causes) {

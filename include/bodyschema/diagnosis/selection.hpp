@@ -35,6 +35,9 @@ struct SelectionOptions {
   /// so 4.7 is asked instead of 4.5; a minute of slow noise ten.)
   std::size_t usual_blocks = 30;
   double gain_floor = 0.006;   ///< of the held-out loss that the model so far leaves
+  /// By this share of its size (one sigma) a cause's true shape differs from its column; beside a large one that
+  /// looks like a small cause of another kind.
+  double shape_error = 0.0;
   double generic_gain_floor = 0.015;  ///< a free curve has more ways to follow noise
   double t_enter = 1.5;        ///< paired over blocks
   std::size_t far_group = 3;   ///< blocks held out together for causes in time: noise may be slow
