@@ -75,8 +75,8 @@ class LogDiagnosis {
     diagnosis.trusted_rms_px = kShapeError_px;
     diagnosis.trusted_outline = kTrustedOutline;
     diagnosis.systematic_share = kSystematicShare;
-    // What five simulated logs with nothing wrong showed (rms), always of one sign; probably how blur, threshold
-    // and pixels place an outline where it bends. Joint offsets were 0.03 deg off in eight logs of two simulators,
+    // What five simulated logs with nothing wrong showed (rms), always of one sign: how masks place an
+    // outline under shading and noise. Joint offsets were 0.03 deg off in eight logs of two simulators,
     // the wrist's pitch -0.04 in every one.
     diagnosis.systematic_error = {{"silhouette_bias", 0.04}, {"finger_posture", 0.03}, {"mesh_scale", 0.06},
                                   {"focal_length", 0.11}, {"joint_offset", 0.03}, {"slip", 0.03}};

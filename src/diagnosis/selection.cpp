@@ -169,24 +169,29 @@ class Selector {
   [[nodiscard]] bool enters(std::size_t candidate, const CandidateScore& s) const {
     const auto& c = candidates_[candidate];
     const double floor = c.generic() ? generic_gain_floor_ : gain_floor_;
-    const double least = std::max(floor * measure_of(c), unshapely());
+    const double least = std::max(floor * measure_of(c), left_by_shapes());
     const bool large = c.temporal() && s.gain > options_.gain_large;
     const double z = large ? options_.z_large : options_.z_enter;
     return s.testable && z_of_few(s.z, statistics_.block_count(), options_.usual_blocks) > z && s.gain > least &&
-           s.t > options_.t_enter && (!c.temporal() || s.gain > options_.gain_far || lasts(candidate));
+           s.t > options_.t_enter &&
+           (!c.temporal() || s.gain > options_.gain_far || (!tolerable_slip(candidate) && lasts(candidate)));
   }
 
-  /// Whether a slip is larger than what one puts up with, and a cause in time also predicts stretches that lie
-  /// far from what its fit has seen. Slow noise follows any smooth curve into the next block, but not further.
+  /// Whether a slip is no larger than what one puts up with.
+  [[nodiscard]] bool tolerable_slip(std::size_t candidate) const {
+    const auto& c = candidates_[candidate];
+    if (!c.slip || c.tolerance <= 0.0) return false;
+    const auto extended_model = with(without(model_, candidate), candidate);
+    const auto extended = fit(extended_model);
+    return !extended.usable || std::abs(extended.estimate[position(extended_model, candidate)]) < c.tolerance;
+  }
+
+  /// Whether a cause in time also predicts stretches that lie far from what its fit has seen. Slow
+  /// noise follows any smooth curve into the next block, but not further.
   [[nodiscard]] bool lasts(std::size_t candidate) const {
     const auto rest = without(model_, candidate);
-    const auto extended_model = with(rest, candidate);
-    if (candidates_[candidate].slip) {
-      const auto all = fit(extended_model);
-      const double step = all.usable ? all.estimate[position(extended_model, candidate)] : 0.0;
-      if (std::abs(step) < candidates_[candidate].tolerance) return false;
-    }
     const auto plain = fit(rest, options_.far_group);
+    const auto extended_model = with(rest, candidate);
     const auto extended = fit(extended_model, options_.far_group);
     if (!plain.usable) return false;
     if (!extended.usable) return candidates_[candidate].slip;  // near an end: one group holds it all
@@ -298,7 +303,7 @@ class Selector {
   [[nodiscard]] double measure_of(const Candidate& c) const { return c.temporal() ? 1.0 : share_left(); }
 
   /// Held-out loss that causes leave because their shapes are not quite right (three sigma).
-  [[nodiscard]] double unshapely() const {
+  [[nodiscard]] double left_by_shapes() const {
     return 9.0 * options_.shape_error * options_.shape_error * (1.0 - share_left());
   }
 

@@ -38,8 +38,8 @@ struct DiagnosisOptions {
   /// do not show between them: how a picture's blur and threshold place an outline, what encoders did
   /// between two readings. Widens the intervals of causes.
   double systematic_share = 0.0;
-  /// The same for causes that change the outline's size, whatever theirs is: by effect, one sigma in the unit of
-  /// its parameter.
+  /// The same whatever the cause's size is, for those that masks imitate: by effect, one sigma in the unit of its
+  /// parameter.
   std::map<std::string, double> systematic_error;
   std::function<void(double)> progress;  ///< called with the share done
 };
