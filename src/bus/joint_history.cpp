@@ -25,6 +25,7 @@ JointHistory::JointHistory(std::vector<std::string> joint_names, const std::map<
       ring.is_fixed = true;
       ring.fixed_rad = fixed->second;
     }
+    ring.is_idle = options_.idle_joints.contains(names_[j]);
   }
 }
 
@@ -35,6 +36,20 @@ void JointHistory::Ring::push(const Sample& sample) {
   } else {
     first = (first + 1) % buffer.size();
   }
+}
+
+std::size_t JointHistory::Ring::first_from(Microseconds utime) const {
+  std::size_t low = 0;
+  std::size_t high = count;
+  while (low < high) {
+    const std::size_t middle = (low + high) / 2;
+    if (at(middle).utime < utime) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return low;
 }
 
 void JointHistory::map_names(const std::vector<std::string>& names) {
@@ -96,17 +111,7 @@ JointHistory::Verdict JointHistory::interpolate(const Ring& ring, Microseconds u
   }
   if (ring.at(ring.count - 1).utime < utime) return Verdict::kNotYet;
   if (ring.at(0).utime > utime) return Verdict::kTooOld;
-  // The first sample at or after the instant.
-  std::size_t low = 0;
-  std::size_t high = ring.count - 1;
-  while (low < high) {
-    const std::size_t middle = (low + high) / 2;
-    if (ring.at(middle).utime < utime) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
+  const std::size_t low = ring.first_from(utime);
   const Sample& after = ring.at(low);
   const Sample& before = ring.at(low > 0 ? low - 1 : low);
   const double step_s = seconds(after.utime - before.utime);
@@ -129,6 +134,22 @@ JointHistory::Verdict JointHistory::interpolate(const Ring& ring, Microseconds u
   return Verdict::kReady;
 }
 
+/// Whether a joint that need not be published may take its last reading, or the fixed value before the first,
+/// where there is none around the instant. One that is published may not: that would be a guess.
+bool JointHistory::may_hold(const Ring& ring, Verdict verdict, Microseconds utime) const {
+  if (ring.is_idle) return true;
+  if (!ring.is_fixed) return false;
+  const auto seldom = [&](std::size_t i) { return ring.at(i).utime - ring.at(i - 1).utime > options_.max_still_gap; };
+  switch (verdict) {
+    case Verdict::kNotYet: return ring.count < 2 || seldom(ring.count - 1);
+    case Verdict::kTooOld: return ring.count < ring.buffer.size();  // else earlier ones were forgotten
+    case Verdict::kGap: return seldom(ring.first_from(utime));
+    case Verdict::kReady:
+    case Verdict::kJump: break;
+  }
+  return false;
+}
+
 JointHistory::Answer JointHistory::interpolate(Microseconds utime, JointSample& out) const {
   const auto n = static_cast<Eigen::Index>(rings_.size());
   out.utime = utime;
@@ -136,8 +157,15 @@ JointHistory::Answer JointHistory::interpolate(Microseconds utime, JointSample& 
   out.qdot.resize(n);
   Answer answer;
   for (Eigen::Index j = 0; j < n; ++j) {
-    const Verdict verdict = interpolate(rings_[static_cast<std::size_t>(j)], utime, out.q[j], out.qdot[j]);
+    const Ring& ring = rings_[static_cast<std::size_t>(j)];
+    const Verdict verdict = interpolate(ring, utime, out.q[j], out.qdot[j]);
     if (verdict == Verdict::kReady) continue;
+    if (may_hold(ring, verdict, utime)) {
+      const std::size_t after = ring.first_from(utime);
+      out.q[j] = after > 0 ? ring.at(after - 1).q : ring.fixed_rad;
+      out.qdot[j] = 0.0;
+      continue;
+    }
     if (verdict != Verdict::kNotYet) return {verdict, j};  // waiting will not mend it
     if (answer.verdict == Verdict::kReady) answer = {verdict, j};
   }
@@ -157,7 +185,7 @@ Microseconds JointHistory::newest(Eigen::Index joint) const {
 std::vector<std::string> JointHistory::missing_joints() const {
   std::vector<std::string> missing;
   for (std::size_t j = 0; j < rings_.size(); ++j) {
-    if (rings_[j].count == 0 && !rings_[j].is_fixed) missing.push_back(names_[j]);
+    if (rings_[j].count == 0 && !rings_[j].is_fixed && !rings_[j].is_idle) missing.push_back(names_[j]);
   }
   return missing;
 }

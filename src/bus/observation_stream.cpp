@@ -2,6 +2,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include <set>
+
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
 
@@ -19,24 +21,36 @@ std::vector<std::string> joint_names(const RobotModel& robot) {
   return names;
 }
 
-/// Values of the joints that need not be published: those the configuration fixes, and those that
-/// move nothing that is seen or sees.
-std::map<std::string, double> resting_joints(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
-                                             const StereoRig& rig) {
+/// Joints that move nothing that is seen or sees.
+std::set<std::string> idle_joints(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                                  const StereoRig& rig) {
   std::vector<std::string> links = setup.model.rendered_links;
   links.push_back(setup.hand_link);
   links.insert(links.end(), setup.fingertip_links.begin(), setup.fingertip_links.end());
   for (const CameraModel& camera : rig.cameras) links.push_back(camera.link);
   const ForwardKinematics kinematics(robot, links);
-  const Eigen::VectorXd q = setup.default_joints(*robot);
-  std::map<std::string, double> resting = setup.fixed_joints_rad;
-  resting.insert(setup.fixed_joints_m.begin(), setup.fixed_joints_m.end());
+  std::set<std::string> idle;
   for (Eigen::Index j = 0; j < robot->joint_count(); ++j) {
     bool matters = false;
     for (std::size_t link = 0; link < links.size() && !matters; ++link) matters = kinematics.moves(j, link);
-    if (!matters) resting.emplace(robot->joints()[static_cast<std::size_t>(j)].name, q[j]);
+    if (!matters) idle.insert(robot->joints()[static_cast<std::size_t>(j)].name);
   }
+  return idle;
+}
+
+/// Values of the joints that need not be published: those the configuration fixes, and idle ones.
+std::map<std::string, double> resting_joints(const RobotModel& robot, const RobotSetup& setup,
+                                             const std::set<std::string>& idle) {
+  const Eigen::VectorXd q = setup.default_joints(robot);
+  std::map<std::string, double> resting = setup.fixed_joints_rad;
+  resting.insert(setup.fixed_joints_m.begin(), setup.fixed_joints_m.end());
+  for (const std::string& name : idle) resting.emplace(name, q[robot.joint_index(name)]);
   return resting;
+}
+
+BusOptions with_idle_joints(BusOptions options, std::set<std::string> idle) {
+  options.synchroniser.joints.idle_joints = std::move(idle);
+  return options;
 }
 
 }  // namespace
@@ -77,7 +91,8 @@ ObservationStream::ObservationStream(const std::vector<std::string>& joint_names
 
 ObservationStream::ObservationStream(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
                                      const StereoRig& rig, const BusOptions& options)
-    : ObservationStream(joint_names(*robot), resting_joints(robot, setup, rig), rig.cameras, options) {}
+    : ObservationStream(joint_names(*robot), resting_joints(*robot, setup, idle_joints(robot, setup, rig)), rig.cameras,
+                        with_idle_joints(options, idle_joints(robot, setup, rig))) {}
 
 bool ObservationStream::receive(std::string_view channel, Bytes message, std::int64_t arrival_us) {
   if (channel == channels_.joint_state) {

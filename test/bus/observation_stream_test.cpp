@@ -9,6 +9,7 @@
 #include "bodyschema/bus/observation_queue.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/effects/online_error_model.hpp"
+#include "robot/temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {
@@ -103,6 +104,34 @@ TEST(ObservationStream, CarriesWhatTheExtendedModelKnowsAtEachExposure) {
   EXPECT_NEAR(dq[1], dq[0], 1e-12);
   EXPECT_NEAR(dq[2], 0.01, 1e-6);
   EXPECT_NEAR(dq[3], dq[2], 1e-12);
+}
+
+TEST(ObservationStream, ALegThatFallsSilentIsNotMissed) {
+  TemporaryFolder folder;
+  const auto joint = [](const std::string& name, const std::string& child) {
+    return "<link name='" + child + "'/><joint name='" + name + "' type='continuous'><parent link='base'/><child link='" +
+           child + "'/><axis xyz='0 0 1'/></joint>";
+  };
+  RobotSetup setup;
+  setup.model.urdf = folder.write("robot.urdf", "<robot name='r'><link name='base'/>" + joint("arm", "hand") +
+                                                    joint("knee", "foot") + "</robot>");
+  setup.hand_link = "hand";
+  setup.estimated_joints = {"arm"};
+  StereoRig cameras;
+  cameras.cameras = rig();
+  for (auto& camera : cameras.cameras) camera.link = "base";
+  ObservationStream stream(setup.load(), setup, cameras, {});
+  int observations = 0;
+  for (int i = 0; i < 300; ++i) {
+    auto message = arm(10 * i * kMs, 0.5F);
+    stream.receive("ICUB_JOINT_STATE", encode(message));
+    message.joint_name = {"knee"};
+    if (i < 20) stream.receive("ICUB_JOINT_STATE", encode(message));
+    if (i % 10 == 5) stream.receive("ICUB_CAMERAS", encode(pictures(message.utime - 1)));
+    while (stream.next()) ++observations;
+  }
+  EXPECT_EQ(observations, 30);
+  EXPECT_EQ(stream.statistics().synchroniser.total_dropped(), 0u);
 }
 
 TEST(ObservationStream, CountsAndSkipsWhatIsMalformed) {

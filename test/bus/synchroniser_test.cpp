@@ -264,6 +264,47 @@ TEST_F(SynchroniserTest, JointThatIsNeverPublishedTakesItsFixedValue) {
   EXPECT_EQ(arrived->observation.cameras[0]->joints.qdot[1], 0.0);
 }
 
+// One message gone astray makes no publisher: its reading is kept, and the next picture is not waited for.
+TEST_F(SynchroniserTest, FixedJointThatIsReadOnceHoldsThatReading) {
+  make(1, {}, {{"neck", -0.7}});
+  const auto arm_until = [&](int from_ms, int to_ms) {
+    for (int ms = from_ms; ms <= to_ms; ms += 10) sync_->add(joints(ms * kMs, {{"arm", 0.5F}}));
+  };
+  const auto neck_at = [&](int ms) {
+    picture(0, ms * kMs);
+    const auto arrived = sync_->next();
+    return arrived ? arrived->observation.cameras[0]->joints.q[1] : -99.0;
+  };
+  arm_until(0, 1000);
+  sync_->add(joints(1005 * kMs, {{"neck", 0.25F}}));
+  arm_until(1010, 1100);
+  EXPECT_NEAR(neck_at(1002), -0.7, 1e-6) << "before it, the fixed value";
+  EXPECT_NEAR(neck_at(1050), 0.25, 1e-6);
+  arm_until(1110, 5000);
+  EXPECT_NEAR(neck_at(4900), 0.25, 1e-6);
+  sync_->add(joints(5005 * kMs, {{"neck", 0.5F}}));
+  arm_until(5010, 9000);
+  EXPECT_NEAR(neck_at(5003), 0.25, 1e-6) << "between two";
+  EXPECT_NEAR(neck_at(8900), 0.5, 1e-6);
+  EXPECT_EQ(sync_->statistics().total_dropped(), 0u);
+}
+
+TEST_F(SynchroniserTest, JointThatMovesNothingThatIsSeenNeverStandsInTheWay) {
+  SynchroniserOptions options;
+  options.joints.idle_joints = {"neck"};
+  make(1, options, {{"neck", -0.7}});
+  encoders(0, 100 * kMs);  // published, then silent, then back with a jump
+  for (int ms = 110; ms <= 2000; ms += 10) {
+    sync_->add(joints(ms * kMs, {{"arm", 0.5F}}));
+    if (ms % 30 == 0) picture(0, (ms - 5) * kMs);
+  }
+  sync_->add(joints(2001 * kMs, {{"neck", 9.0F}}));
+  sync_->add(joints(2010 * kMs, {{"arm", 0.5F}, {"neck", -9.0F}}));
+  picture(0, 2005 * kMs);
+  EXPECT_EQ(out().size(), 64u);
+  EXPECT_EQ(sync_->statistics().total_dropped(), 0u);
+}
+
 TEST_F(SynchroniserTest, JointThatIsNeitherPublishedNorFixedIsNamed) {
   make(1);
   for (int i = 0; i < 100; ++i) {

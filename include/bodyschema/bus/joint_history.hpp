@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,13 +24,16 @@ struct JointHistoryOptions {
   /// Where joint velocities come from: the messages, or the slope between the two neighbours, for
   /// publishers that leave velocities at zero.
   bool velocity_from_differences = false;
+  /// Joints that move nothing that is seen or sees: whatever their readings do, they stand in nobody's way.
+  std::set<std::string> idle_joints;
 };
 
 /// Encoder readings of the recent past, joint by joint, and what they were at a given instant.
 ///
 /// Joints are matched by name, so that one message may carry all of them, some, or others besides;
 /// head and arm may be published separately. Joint vectors are in the order of `joint_names`.
-/// A joint in `fixed_rad` that was never published holds that value. One thread.
+/// A joint in `fixed_rad` holds that value before its first reading, and its last reading after it, unless
+/// its readings come often enough that one must be awaited: a message gone astray makes no publisher. One thread.
 class JointHistory {
  public:
   JointHistory(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad,
@@ -75,11 +79,15 @@ class JointHistory {
     std::size_t count = 0;
     double fixed_rad = 0.0;
     bool is_fixed = false;
+    bool is_idle = false;
     [[nodiscard]] const Sample& at(std::size_t i) const { return buffer[(first + i) % buffer.size()]; }
     void push(const Sample& sample);
+    /// The first sample at or after the instant; count: none.
+    [[nodiscard]] std::size_t first_from(Microseconds utime) const;
   };
   void map_names(const std::vector<std::string>& names);
   Verdict interpolate(const Ring& ring, Microseconds utime, double& q, double& qdot) const;
+  [[nodiscard]] bool may_hold(const Ring& ring, Verdict verdict, Microseconds utime) const;
   [[nodiscard]] bool too_far(double way_rad, const Sample& before, const Sample& after) const;
   [[nodiscard]] bool is_restless(const Ring& ring, std::size_t last, Microseconds utime) const;
 
