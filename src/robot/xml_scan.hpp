@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -26,10 +27,12 @@ class XmlScanner {
   bool next(XmlTag& tag);
   /// What follows the last tag, to the end of the text.
   [[nodiscard]] std::string_view rest() const { return text_.substr(at_); }
-  /// Whether what was scanned held a declaration `<!...>` or a `<?...>` with a bracket inside.
+  /// Whether what was scanned held a declaration `<!...>`, a `<?...>` other than a plain <?xml ...?> at the
+  /// beginning, or a tag without a name.
   [[nodiscard]] bool odd() const { return odd_; }
 
  private:
+  [[nodiscard]] bool begins_text(std::size_t at) const;
   void skip_past(std::string_view start, std::string_view end);
   std::string_view text_;
   std::size_t at_ = 0;
@@ -37,7 +40,8 @@ class XmlScanner {
 };
 
 /// Why a recursive parser should not see this text: its elements nest too deep, end more often than they
-/// begin, or it declares entities (which may stand for gigabytes). Empty when there is nothing.
+/// begin, it declares entities (which may stand for gigabytes), or parsers may see other tags in it than the
+/// scanner does. Empty when there is nothing.
 std::string xml_danger(std::string_view text, int max_depth);
 
 }  // namespace bodyschema

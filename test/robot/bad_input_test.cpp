@@ -102,6 +102,31 @@ TEST_F(BadInput, UrdfWhoseNestingIsHidden) {
     EXPECT_THAT(urdf_message(text), testing::AnyOf(HasSubstr("nest 501 deep"), HasSubstr("it declares")));
   }
 }
+// The same for what TinyXML in particular reads otherwise than it looks.
+TEST_F(BadInput, UrdfThatTheParserReadsOtherwise) {
+  for (const std::string hidden : {"<a><?xml version=\"?></a>\"?>", "<a><?XML version='?></a>'?>", "<a><?x y='?></a>'?>",
+                                   "<1 '><a>'/>", "< '><a>'/>", "<a b=\"&#x\"></a>x41;\">", "<a>&#x</a>x41;",
+                                   "<a>&#</a>#65;", "<a>\xC2</a>", "<a>\xE2\x82</a>", "<a b='\xF0'></a>'>"}) {
+    SCOPED_TRACE(hidden);
+    std::string text = "<?xml version='1.0'?><robot name='r'>";
+    for (int i = 0; i < 60'000; ++i) text += hidden;
+    EXPECT_THAT(urdf_message(text), testing::AnyOf(HasSubstr("expected"), HasSubstr("it declares")));
+  }
+  std::string nested;
+  for (int i = 0; i < 60'000; ++i) nested += "<a>";
+  for (const std::string begin : {"<?xml version='?><!--'?>", "<?xml x=\"a version=\"?><!--\"?>", "<?xml \" version=\"?><!--\"?>",
+                                  "<?xml version='1.0'?><?xml version='?><!--'?>"}) {
+    SCOPED_TRACE(begin);
+    EXPECT_THAT(urdf_message(begin + "<robot name='r'>" + nested + "-->"), HasSubstr("it declares"));
+  }
+  // What is nothing of the kind stays allowed.
+  for (const std::string begin : {"", "\xEF\xBB\xBF<?xml version=\"1.0\" ?>\n", "\n<?xml version = '1.0' encoding='utf-8' standalone=\"yes\"?>",
+                                  "<?xml version='1.0' encoding='iso-8859-1'?><!-- Andr\xE9 said -->"}) {
+    SCOPED_TRACE(begin);
+    const auto good = folder_.write("good.urdf", begin + robot("<link name='caf\xC3\xA9'/><!-- &#x20AC; a -> b, \xE2\x82\xAC -->"));
+    EXPECT_NO_THROW(RobotModel::load({good, {}, {}}));
+  }
+}
 TEST_F(BadInput, UrdfThatDeclaresEntities) {
   std::string text = "<!DOCTYPE robot [<!ENTITY a0 'aaaaaaaaaa'>";
   for (int i = 1; i < 10; ++i) {
