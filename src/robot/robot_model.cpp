@@ -147,10 +147,17 @@ void build_tree(const UrdfTree& urdf_tree, const std::string& file, RobotModel::
 
 constexpr std::size_t kMaxTriangles = 4'000'000;  // of all rendered links together
 
+constexpr double kMaxReach_m = 1e6;  // beyond, what is computed with vertices overflows
+
 /// Scales and places a mesh in the link frame; a mirroring scale turns the winding back.
-void place(TriangleMesh& mesh, const Eigen::Vector3d& scale, const Pose& X_LM) {
+void place(TriangleMesh& mesh, const Eigen::Vector3d& scale, const Pose& X_LM, const std::string& where) {
   for (auto& p : mesh.vertices) {
-    p = (X_LM * scale.cwiseProduct(p.cast<double>())).cast<float>();
+    const Eigen::Vector3d placed = X_LM * scale.cwiseProduct(p.cast<double>());
+    if (!(placed.cwiseAbs().maxCoeff() <= kMaxReach_m) || !placed.allFinite()) {
+      throw FileError(where + ": mesh '" + mesh.name + "' reaches further than 1e6 m from its link, expected metres; " +
+                      "are scale and origin right?");
+    }
+    p = placed.cast<float>();
   }
   if (scale.prod() < 0) {
     for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
@@ -209,7 +216,7 @@ TriangleMesh visual_mesh(const urdf::Visual& visual, const std::string& where,
       break;
     }
   }
-  place(mesh, scale, to_eigen(visual.origin));
+  place(mesh, scale, to_eigen(visual.origin), where);
   return mesh;
 }
 

@@ -21,6 +21,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMaxUrdfBytes = 16u << 20;
 constexpr int kMaxXmlDepth = 100;
+constexpr int kMaxLinks = 2000;  // urdfdom's links hold each other, one level of recursion for each
 
 /// Collects what urdfdom would print.
 class MessageCollector : public console_bridge::OutputHandler {
@@ -113,19 +114,24 @@ void check_link(const fs::path& file, const urdf::Link& link) {
   }
 }
 
-/// Throws when a link is the child of two joints or its own ancestor. Done on the text: urdfdom
-/// accepts such models and its shared pointers then keep them alive for ever.
-void check_no_cycle(const fs::path& file, std::string_view text) {
+/// Throws when a link is the child of two joints or its own ancestor, or there are too many. Done on the text:
+/// urdfdom accepts such models; its shared pointers then keep cycles alive for ever, and long chains end the stack.
+void check_tree(const fs::path& file, std::string_view text) {
   struct Above {
     std::string joint;
     std::string parent;
   };
   std::map<std::string, Above> above;  // by child link
   int depth = 0;
+  int count[2] = {0, 0};  // of joints and of links
   std::string joint, parent, child;
   XmlScanner scanner(text);
   for (XmlTag tag; scanner.next(tag);) {
     const bool opens = tag.kind != XmlTag::Kind::kClose;
+    if (opens && depth == 1 && (tag.name == "link" || tag.name == "joint") && ++count[tag.name == "link"] > kMaxLinks) {
+      throw FileError(file.string() + ": more than " + std::to_string(kMaxLinks) + " " + std::string(tag.name) +
+                      "s, too many for a robot");
+    }
     if (opens && depth == 1 && tag.name == "joint") joint = tag.attribute("name");
     if (opens && depth == 2 && tag.name == "parent") parent = tag.attribute("link");
     if (opens && depth == 2 && tag.name == "child") child = tag.attribute("link");
@@ -164,7 +170,7 @@ UrdfTree read_urdf(const fs::path& file) {
   if (const std::string danger = xml_danger(text, kMaxXmlDepth); !danger.empty()) {
     throw FileError(file.string() + ": not a usable URDF: " + danger);
   }
-  check_no_cycle(file, text);
+  check_tree(file, text);
 
   urdf::ModelInterfaceSharedPtr model;
   {

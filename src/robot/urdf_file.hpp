@@ -21,7 +21,7 @@ struct UrdfTree {
 /// of the error. One thread at a time (guarded inside; the message handler is global).
 ///
 /// Throws FileError naming the file when it is missing, not a regular file, larger than 16 MiB,
-/// nested deeper than 100 elements, not a URDF, or not a tree.
+/// nested deeper than 100 elements, of more than 2000 links, not a URDF, or not a tree.
 UrdfTree read_urdf(const std::filesystem::path& file);
 
 }  // namespace bodyschema

@@ -139,6 +139,21 @@ TEST_F(BadInput, UrdfThatDeclaresEntities) {
   const auto good = folder_.write("good.urdf", "<?xml version='1.0'?><!-- a > b -->" + robot("<link name='a'/>"));
   EXPECT_NO_THROW(RobotModel::load({good, {}, {}}));
 }
+TEST_F(BadInput, UrdfOfMoreLinksThanARobotHas) {
+  const auto chain = [](int links) {
+    std::string inside = "<link name='l0'/>";
+    for (int i = 1; i < links; ++i) {
+      const std::string name = std::to_string(i), above = std::to_string(i - 1);
+      inside += "<link name='l" + name + "'/>" +
+                joint("j" + name, "l" + above, "l" + name,
+                      "<axis xyz='1 0 0'/>" + (i > 1 ? "<mimic joint='j" + above + "'/>" : std::string()), "continuous");
+    }
+    return robot(inside);
+  };
+  EXPECT_THAT(urdf_message(chain(50'000)), HasSubstr("more than 2000 links, too many for a robot"));
+  const auto model = RobotModel::load({folder_.write("long.urdf", chain(2000)), {}, {}});
+  EXPECT_EQ(model->joint_count(), 1);
+}
 TEST_F(BadInput, UrdfThatIsTooLarge) {
   const auto file = folder_.write("large.urdf", "<robot/>");
   std::filesystem::resize_file(file, (16u << 20) + 1);
@@ -261,6 +276,17 @@ TEST_F(BadInput, ScaleOfZero) {
   folder_.write("a.obj", obj_text(test_box({0, 0, 0}, {1, 1, 1})));
   EXPECT_THAT(urdf_message(one_part_urdf(mesh_visual("a.obj", "1 0 1")), {"part"}),
               HasSubstr("scale must be finite and not zero"));
+}
+TEST_F(BadInput, ScaleBeyondAllMeasure) {
+  folder_.write("a.obj", obj_text(test_box({0, 0, 0}, {1, 1, 1})));
+  for (const char* scale : {"1e40 1 1", "1e7 1 1", "1 1 -1e7"}) {
+    SCOPED_TRACE(scale);
+    EXPECT_THAT(urdf_message(one_part_urdf(mesh_visual("a.obj", scale)), {"part"}),
+                AllOf(HasSubstr("link 'part'"), HasSubstr("reaches further than 1e6 m")));
+  }
+  EXPECT_THAT(urdf_message(one_part_urdf("<visual><origin xyz='0 1e30 0'/><geometry><box size='1 1 1'/></geometry></visual>"),
+                           {"part"}),
+              HasSubstr("reaches further than 1e6 m"));
 }
 TEST_F(BadInput, MoreTrianglesThanARobotHas) {
   std::string visuals;
