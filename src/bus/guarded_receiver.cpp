@@ -83,7 +83,7 @@ void GuardedReceiver::subscribe(const std::string& channel, int queue_messages, 
 }
 
 void GuardedReceiver::work() {
-  UdpmAssembler assembler;
+  UdpmAssembler assembler({}, [this](const std::string& channel, Sender sender) { return wanted(channel, sender); });
   std::vector<std::uint8_t> packet(kLargestPacket);
   while (!stopping_) {
     pollfd ready{socket_, POLLIN, 0};
@@ -101,6 +101,21 @@ void GuardedReceiver::work() {
   }
 }
 
+/// Whether a long message that has told its channel shall be put together. It makes no owner: that is who has
+/// spoken, not who has begun to.
+bool GuardedReceiver::wanted(const std::string& channel, const Sender& sender) {
+  std::string complaint;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!subscriptions_.contains(channel)) return false;
+    const std::int64_t now_us = monotonic_us();
+    if (owners_.would_admit(channel, sender, now_us)) return true;
+    complaint = refuse(channel, sender, now_us);
+  }
+  if (!complaint.empty()) spdlog::warn("{}", complaint);
+  return false;
+}
+
 void GuardedReceiver::take(UdpmAssembler::Message message) {
   const std::int64_t now = wall_us();
   std::string complaint;  // written without the lock, which the disk must not hold
@@ -112,14 +127,7 @@ void GuardedReceiver::take(UdpmAssembler::Message message) {
     if (owners_.admit(message.channel, message.sender, heard_us)) {
       enqueue(at->second, std::move(message), now);
     } else {
-      ++refused_.messages;
-      refused_.channel = message.channel;
-      refused_.sender = message.sender.text();
-      if (complained_us_ < 0 || heard_us - complained_us_ >= kQuietTime_us) {
-        complained_us_ = heard_us;
-        complaint = message.channel + ": messages of " + refused_.sender + " refused, the channel is " +
-                    owners_.owner(message.channel)->text() + "'s";
-      }
+      complaint = refuse(message.channel, message.sender, heard_us);
     }
   }
   if (!complaint.empty()) {
@@ -127,6 +135,17 @@ void GuardedReceiver::take(UdpmAssembler::Message message) {
   } else {
     arrived_.notify_one();
   }
+}
+
+/// Counts, and answers what is to be said of it, if anything is now. Needs mutex_.
+std::string GuardedReceiver::refuse(const std::string& channel, const Sender& sender, std::int64_t now_us) {
+  ++refused_.messages;
+  refused_.channel = channel;
+  refused_.sender = sender.text();
+  if (complained_us_ >= 0 && now_us - complained_us_ < kQuietTime_us) return {};
+  complained_us_ = now_us;
+  return channel + ": messages of " + refused_.sender + " refused, the channel is " + owners_.owner(channel)->text() +
+         "'s";
 }
 
 /// Needs mutex_.

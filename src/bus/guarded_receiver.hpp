@@ -43,7 +43,9 @@ class GuardedReceiver {
     LcmLink::Handler handler;
   };
   void work();
+  bool wanted(const std::string& channel, const Sender& sender);
   void take(UdpmAssembler::Message message);
+  std::string refuse(const std::string& channel, const Sender& sender, std::int64_t now_us);
   void enqueue(Subscription& subscription, UdpmAssembler::Message message, std::int64_t wall_us);
 
   int socket_ = -1;

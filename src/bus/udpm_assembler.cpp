@@ -67,49 +67,79 @@ std::optional<UdpmAssembler::Message> UdpmAssembler::take_fragment(Bytes packet,
   if (offset > size || rest.size() > size - offset) return std::nullopt;
 
   auto at = pending_.find(sender);
-  if (at != pending_.end() && (at->second.sequence != sequence || at->second.bytes.size() != size ||
-                               at->second.here.size() != fragments)) {
+  if (at != pending_.end() && (at->second.sequence != sequence || at->second.size != size ||
+                               at->second.fragments != fragments)) {
     // A sender's numbers rise (and wrap): what comes late belongs to a message given up before.
     if (static_cast<std::int32_t>(sequence - at->second.sequence) < 0) return std::nullopt;
     give_up(at);
     at = pending_.end();
   }
   if (at == pending_.end()) {
-    make_room(size);
-    Pending begun;
-    begun.sequence = sequence;
-    begun.bytes.resize(size);
-    begun.here.resize(fragments);
-    begun.missing = fragments;
-    begun.begun = order_++;
-    pending_bytes_ += size;
-    at = pending_.emplace(sender, std::move(begun)).first;
+    at = pending_.emplace(sender, Pending{}).first;
+    at->second.sequence = sequence;
+    at->second.size = size;
+    at->second.fragments = fragments;
+    at->second.begun = order_++;
+    pending_bytes_ += at->second.memory();
   }
   Pending& pending = at->second;
-  if (pending.here[fragment]) return std::nullopt;
-  pending.here[fragment] = true;
-  --pending.missing;
-  std::copy(rest.begin(), rest.end(), pending.bytes.begin() + static_cast<std::ptrdiff_t>(offset));
-  if (channel) pending.channel = std::move(channel);
-  if (pending.missing > 0) return std::nullopt;
-  Message message{std::move(*pending.channel), std::move(pending.bytes), sender};
-  pending_bytes_ -= size;
-  pending_.erase(at);
+  if (pending.unwanted || pending.pieces.contains(fragment)) return std::nullopt;
+  pending_bytes_ -= pending.memory();
+  if (channel && wanted_ && !wanted_(*channel, sender)) {
+    pending.unwanted = true;
+    pending.pieces.clear();
+    pending.arrived = 0;
+  } else {
+    pending.pieces.emplace(fragment, Piece{offset, {rest.begin(), rest.end()}});
+    pending.arrived += rest.size();
+    if (channel) pending.channel = std::move(channel);
+  }
+  pending_bytes_ += pending.memory();
+  if (!make_room(at) || pending.unwanted || pending.pieces.size() < fragments) return std::nullopt;
+  if (pending.arrived != size) {  // or a packet that says it is all of a long message would take that memory
+    give_up(at);
+    return std::nullopt;
+  }
+  Message message{std::move(*pending.channel), std::vector<std::uint8_t>(size), sender};
+  for (const auto& [unused, piece] : pending.pieces) {
+    std::copy(piece.bytes.begin(), piece.bytes.end(),
+              message.bytes.begin() + static_cast<std::ptrdiff_t>(piece.offset));
+  }
+  remove(at);
   return message;
 }
 
-void UdpmAssembler::give_up(std::map<Sender, Pending>::iterator pending) {
-  ++incomplete_;
-  pending_bytes_ -= pending->second.bytes.size();
+/// With what the tables take, so that many small pieces are not free.
+std::size_t UdpmAssembler::Pending::memory() const {
+  constexpr std::size_t kEach = 128;
+  return arrived + kEach * (1 + pieces.size());
+}
+
+void UdpmAssembler::remove(Place pending) {
+  pending_bytes_ -= pending->second.memory();
   pending_.erase(pending);
 }
 
-void UdpmAssembler::make_room(std::size_t bytes) {
-  while (!pending_.empty() &&
-         (pending_.size() >= limits_.senders || pending_bytes_ + bytes > limits_.pending_bytes)) {
-    give_up(std::min_element(pending_.begin(), pending_.end(),
-                             [](const auto& a, const auto& b) { return a.second.begun < b.second.begun; }));
+void UdpmAssembler::give_up(Place pending) {
+  if (!pending->second.unwanted) ++incomplete_;
+  remove(pending);
+}
+
+/// False where the newcomer itself had to go.
+bool UdpmAssembler::make_room(Place newcomer) {
+  while (pending_.size() > limits_.senders || pending_bytes_ > limits_.pending_bytes) {
+    const bool too_many = pending_.size() > limits_.senders;
+    const auto victim = std::min_element(pending_.begin(), pending_.end(), [&](const auto& a, const auto& b) {
+      const Pending &p = a.second, &q = b.second;
+      if (p.rank() != q.rank()) return p.rank() < q.rank();
+      if (!too_many && p.memory() != q.memory()) return p.memory() > q.memory();
+      return p.begun < q.begun;
+    });
+    const bool itself = victim == newcomer;
+    give_up(victim);
+    if (itself) return false;
   }
+  return true;
 }
 
 bool ChannelOwners::admit(const std::string& channel, Sender sender, std::int64_t now_us) {
@@ -121,6 +151,11 @@ bool ChannelOwners::admit(const std::string& channel, Sender sender, std::int64_
   }
   owner.heard_us = now_us;
   return true;
+}
+
+bool ChannelOwners::would_admit(const std::string& channel, Sender sender, std::int64_t now_us) const {
+  const auto at = owners_.find(channel);
+  return at == owners_.end() || at->second.sender == sender || now_us - at->second.heard_us > silence_us_;
 }
 
 std::optional<Sender> ChannelOwners::owner(const std::string& channel) const {

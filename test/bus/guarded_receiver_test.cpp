@@ -106,6 +106,19 @@ TEST_F(OneSource, CountsMessagesOfWhichAPartIsMissing) {
   EXPECT_EQ(sizes_, (std::vector<std::size_t>{300, 300}));
 }
 
+TEST_F(OneSource, LongMessagesOfAnotherAreRefusedAndCountedOnce) {
+  Sender other(port_);
+  sender_.fragments(3);
+  other.fragments(30);
+  other.fragments(30);
+  EXPECT_TRUE(eventually([this] { return link_->refused_sources().messages == 2; }))
+      << link_->refused_sources().messages;
+  while (link_->handle(200)) {
+  }
+  EXPECT_EQ(sizes_, (std::vector<std::size_t>{300}));
+  EXPECT_EQ(link_->lost().incomplete, 0u);
+}
+
 TEST_F(OneSource, WhenTooManyWaitTheOldestGoAndAreCounted) {
   for (std::size_t i = 1; i <= 10; ++i) sender_.message(i);
   EXPECT_TRUE(eventually([this] { return link_->lost().queue == 6; })) << link_->lost().queue;

@@ -144,9 +144,71 @@ TEST(UdpmAssembler, LiesAreRefusedBeforeMemoryIsTaken) {
 TEST(UdpmAssembler, ManySendersCannotFillTheMemory) {
   UdpmAssembler assembler({.message_bytes = 10'000, .pending_bytes = 50'000, .senders = 8});
   for (std::uint16_t port = 1; port <= 100; ++port) {
-    EXPECT_FALSE(assembler.take(fragments("C", numbers(10'000), 1, 900)[0], {1, port}));
+    const auto packets = fragments("C", numbers(10'000), 1, 900);
+    for (std::size_t i = 0; i + 1 < packets.size(); ++i) {
+      EXPECT_FALSE(assembler.take(packets[i], {1, port}));
+      EXPECT_LE(assembler.pending_bytes(), 50'000u);
+    }
   }
-  EXPECT_EQ(assembler.incomplete(), 95u) << "five messages fit";
+  EXPECT_GE(assembler.incomplete(), 95u) << "not even five messages fit";
+}
+
+TEST(UdpmAssembler, AnAnnouncementTakesNoMemory) {
+  UdpmAssembler assembler;
+  for (std::uint16_t port = 1; port <= 60; ++port) {
+    (void)assembler.take(fragments("C", numbers(20'000'000), 1, 60'000)[1], {1, port});
+  }
+  EXPECT_LT(assembler.pending_bytes(), 60u * 61'000u);
+  EXPECT_EQ(assembler.incomplete(), 0u) << "nobody is driven out by what is only announced";
+  // Nor does a packet that says it is all of a message, and is not.
+  auto lie = fragments("C", numbers(100), 2, 100)[0];
+  lie[9] = 1;  // 65636 bytes
+  EXPECT_FALSE(assembler.take(lie, kOther));
+  EXPECT_EQ(assembler.incomplete(), 1u);
+}
+
+TEST(UdpmAssembler, NobodyDrivesOutASenderThatAsksForLess) {
+  UdpmAssembler assembler({.message_bytes = 10'000, .pending_bytes = 20'000, .senders = 8});
+  const auto ours = fragments("C", numbers(5000), 1, 900);
+  EXPECT_FALSE(assembler.take(ours[0], kRobot));
+  for (std::uint32_t sequence = 0; sequence < 20; ++sequence) {
+    for (std::uint16_t port = 1; port <= 7; ++port) {  // of each its first, and more: none is complete
+      const auto theirs = fragments("C", numbers(10'000), sequence, 900);
+      for (std::size_t i = 0; i < 11; ++i) EXPECT_FALSE(assembler.take(theirs[i], {1, port}));
+    }
+  }
+  for (std::size_t i = 1; i + 1 < ours.size(); ++i) EXPECT_FALSE(assembler.take(ours[i], kRobot));
+  EXPECT_TRUE(assembler.take(ours.back(), kRobot));
+}
+
+TEST(UdpmAssembler, WhatDoesNotTellItsChannelGoesFirst) {
+  UdpmAssembler assembler({.message_bytes = 10'000, .pending_bytes = 20'000, .senders = 8});
+  const auto ours = fragments("C", numbers(9000), 1, 900);
+  for (std::size_t i = 0; i < 9; ++i) EXPECT_FALSE(assembler.take(ours[i], kRobot));
+  for (std::uint16_t port = 1; port <= 100; ++port) {
+    const auto theirs = fragments("C", numbers(9000), 1, 900);
+    for (std::size_t i = 1; i < 10; ++i) EXPECT_FALSE(assembler.take(theirs[i], {1, port}));
+  }
+  EXPECT_TRUE(assembler.take(ours[9], kRobot));
+}
+
+TEST(UdpmAssembler, WhatIsNotWantedIsDroppedOnceItTellsItsChannel) {
+  std::vector<std::string> asked;
+  UdpmAssembler assembler({}, [&](const std::string& channel, Sender sender) {
+    asked.push_back(channel);
+    return channel == "C" && sender == kRobot;
+  });
+  const auto points = fragments("POINTS", numbers(9000), 1, 900);
+  EXPECT_FALSE(assembler.take(points[1], kOther));
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_FALSE(assembler.take(points[i], kOther));
+  EXPECT_LT(assembler.pending_bytes(), 900u);
+  const auto theirs = fragments("C", numbers(9000), 2, 900);
+  for (const auto& packet : theirs) EXPECT_FALSE(assembler.take(packet, kOther));
+  const auto ours = fragments("C", numbers(9000), 1, 900);
+  for (std::size_t i = 0; i < 9; ++i) EXPECT_FALSE(assembler.take(ours[i], kRobot));
+  EXPECT_TRUE(assembler.take(ours[9], kRobot));
+  EXPECT_EQ(asked, (std::vector<std::string>{"POINTS", "C", "C"}));
+  EXPECT_EQ(assembler.incomplete(), 0u) << "these are not lost";
 }
 
 TEST(ChannelOwners, FirstComeFirstServedUntilSilent) {
