@@ -47,6 +47,13 @@ int receive_buffer_of(const std::string& url) {
   return at == std::string::npos ? 0 : std::atoi(url.c_str() + at + std::strlen("recv_buf_size="));
 }
 
+void say_failure(const std::exception& failure) noexcept {
+  try {
+    spdlog::error("a packet could not be taken in: {}", failure.what());
+  } catch (...) {  // no memory for that either
+  }
+}
+
 }  // namespace
 
 GuardedReceiver::GuardedReceiver(const std::string& lcm_url, std::int64_t silence_us) : owners_(silence_us) {
@@ -85,6 +92,7 @@ void GuardedReceiver::subscribe(const std::string& channel, int queue_messages, 
 void GuardedReceiver::work() {
   UdpmAssembler assembler({}, [this](const std::string& channel, Sender sender) { return wanted(channel, sender); });
   std::vector<std::uint8_t> packet(kLargestPacket);
+  std::uint64_t failed = 0;
   while (!stopping_) {
     pollfd ready{socket_, POLLIN, 0};
     if (poll(&ready, 1, kPoll_ms) <= 0) continue;
@@ -93,11 +101,15 @@ void GuardedReceiver::work() {
     const ssize_t bytes = recvfrom(socket_, packet.data(), packet.size(), MSG_DONTWAIT,
                                    reinterpret_cast<sockaddr*>(&from), &length);
     if (bytes <= 0) continue;
-    auto message = assembler.take(Bytes(packet.data(), static_cast<std::size_t>(bytes)),
-                                  {ntohl(from.sin_addr.s_addr), ntohs(from.sin_port)});
-    if (message) take(std::move(*message));
+    try {
+      auto message = assembler.take(Bytes(packet.data(), static_cast<std::size_t>(bytes)),
+                                    {ntohl(from.sin_addr.s_addr), ntohs(from.sin_port)});
+      if (message) take(std::move(*message));
+    } catch (const std::exception& e) {  // of this packet, which cost its message; memory may be there for the next
+      if (failed++ % 1000 == 0) say_failure(e);
+    }
     const std::lock_guard lock(mutex_);
-    lost_.incomplete = assembler.incomplete();
+    lost_.incomplete = assembler.incomplete() + failed;
   }
 }
 

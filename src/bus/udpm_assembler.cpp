@@ -84,17 +84,18 @@ std::optional<UdpmAssembler::Message> UdpmAssembler::take_fragment(Bytes packet,
   }
   Pending& pending = at->second;
   if (pending.unwanted || pending.pieces.contains(fragment)) return std::nullopt;
-  pending_bytes_ -= pending.memory();
-  if (channel && wanted_ && !wanted_(*channel, sender)) {
+  const bool unwanted = channel && wanted_ && !wanted_(*channel, sender);
+  const std::size_t before = pending.memory();
+  if (unwanted) {
     pending.unwanted = true;
     pending.pieces.clear();
     pending.arrived = 0;
   } else {
-    pending.pieces.emplace(fragment, Piece{offset, {rest.begin(), rest.end()}});
+    pending.pieces.emplace(fragment, Piece{offset, {rest.begin(), rest.end()}});  // throws before anything changes
     pending.arrived += rest.size();
     if (channel) pending.channel = std::move(channel);
   }
-  pending_bytes_ += pending.memory();
+  pending_bytes_ = pending_bytes_ - before + pending.memory();
   if (!make_room(at) || pending.unwanted || pending.pieces.size() < fragments) return std::nullopt;
   if (pending.arrived != size) {  // or a packet that says it is all of a long message would take that memory
     give_up(at);

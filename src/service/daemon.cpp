@@ -204,7 +204,9 @@ class Daemon {
     if (session_) {
       // What still waits is lost with the session, but not without being counted.
       session_->receiver.finish();
-      add_counts(earlier_bus_, session_->receiver.facts().bus);
+      const Receiver::Facts facts = session_->receiver.facts();
+      add_counts(earlier_bus_, facts.bus);
+      earlier_refused_ += facts.refused.messages;
       earlier_shed_ += session_->queue.shed() + session_->waiting();
       fresh->pipeline->take_background_from(*session_->pipeline);
     }
@@ -266,7 +268,32 @@ class Daemon {
     return true;
   }
 
+  /// Whatever is wrong with one frame, memory that is short included, the next may be good.
   void estimate(ArrivedObservation& arrived) {
+    Estimate estimate;
+    try {
+      work_on(arrived, estimate);
+    } catch (const std::exception& e) {
+      const std::lock_guard lock(progress_mutex_);
+      progress_.busy_since_us = -1;
+      if (progress_.failed++ % 100 == 0) spdlog::error("a frame could not be worked on: {}", e.what());
+      progress_.frame_failure = e.what();
+      return;
+    }
+    try {
+      if (page_) show(arrived.observation, estimate);
+      if (++frames_since_engine_check_ == kEngineCheckFrames) note_engine();
+    } catch (const std::exception& e) {
+      if (shows_failed_++ % 100 == 0) spdlog::error("a picture could not be shown: {}", e.what());
+    }
+    if (!ready_) {
+      ready_ = true;
+      notifier_.ready();
+      spdlog::info("ready: the first pictures and encoders came together");
+    }
+  }
+
+  void work_on(ArrivedObservation& arrived, Estimate& estimate) {
     const std::int64_t begin = monotonic_us();
     {
       const std::lock_guard lock(progress_mutex_);
@@ -276,16 +303,7 @@ class Daemon {
     Observation& observation = arrived.observation;
     Pipeline& pipeline = *session_->pipeline;
     session_->next = session_->queue.pop(milliseconds(0));
-    Estimate estimate;
-    try {
-      estimate = pipeline.process(observation, session_->next ? &session_->next->observation : nullptr);
-    } catch (const Error& e) {  // of this frame; the next may be good
-      const std::lock_guard lock(progress_mutex_);
-      progress_.busy_since_us = -1;
-      progress_.frame_failure = e.what();
-      if (progress_.failed++ % 100 == 0) spdlog::error("a frame could not be worked on: {}", e.what());
-      return;
-    }
+    estimate = pipeline.process(observation, session_->next ? &session_->next->observation : nullptr);
     const std::int64_t published = publish(estimate, arrived.arrival_us);
     if (estimates_.is_open()) write(estimate);
 
@@ -296,24 +314,15 @@ class Daemon {
         t.filter_ms, t.refinement_ms,
         ms_between(begin, published) - pipeline.segmentation_ms() - t.total_ms, latency_ms};
     if (options_.timings) all_stages_.add(stages);
-    {
-      const std::lock_guard lock(progress_mutex_);
-      progress_.busy_since_us = -1;
-      progress_.last_estimate_us = published;
-      ++progress_.estimated;
-      progress_.estimate = estimate;
-      progress_.latency.add(latency_ms);
-      progress_.latency_last_second.add(latency_ms);
-      progress_.stages.add(stages);
-      note_cameras(observation, published);
-    }
-    if (page_) show(observation, estimate);
-    if (++frames_since_engine_check_ == kEngineCheckFrames) note_engine();
-    if (!ready_) {
-      ready_ = true;
-      notifier_.ready();
-      spdlog::info("ready: the first pictures and encoders came together");
-    }
+    const std::lock_guard lock(progress_mutex_);
+    progress_.estimate = estimate;
+    progress_.latency.add(latency_ms);
+    progress_.latency_last_second.add(latency_ms);
+    progress_.stages.add(stages);
+    note_cameras(observation, published);
+    progress_.busy_since_us = -1;
+    progress_.last_estimate_us = published;
+    ++progress_.estimated;  // last: what throws before counts as failed
   }
 
   void write(const Estimate& estimate) {
@@ -397,21 +406,33 @@ class Daemon {
     if (ready_) notifier_.reloading();
     // Not std::async, whose future waits for the end of the load when it goes, which a stop cannot.
     std::packaged_task<std::unique_ptr<Pipeline>()> task([from = load_configuration_] { return load(from); });
-    reloading_ = task.get_future();
-    std::thread(std::move(task)).detach();
+    try {
+      auto loaded = task.get_future();
+      std::thread(std::move(task)).detach();
+      reloading_ = std::move(loaded);
+    } catch (const std::exception& e) {  // no thread to be had
+      reload_failed(e.what());
+    }
   }
 
   void finish_reload() {
     if (!reloading_.valid() || loading()) return;
-    std::string failure;
     try {
       start_session(reloading_.get());
       give_back_memory();
       spdlog::info("configuration reloaded; estimating starts anew");
     } catch (const std::exception& e) {  // whatever is wrong with what was loaded, the old works on
-      failure = e.what();
-      spdlog::error("reload refused, going on as before: {}", failure);
+      return reload_failed(e.what());
     }
+    {
+      const std::lock_guard lock(progress_mutex_);
+      progress_.reload_failure.clear();
+    }
+    if (ready_) notifier_.ready();
+  }
+
+  void reload_failed(const std::string& failure) {
+    spdlog::error("reload refused, going on as before: {}", failure);
     {
       const std::lock_guard lock(progress_mutex_);
       progress_.reload_failure = failure;
@@ -449,6 +470,14 @@ class Daemon {
   }
 
   void report() {
+    try {
+      compose_report();
+    } catch (const std::exception& e) {  // the next may be possible again
+      if (reports_failed_++ % 100 == 0) spdlog::error("the status could not be reported: {}", e.what());
+    }
+  }
+
+  void compose_report() {
     const std::lock_guard lock(session_mutex_);
     if (!session_) return;
     const Receiver::Facts facts = received();
@@ -475,6 +504,7 @@ class Daemon {
   [[nodiscard]] Receiver::Facts received() const {
     Receiver::Facts facts = session_->receiver.facts();
     add_counts(facts.bus, earlier_bus_);
+    facts.refused.messages += earlier_refused_;
     return facts;
   }
 
@@ -490,6 +520,7 @@ class Daemon {
   std::mutex session_mutex_;  ///< held to replace the session, and by the reporter to use it
   std::unique_ptr<Session> session_;
   BusStatistics earlier_bus_;  ///< of sessions before a reload
+  std::uint64_t earlier_refused_ = 0;
   std::uint64_t earlier_shed_ = 0;
 
   std::mutex progress_mutex_;  ///< taken after session_mutex_ where both are
@@ -498,6 +529,8 @@ class Daemon {
   StatusReporter reporter_{{}};
   std::string engine_;  ///< what draws silhouettes, in words
   int frames_since_engine_check_ = 0;
+  std::uint64_t shows_failed_ = 0;
+  std::uint64_t reports_failed_ = 0;
   HealthLevel logged_level_ = HealthLevel::kOk;
   StageDurations all_stages_;
   std::int64_t sequence_ = 0;

@@ -151,10 +151,14 @@ std::optional<std::string> error(const HealthFacts& f) {
 std::optional<std::string> camera_warning(const HealthFacts& f) {
   for (const auto& camera : f.cameras) {
     if (camera.age_ms < 0.0 || camera.age_ms > kCameraDead_ms) {
-      return camera.age_ms < 0.0
-                 ? fmt::format("nothing yet from the {} camera; working with the other", camera.name)
-                 : fmt::format("nothing from the {} camera for {}; working with the other", camera.name,
-                               age(camera.age_ms));
+      std::string text = camera.age_ms < 0.0
+                             ? fmt::format("nothing yet from the {} camera; working with the other", camera.name)
+                             : fmt::format("nothing from the {} camera for {}; working with the other", camera.name,
+                                           age(camera.age_ms));
+      // Its pictures may come and be of no use.
+      auto why = refused(f);
+      if (!why) why = dropped(f);
+      return why ? text + "; " + *why : text;
     }
     if (is_frozen(camera)) {
       return fmt::format("the {} camera has shown the same picture for {} while the arm moved by {:.0f} deg",
@@ -238,6 +242,22 @@ Health verdict(const HealthFacts& facts) {
   return {HealthLevel::kOk, fmt::format("converged: hand known to {:.1f} mm; weakest {}",
                                         1e3 * facts.estimate.hand_sd_m, facts.estimate.weakest.text)};
 }
+
+/// Words of others may be long and hold line breaks: readers of the status refuse both, and systemd takes what
+/// follows a break for another field.
+std::string in_one_line(std::string text) {
+  constexpr std::size_t kLongest = 1000;
+  if (text.size() > kLongest) {
+    std::size_t end = kLongest;
+    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;  // not within a character
+    text.resize(end);
+    text += " ...";
+  }
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+  }
+  return text;
+}
 }  // namespace
 
 Health assess(const HealthFacts& facts) {
@@ -256,6 +276,7 @@ Health assess(const HealthFacts& facts) {
   };
   add("recording has ended", facts.recording_failure);
   add("writing of estimates has ended", facts.estimates_failure);
+  health.sentence = in_one_line(std::move(health.sentence));
   return health;
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <new>
 #include <numeric>
 #include <random>
 
@@ -179,6 +180,22 @@ TEST(UdpmAssembler, NobodyDrivesOutASenderThatAsksForLess) {
   }
   for (std::size_t i = 1; i + 1 < ours.size(); ++i) EXPECT_FALSE(assembler.take(ours[i], kRobot));
   EXPECT_TRUE(assembler.take(ours.back(), kRobot));
+}
+
+// As where memory is short; the service goes on with the next packet.
+TEST(UdpmAssembler, KeepsCountWhereItThrows) {
+  bool short_of_memory = true;
+  UdpmAssembler assembler({}, [&](const std::string&, Sender) {
+    if (short_of_memory) throw std::bad_alloc();
+    return true;
+  });
+  const auto first = fragments("C", numbers(2000), 1, 900);
+  EXPECT_THROW((void)assembler.take(first[0], kRobot), std::bad_alloc);
+  short_of_memory = false;
+  EXPECT_FALSE(assembler.take(first[1], kRobot));
+  EXPECT_FALSE(assembler.take(first[2], kRobot));
+  EXPECT_TRUE(assembler.take(first[0], kRobot)) << "sent again";
+  EXPECT_EQ(assembler.pending_bytes(), 0u);
 }
 
 TEST(UdpmAssembler, WhatDoesNotTellItsChannelGoesFirst) {

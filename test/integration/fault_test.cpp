@@ -400,6 +400,26 @@ TEST_F(World, SecondSourceIsRefusedWhenConfigured) {
   EXPECT_EQ(counter("dropped.out_of_order"), 0) << "none of its pictures came in";
 }
 
+TEST_F(World, RefusalsAddUpOverAReload) {
+  Process service({"bodyschemad", "--config", reach_configuration(), "-l", url_, "--set", "bus.one_source=true"},
+                  scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  Listener listener(url_);
+  Robot robot(url_, reach_log(), speed());
+  ASSERT_TRUE(listener.wait_offsets(3, Seconds(30)));
+  LcmLink other(url_);
+  robot.set_faults(faults::second_publisher(other));
+  const auto before =
+      listener.wait_status([](const offsets_status_t& s) { return counter(s, "refused.second_source") > 20; }, Seconds(20));
+  ASSERT_TRUE(before) << said(listener);
+  robot.set_faults({});
+  service.signal(SIGHUP);
+  ASSERT_TRUE(service.said("configuration reloaded", kStart));
+  int more = 0;
+  ASSERT_TRUE(listener.wait_status([&](const offsets_status_t&) { return ++more > 1; }, Seconds(10)));
+  EXPECT_GE(counter(listener.statuses().back(), "refused.second_source"), counter(*before, "refused.second_source"));
+}
+
 TEST_F(World, AnotherSourceMayFollowOnceTheFirstIsSilent) {
   Process service({"bodyschemad", "--config", reach_configuration(), "-l", url_, "--set", "bus.one_source=true",
                    "--set", "bus.one_source_silence_s=0.5"}, scratch_.folder());

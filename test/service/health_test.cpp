@@ -129,6 +129,32 @@ TEST(Health, SomeMessagesRefused) {
   expect(facts, HealthLevel::kWarn, "3 messages or pictures refused in the last second: a picture has not the size");
 }
 
+TEST(Health, PicturesOfOneCameraRefused) {
+  HealthFacts facts = well();
+  facts.cameras[1].age_ms = -1.0;
+  facts.since_last.faults[static_cast<std::size_t>(MessageFault::kBrokenPicture)] = 30;
+  expect(facts, HealthLevel::kWarn,
+         "nothing yet from the right camera; working with the other; 30 messages or pictures refused in the last "
+         "second: a JPEG picture is broken");
+  facts.since_last.faults = {};
+  facts.cameras[1].age_ms = 5000.0;
+  drop(facts, DropReason::kOutOfOrder, 29);
+  expect(facts, HealthLevel::kWarn, "for 5.0 s; working with the other; 29 pictures came twice or out of order");
+  drop(facts, DropReason::kOutOfOrder, 0);
+  EXPECT_EQ(assess(facts).sentence, "nothing from the right camera for 5.0 s; working with the other");
+}
+
+TEST(Health, WordsOfOthersStayInOneLine) {
+  HealthFacts facts = well();
+  facts.reload_failure = "b.yaml:3: unexpected\nREADY=1\r\tetc\x7f";
+  expect(facts, HealthLevel::kWarn, "b.yaml:3: unexpected READY=1  etc ");
+  facts.recording_failure = "disk\nfull";
+  expect(facts, HealthLevel::kWarn, "disk full");
+  for (const char c : assess(facts).sentence) EXPECT_GE(c, ' ');
+  facts.reload_failure.assign(100'000, 'x');
+  EXPECT_LT(assess(facts).sentence.size(), 1100u);
+}
+
 TEST(Health, SecondPublisher) {
   HealthFacts facts = well();
   drop(facts, DropReason::kDuplicate, 30);
