@@ -200,10 +200,16 @@ class Page {
       return std::vector<std::string>{name, fmt::format("{:.3f} {}", before, unit),
                                       fmt::format("{:.3f} {}", after, unit)};
     };
+    const auto share = [](const char* name, double before, double after) {
+      return std::vector<std::string>{name, fmt::format("{:.0f} %", 100.0 * before), fmt::format("{:.0f} %", 100.0 * after)};
+    };
     page_.table({"on parts of the log that the fit has not seen", "without the causes", "extended model"},
                 {row("outline residual, rms", d_.before.rms_px, d_.after.rms_px, "px"),
                  row("motion of the hand it asks for", d_.before.hand_mm, d_.after.hand_mm, "mm"),
-                 row("turn of the hand it asks for", d_.before.hand_deg, d_.after.hand_deg, "deg")});
+                 row("turn of the hand it asks for", d_.before.hand_deg, d_.after.hand_deg, "deg"),
+                 share("outline found, all pictures", d_.before.outline_found, d_.after.outline_found),
+                 share("outline found where the hand is seen", d_.before.outline_where_seen,
+                       d_.after.outline_where_seen)});
   }
 
   void offsets() {

@@ -18,7 +18,7 @@ Json optional_text(const std::string& text) { return text.empty() ? Json(nullptr
 
 Json json_of(const HeldoutError& e) {
   return {{"rms_px", number(e.rms_px)}, {"hand_mm", number(e.hand_mm)}, {"hand_deg", number(e.hand_deg)},
-          {"outline_found", number(e.outline_found)}};
+          {"outline_found", number(e.outline_found)}, {"outline_where_seen", number(e.outline_where_seen)}};
 }
 
 Json json_of(const CauseName& c) {

@@ -36,7 +36,7 @@ DiagnosisReport report() {
   r.z_threshold = 4.5;
   r.gain_threshold = 0.006;
   r.before = {0.9, 2.0, 0.8};
-  r.after = {0.3, 0.2, 0.1};
+  r.after = {0.3, 0.2, 0.1, 0.61, 0.93};
   r.offsets_deg_before = {{"r_shoulder_roll", 1.0}, {"r_elbow", 2.0}};
   r.offsets_deg_after = {{"r_shoulder_roll", 1.5}, {"r_elbow", 2.5}};
   r.not_testable = {{{"payload", "", ""}, "the robot's URDF has no masses"}};
@@ -76,6 +76,7 @@ TEST(DiagnosisPage, BeginsWithTheVerdictAndShowsEveryPart) {
   EXPECT_LT(gain, chart);
   for (const char* part : {"3.5 to 4.5", "31.0 %", "Sweep r_elbow", "eccentricity of r_elbow", "0.900 px", "0.300 px",
                            "threshold 0.6 %", "What this log cannot test", "no masses", "latency", "4.2 ms",
+                           "61 %", "93 %",
                            "rising against falling"}) {
     EXPECT_THAT(page, HasSubstr(part));
   }

@@ -78,6 +78,7 @@ TEST(Verdict, TrustsNoNameWhereMuchOfTheOutlineIsMissing) {
     word_verdict(report, picture_options());
     EXPECT_EQ(report.verdict, "unexplained");
     EXPECT_THAT(report.sentence, HasSubstr("only 67 %"));
+    EXPECT_THAT(report.to_json(), HasSubstr("\"outline_where_seen\": 0.67"));  // what the rule goes by
     EXPECT_EQ(report.sentence.find("encoder_gain of r_elbow") != std::string::npos, with_cause);
   }
 }
