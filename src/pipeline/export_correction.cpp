@@ -156,7 +156,8 @@ std::string applied_text(const std::vector<AppliedEffect>& applied) {
   if (!yes.empty()) text += "Of the extended model these files hold:\n" + yes;
   if (!no.empty()) {
     text += "They cannot hold the following; load extended_model.yaml in bodyschemad or bodyschema replay\n"
-            "(--extended-model), or do as said:\n" + no;
+            "(--extended-model), with the original URDF and cameras, or do as said. Beside corrected.urdf it would\n"
+            "apply twice what that holds:\n" + no;
   }
   return text.empty() ? "The extended model holds joint offsets alone; those of the replay are used.\n" : text;
 }

@@ -244,6 +244,8 @@ effects:
   EXPECT_THAT(text, ::testing::HasSubstr("link_length of r_shoulder_yaw change 2 mm: in corrected.urdf"));
   EXPECT_THAT(text, ::testing::HasSubstr("focal_length scale 1 %: in cameras.yaml"));
   EXPECT_LT(text.find("cannot hold"), text.find("latency delay 40 ms"));
+  // Beside corrected.urdf the extended model would apply the length twice.
+  EXPECT_THAT(text, ::testing::HasSubstr("with the original URDF"));
   EXPECT_THAT(content("out/cameras.yaml"), ::testing::HasSubstr("fx: 259.9134"));
   EXPECT_THAT(content("out/offsets.yaml"), ::testing::HasSubstr("what_was_applied.txt"));
 
