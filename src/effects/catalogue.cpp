@@ -1,5 +1,7 @@
 #include "bodyschema/effects/catalogue.hpp"
 
+#include <algorithm>
+
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 #include "factories.hpp"
@@ -39,6 +41,22 @@ const Entry& entry(const std::string& name) {
                            nearest_name(name, effect_names()) + "'?");
 }
 
+using Part = std::string EffectTarget::*;
+
+/// Throws unless some target has this joint or source. Of a coupling joint and source are looked at by
+/// themselves: any two joints of the arm may be coupled.
+void check_is_listed(const std::string& effect, const char* key, Part part, const EffectTarget& target,
+                     const effects::Targets& targets) {
+  std::vector<std::string> known;
+  for (const auto& t : targets) {
+    if (std::find(known.begin(), known.end(), t.*part) == known.end()) known.push_back(t.*part);
+  }
+  if (std::find(known.begin(), known.end(), target.*part) != known.end()) return;
+  std::string expected = known.front().empty() ? "none" : known.front();
+  for (std::size_t i = 1; i < known.size(); ++i) expected += (i + 1 < known.size() ? ", " : " or ") + known[i];
+  throw ConfigurationError(effect + ": " + key + " is '" + target.*part + "', expected " + expected);
+}
+
 }  // namespace
 
 std::string Effect::description() const {
@@ -68,6 +86,9 @@ std::unique_ptr<Effect> make_effect(const std::string& name, const EffectTarget&
                                          ? ": expected a joint"
                                          : ": takes no joint, found '" + target.joint + "'"));
   }
+  if (needs_joint) static_cast<void>(roles.index(target.joint));  // says which one may be meant
+  check_is_listed(name, "joint", &EffectTarget::joint, target, targets);
+  check_is_listed(name, "source", &EffectTarget::source, target, targets);
   return e.make(target, roles);
 }
 

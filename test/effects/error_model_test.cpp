@@ -103,6 +103,25 @@ TEST(ErrorModel, SaysWhatIsWrongWithAFile) {
   EXPECT_THAT(parse(head + "elbow, parameters: {width_deg: 1}}\n- {name: backlash, joint: elbow, "
                            "parameters: {width_deg: 1}}"),
               ThrowsMessage<ConfigurationError>(HasSubstr("twice")));
+  // A joint that the effect does not act on, and a source where there is none.
+  const auto entry = [&](const std::string& what) { return parse("version: 1\neffects:\n- {" + what + "}"); };
+  EXPECT_THAT(entry("name: link_length, joint: elbow, parameters: {change_mm: 2}"),
+              ThrowsMessage<ConfigurationError>(
+                  HasSubstr("x.yaml:3: link_length: joint is 'elbow', expected s_yaw or prosup")));
+  EXPECT_THAT(entry("name: backlash, joint: index, parameters: {width_deg: 1}"),
+              ThrowsMessage<ConfigurationError>(HasSubstr("joint is 'index', expected s_pitch, s_roll, ")));
+  EXPECT_THAT(entry("name: head_offset, joint: elbow, parameters: {angle_deg: 1}"),
+              ThrowsMessage<ConfigurationError>(HasSubstr("joint is 'elbow', expected neck_pitch, neck_roll, ")));
+  EXPECT_THAT(entry("name: latency, source: x, parameters: {delay_ms: 40}"),
+              ThrowsMessage<ConfigurationError>(HasSubstr("x.yaml:3: latency: source is 'x', expected none")));
+  EXPECT_THAT(entry("name: backlash, joint: elbow, source: s_yaw, parameters: {width_deg: 1}"),
+              ThrowsMessage<ConfigurationError>(HasSubstr("backlash: source is 's_yaw', expected none")));
+  EXPECT_THAT(entry("name: joint_coupling, joint: elbow, source: thumb, parameters: {ratio_percent: 1}"),
+              ThrowsMessage<ConfigurationError>(HasSubstr("source is 'thumb', expected s_roll, s_yaw, ")));
+  EXPECT_THAT(entry("name: joint_coupling, joint: elbow, parameters: {ratio_percent: 1}"),
+              ThrowsMessage<ConfigurationError>(HasSubstr("source is '', expected s_roll, s_yaw, ")));
+  // Of a coupling any two joints of the arm, though the diagnosis looks at near ones only.
+  EXPECT_NO_THROW(entry("name: joint_coupling, joint: s_pitch, source: w_yaw, parameters: {ratio_percent: 1}")());
   EXPECT_THROW(ErrorModel::load("/nonexistent/x.yaml", r), ConfigurationError);
   const auto large = std::filesystem::temp_directory_path() / ("model_" + std::to_string(getpid()) + ".yaml");
   std::ofstream(large) << "version: 1\n";
