@@ -76,6 +76,19 @@ class Diagnoser {
     fitter_.set_plan(plan_blocks(source_, before_.at.views, options_.block_s));
     fitter_.accumulate_on({}, before_);
     excluded_ = untestable(source_, before_.at);
+    drop_untestable_nuisances();
+  }
+
+  /// A nuisance that this log says nothing about (vergence, of one camera) would end anywhere, unseen.
+  void drop_untestable_nuisances() {
+    const auto effects = baseline_.size();
+    for (const auto& nuisance : options_.nuisances) {
+      if (is_excluded(excluded_, nuisance)) baseline_.remove(nuisance.name, {nuisance.joint, nuisance.source});
+    }
+    if (baseline_.size() == effects) return;
+    before_ = fitter_.fit(baseline_, {}, {.iterations = options_.refit_iterations, .from_afar = false});
+    fitter_.set_plan(plan_blocks(source_, before_.at.views, options_.block_s));
+    fitter_.accumulate_on({}, before_);
   }
 
   /// What a cause is worth shows against a model without it: nuisances that are causes go back to zero.

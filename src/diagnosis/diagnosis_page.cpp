@@ -175,9 +175,8 @@ class Page {
       }
       for (std::size_t i = 0; i < cause.parameters.size(); ++i) {
         const auto& p = cause.parameters[i];
-        const std::string when =
-            p.from ? fmt::format(", {:.1f} s into the log", seconds(*p.from - d_.begin_utime)) : "";
-        rows.push_back({i == 0 ? name : "", p.parameter + when,
+        const auto when = p.when(d_.begin_utime);
+        rows.push_back({i == 0 ? name : "", p.parameter + (when.empty() ? "" : ", " + when),
                         fmt::format("{:.3g}{}", p.estimate, p.unit == "1" ? "" : " " + p.unit), interval(p),
                         i == 0 ? fmt::format("{:.1f}", cause.z) : "",
                         i == 0 ? fmt::format("{:.1f} %", 100 * cause.heldout_gain) : ""});

@@ -1,5 +1,7 @@
 #include "bodyschema/diagnosis/diagnosis_report.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -31,6 +33,7 @@ Json json_of(const EstimatedParameter& p) {
   Json j = {{"parameter", p.parameter}, {"unit", p.unit}, {"estimate", number(p.estimate)},
             {"ci95", {number(p.ci95[0]), number(p.ci95[1])}}};
   if (p.from) j["from_utime"] = *p.from;
+  if (p.duration_s) j["duration_s"] = number(*p.duration_s);
   return j;
 }
 
@@ -63,6 +66,13 @@ Json json_of(const DiagnosedCause& c) {
 }
 
 }  // namespace
+
+std::string EstimatedParameter::when(Microseconds log_begin) const {
+  if (!from) return "";
+  const double begin_s = seconds(*from - log_begin);
+  if (!duration_s) return fmt::format("{:.1f} s into the log", begin_s);
+  return fmt::format("from {:.1f} to {:.1f} s into the log", begin_s, begin_s + *duration_s);
+}
 
 std::string DiagnosisReport::to_json() const {
   Json j;

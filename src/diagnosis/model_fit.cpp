@@ -144,8 +144,9 @@ ModelFit ModelFitter::fit(ErrorModel& model, const std::vector<const SparseColum
   const double outline = outline_points(accepted.at);
   Pace pace{misfit(accepted.at, outline)};
   for (int i = 0; i < settings.iterations;) {
-    const auto step = damped_step(accepted, pace.damping);
-    if (step.size() == 0 || step.cwiseAbs().maxCoeff() < kSmall) break;
+    // Extra columns stay beside the model: what they ask for never shrinks.
+    const auto known = static_cast<Eigen::Index>(accepted.parameters.size());
+    if (known == 0 || damped_step(accepted, pace.damping).head(known).cwiseAbs().maxCoeff() < kSmall) break;
     auto moved = model;
     take(moved, accepted, pace.damping);
     auto at = linearise(source_, moved);
@@ -189,7 +190,9 @@ double ModelFitter::approach(ErrorModel& model, const std::vector<const SparseCo
 void ModelFitter::accumulate_on(const std::vector<const SparseColumn*>& extra, ModelFit& at) const {
   std::vector<const SparseColumn*> pointers;
   for (const auto& column : at.columns) pointers.push_back(&column);
-  pointers.insert(pointers.end(), extra.begin(), extra.end());
+  at.extra.clear();
+  for (const auto* column : extra) at.extra.push_back(*column);
+  for (const auto& column : at.extra) pointers.push_back(&column);
   at.all.clear();
   for (Eigen::Index c = 0; c < static_cast<Eigen::Index>(pointers.size()); ++c) {
     at.all.push_back({c, 0});

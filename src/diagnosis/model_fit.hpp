@@ -24,6 +24,7 @@ struct ParameterRef {
 struct ModelFit {
   Linearisation at;
   std::vector<SparseColumn> columns;
+  std::vector<SparseColumn> extra;  ///< fitted beside the parameters; no model applies them
   std::vector<ParameterRef> parameters;
   std::optional<BlockStatistics> statistics;
   Columns all;

@@ -13,9 +13,9 @@ bool is_known(const EstimatedParameter& p) { return std::isfinite(p.ci95[0]) && 
 
 std::string text_of(const EstimatedParameter& p, Microseconds begin) {
   if (!is_known(p)) return fmt::format(" {} of a size that this log does not tell", p.parameter);
-  const std::string when = p.from ? fmt::format(" {:.1f} s into the log", seconds(*p.from - begin)) : "";
+  const auto when = p.when(begin);
   return fmt::format(" {} {:.3g}{} [{:.3g}, {:.3g}]{}", p.parameter, p.estimate,
-                     p.unit == "1" ? "" : " " + p.unit, p.ci95[0], p.ci95[1], when);
+                     p.unit == "1" ? "" : " " + p.unit, p.ci95[0], p.ci95[1], when.empty() ? "" : " " + when);
 }
 
 std::string text_of(const DiagnosedCause& cause, Microseconds begin) {

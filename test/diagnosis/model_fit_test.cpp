@@ -64,6 +64,49 @@ TEST(ModelFitter, TakesNoStepThatMakesTheOutlinesWorse) {
   EXPECT_LE(misfit(end.at, points), 1.01 * misfit(begin.at, points));
 }
 
+/// Counts how often a log is looked at.
+class Counted final : public MeasurementSource {
+ public:
+  explicit Counted(MeasurementSource& log) : log_(log) {}
+  const JointRoles& roles() const override { return log_.roles(); }
+  std::span<const ViewInput> views() const override { return log_.views(); }
+  std::span<const JointSample> stream() const override { return log_.stream(); }
+  void instant(std::size_t view, const Eigen::VectorXd& offsets, Instant& out) override {
+    log_.instant(view, offsets, out);
+  }
+  void compress(std::span<const Corrections> corrections, std::vector<CompressedView>& out) override {
+    ++looks;
+    log_.compress(corrections, out);
+  }
+  Eigen::MatrixXd hand_jacobian(std::size_t view, const Corrections& c) override {
+    return log_.hand_jacobian(view, c);
+  }
+  int looks = 0;
+
+ private:
+  MeasurementSource& log_;
+};
+
+/// A free curve stays beside the model, so its step never shrinks.
+TEST(ModelFitter, StopsWhereTheParametersDoWhateverExtraColumnsAskFor) {
+  TrialOptions options;
+  options.faults = {{{"wobble", "r_elbow", ""}, 2.0, 8.0, 0.0}};
+  const auto log = make_synthetic_log(test::robot(), options, test::log_seed());
+  const CoordinateLayout layout(log->roles());
+  std::vector<double> curve;
+  const double begin = seconds(log->views().front().joints.utime);
+  for (const auto& view : log->views()) {
+    curve.push_back(kDeg * std::sin(2.0 * 3.14159265358979323846 / 8.0 * (seconds(view.joints.utime) - begin)));
+  }
+  const auto column = joint_column(layout, log->roles().index("r_elbow"), curve);
+  constexpr int kIterations = 20;
+  Counted counted(*log);
+  ModelFitter fitter(counted, layout, 2.0);
+  auto model = offsets_of(*log, 0.0);
+  fitter.fit(model, {&column}, {.iterations = kIterations, .from_afar = false});
+  EXPECT_LT(counted.looks, kIterations);  // 16; every iteration takes two
+}
+
 TEST(Misfit, CountsPointsThatLeftThePictures) {
   Linearisation all, few;
   all.views.push_back({{}, {}, 0.0, 0.0, 200.0, 100.0});

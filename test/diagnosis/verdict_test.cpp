@@ -53,6 +53,20 @@ TEST(Verdict, SaysWhenAJointSlipped) {
   EXPECT_THAT(report.to_json(), HasSubstr("\"from_utime\": 1600000048700000"));
 }
 
+TEST(Verdict, SaysOverWhichSpanAJointDrifted) {
+  DiagnosedCause cause;
+  cause.cause = {"drift", "r_elbow", ""};
+  cause.parameters = {{"change", "deg/log", 2.0, {1.9, 2.1}, Microseconds{1'600'000'003'500'000}, 50.5}};
+  cause.same = {cause.cause};
+  auto report = report_of(0.3, {cause});
+  report.begin_utime = 1'600'000'000'000'000;
+  word_verdict(report, picture_options());
+  EXPECT_EQ(report.sentence,
+            "The log asks for: drift of r_elbow change 2 deg/log [1.9, 2.1] from 3.5 to 54.0 s into the log.");
+  EXPECT_THAT(report.to_json(), HasSubstr("\"from_utime\": 1600000003500000"));
+  EXPECT_THAT(report.to_json(), HasSubstr("\"duration_s\": 50.5"));
+}
+
 TEST(Verdict, SaysAClassWhereSeveralFit) {
   auto cause = gain_of_elbow();
   cause.same.push_back({"eccentricity", "r_elbow", ""});

@@ -25,7 +25,12 @@ struct EstimatedParameter {
   std::string unit;
   double estimate = 0.0;
   std::array<double, 2> ci95{};
-  std::optional<Microseconds> from{};  ///< of a slip: when it happened, us since the Unix epoch
+  /// Of a slip: when it happened; of a drift: when it begins, the first picture in which the arm is seen; us
+  /// since the Unix epoch.
+  std::optional<Microseconds> from{};
+  std::optional<double> duration_s{};  ///< of a drift: until the last picture in which the arm is seen
+  /// "48.7 s into the log", "from 3.5 to 54.0 s into the log" or nothing.
+  [[nodiscard]] std::string when(Microseconds log_begin) const;
 };
 
 struct DiagnosedCause {
