@@ -200,7 +200,8 @@ class Page {
                                       fmt::format("{:.3f} {}", after, unit)};
     };
     const auto share = [](const char* name, double before, double after) {
-      return std::vector<std::string>{name, fmt::format("{:.0f} %", 100.0 * before), fmt::format("{:.0f} %", 100.0 * after)};
+      return std::vector<std::string>{name, fmt::format("{:.0f} %", 100.0 * before),
+                                      fmt::format("{:.0f} %", 100.0 * after)};
     };
     page_.table({"on parts of the log that the fit has not seen", "without the causes", "extended model"},
                 {row("outline residual, rms", d_.before.rms_px, d_.after.rms_px, "px"),
@@ -241,9 +242,10 @@ class Page {
     page_.paragraph(
         fmt::format("How much of the residual of held-out blocks each cause of the catalogue takes away when it alone is "
                     "added to the model: before, to the model of offsets and usual nuisances; after, to the extended "
-                    "one. A cause must take away {:.1f} %, stand out of the noise by z = {:.1f} (given with its name), "
-                    "and beat the others. Free curves (unexplained) must take away 1.5 % and beat every named cause clearly.",
-                    100.0 * d_.gain_threshold, d_.z_threshold));
+                    "one. A cause must take away {:.1f} %, stand out of the noise by z = {:.1f} (given with its name; "
+                    "{:.1f} for a slip, a drift or a curve in time that takes away more than {:.0f} %), and beat the "
+                    "others. Free curves (unexplained) must take away 1.5 % and beat every named cause clearly.",
+                    100.0 * d_.gain_threshold, d_.z_threshold, d_.z_threshold_large, 100.0 * d_.gain_large));
     std::stable_sort(bars.begin(), bars.end(),
                      [](const auto& a, const auto& b) { return a.gain_before > b.gain_before; });
     const auto draw = [&](std::size_t from, std::size_t to, const std::string& title) {

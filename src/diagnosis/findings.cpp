@@ -105,6 +105,8 @@ class Findings {
     report.begin_utime = source_.views().front().joints.utime;
     report.z_threshold = rules_.z_enter;
     report.gain_threshold = found_.selection.gain_floor;
+    report.z_threshold_large = rules_.z_large;
+    report.gain_large = rules_.gain_large;
     report.duration_s = seconds(source_.views().back().joints.utime -
                                 source_.views().front().joints.utime);
     report.block_s = plan_.length_s;

@@ -35,6 +35,8 @@ DiagnosisReport report() {
             {"payload", false, false, false, 0.0, 0.0, 0.0, 0.0}};
   r.z_threshold = 4.5;
   r.gain_threshold = 0.006;
+  r.z_threshold_large = 3.0;
+  r.gain_large = 0.25;
   r.before = {0.9, 2.0, 0.8};
   r.after = {0.3, 0.2, 0.1, 0.61, 0.93};
   r.offsets_deg_before = {{"r_shoulder_roll", 1.0}, {"r_elbow", 2.0}};
@@ -76,7 +78,7 @@ TEST(DiagnosisPage, BeginsWithTheVerdictAndShowsEveryPart) {
   EXPECT_LT(gain, chart);
   for (const char* part : {"3.5 to 4.5", "31.0 %", "Sweep r_elbow", "eccentricity of r_elbow", "0.900 px", "0.300 px",
                            "threshold 0.6 %", "What this log cannot test", "no masses", "latency", "4.2 ms",
-                           "61 %", "93 %",
+                           "61 %", "93 %", "z = 4.5", "3.0 for a slip",
                            "rising against falling"}) {
     EXPECT_THAT(page, HasSubstr(part));
   }

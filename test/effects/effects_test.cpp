@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
+#include <string>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/effects/catalogue.hpp"
@@ -53,6 +55,28 @@ TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
       for (const auto& a : c.adjustments) EXPECT_TRUE(a.is_zero());
       EXPECT_GT(effect->parameters()[0].typical, 0.0) << effect->description();
     }
+  }
+}
+
+/// Without sign and definition nobody can compare an estimate with another tool's.
+TEST(Catalogue, EveryParameterHasItsMeaningInTheHandbook) {
+  const auto r = roles();
+  for (const auto& name : effect_names()) {
+    std::ifstream page(std::string(BODYSCHEMA_SOURCE_DIR) + "/docs/diagnose.md");
+    ASSERT_TRUE(page) << "docs/diagnose.md";
+    const auto begin = "| `" + name + "` | ";
+    std::string line, row;
+    while (std::getline(page, line)) {
+      if (line.starts_with(begin)) row = line;
+    }
+    const auto effect = make_effect(name, effect_targets(name, r).front(), r);
+    std::string names;
+    for (const auto& p : effect->parameters()) {
+      if (p.fitted) names += (names.empty() ? "`" : ", `") + p.name + "`";
+    }
+    EXPECT_TRUE(row.starts_with(begin + names + " | " + effect->parameters()[0].unit + " | "))
+        << "docs/diagnose.md: expected a row '" << begin << names << " | " << effect->parameters()[0].unit
+        << " | meaning |', found '" << row << "'";
   }
 }
 

@@ -111,6 +111,7 @@ struct DiagnosisReport {
   std::vector<std::string> arm_joints;
   std::vector<CandidateBar> bars;
   double z_threshold = 0.0, gain_threshold = 0.0;
+  double z_threshold_large = 0.0, gain_large = 0.0;  ///< of a cause in time that takes away more than `gain_large`
   std::vector<ResidualSample> samples;
   Microseconds begin_utime = 0;  ///< first picture
   double duration_s = 0.0, block_s = 0.0, noise_correlation_s = 0.0;
