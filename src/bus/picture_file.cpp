@@ -10,6 +10,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/file_size.hpp"
+#include "bodyschema/core/picture_size.hpp"
 #include "jpeg.hpp"
 #include "netpbm.hpp"
 
@@ -20,43 +21,14 @@ constexpr std::uintmax_t kMaxBytes = 64u << 20;
 constexpr int kMaxSide_px = 4096;  // as of pictures that are received
 constexpr std::array<std::uint8_t, 8> kPng = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
 
-struct Size {
-  int width = 0;
-  int height = 0;
-};
-
-int big_endian(const std::vector<std::uint8_t>& bytes, std::size_t at, std::size_t count) {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < count && at + i < bytes.size(); ++i) value = value << 8 | bytes[at + i];
-  return static_cast<int>(std::min<std::uint64_t>(value, 1'000'000'000));
-}
-
-/// Of the frame's header, which stands behind segments of known lengths; 0x0 where there is none.
-Size jpeg_size(const std::vector<std::uint8_t>& bytes) {
-  for (std::size_t at = 2; at + 9 < bytes.size();) {
-    if (bytes[at] != 0xFF) return {};
-    const std::uint8_t marker = bytes[at + 1];
-    if (marker == 0xFF) {  // padding
-      ++at;
-      continue;
-    }
-    // Start of frame: C0 to CF but for tables (C4, CC) and an extension (C8).
-    if (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC) {
-      return {big_endian(bytes, at + 7, 2), big_endian(bytes, at + 5, 2)};
-    }
-    at += 2 + static_cast<std::size_t>(big_endian(bytes, at + 2, 2));
-  }
-  return {};
-}
-
-void check(const Size& size, const std::filesystem::path& file) {
+void check(const PictureSize& size, const std::filesystem::path& file) {
   if (size.width >= 1 && size.height >= 1 && size.width <= kMaxSide_px && size.height <= kMaxSide_px) return;
   throw FileError(file.string() + ": header says " + std::to_string(size.width) + "x" + std::to_string(size.height) +
                   " px; expected 1 to " + std::to_string(kMaxSide_px) + " a side");
 }
 
 Image read_png(const std::vector<std::uint8_t>& bytes, const std::filesystem::path& file) {
-  check({big_endian(bytes, 16, 4), big_endian(bytes, 20, 4)}, file);
+  check(picture_size(bytes).value_or(PictureSize{}), file);
   // Without its last chunk it was cut short, and the decoder may not mind.
   constexpr std::array<std::uint8_t, 4> kEnd = {'I', 'E', 'N', 'D'};
   const bool whole = std::search(bytes.end() - std::min<std::ptrdiff_t>(16, std::ssize(bytes)), bytes.end(),
@@ -76,7 +48,7 @@ Image read_png(const std::vector<std::uint8_t>& bytes, const std::filesystem::pa
 }
 
 Image read_jpeg(const std::vector<std::uint8_t>& bytes, const std::filesystem::path& file) {
-  const Size size = jpeg_size(bytes);
+  const PictureSize size = picture_size(bytes).value_or(PictureSize{});
   check(size, file);
   Image image;
   const DecodeResult result = decompress_jpeg({bytes.data(), bytes.size()}, size.width, size.height, image);

@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t kMaxLineBytes = 1 << 16;
 constexpr std::uintmax_t kMaxDataBytes = 256u << 20;  // rows are kept; an hour of an arm at 100 Hz has some 50 MB
+constexpr std::uint64_t kMaxRows = 10 * 3600 * 200;   // ten hours at 200 Hz: a short row takes more memory than its text
 
 Microseconds parse_stamp(const std::string& text, const std::string& where) {
   double stamp_s = 0.0;
@@ -131,7 +132,10 @@ YarpDataLog::YarpDataLog(const std::filesystem::path& recording, const std::stri
     const bool too_long = text.size() > kMaxLineBytes;
     const auto words = split(std::move(text));
     if (words.empty()) continue;
-    ++lines;
+    if (++lines > kMaxRows) {
+      throw FileError(file_.string() + ": more than " + std::to_string(kMaxRows) +
+                      " rows, ten hours at 200 Hz; cut it into parts");
+    }
     try {
       if (too_long) {
         throw FileError(where(number) + ": line of more than " + std::to_string(kMaxLineBytes) + " bytes");

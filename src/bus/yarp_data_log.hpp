@@ -23,7 +23,7 @@ struct YarpLine {
 struct LeftOut {
   std::uint64_t count = 0;
   std::string first;
-  void add(const FileError& error) {
+  void add(const Error& error) {
     if (count++ == 0) first = error.what();
   }
   /// Throws the first error where too many are bad.

@@ -20,6 +20,7 @@ namespace bodyschema {
 namespace {
 
 constexpr const char* kUnused = "-";
+constexpr int kMaxSide_px = 4096;  // BusOptions::limits as shipped: what is larger is refused where the log is played
 /// Encoder rows of one folder as joints in radians.
 class EncoderRows {
  public:
@@ -142,8 +143,13 @@ struct Pictures {
                       "image_png or image_jpg");
     }
     const auto file = folder / name;
-    if (!std::filesystem::is_regular_file(file)) throw FileError(where + ": picture " + name + " is missing");
+    std::error_code unreadable;  // a name of more than 255 bytes, for one
+    if (!std::filesystem::is_regular_file(file, unreadable)) throw FileError(where + ": picture " + name + " is missing");
     const Image image = read_picture_file(file);
+    if (std::max(image.width, image.height) > kMaxSide_px) {
+      throw FileError(where + ": " + name + " is " + std::to_string(image.width) + "x" + std::to_string(image.height) +
+                      " px, at most " + std::to_string(kMaxSide_px) + " px a side are received");
+    }
     if (width == 0) {
       width = image.width;
       height = image.height;
@@ -334,7 +340,9 @@ YarpImportSummary import_yarp(const std::filesystem::path& recording, const Yarp
         try {
           writer.publish_message(channels.cameras, event.utime, camera.message(event.index));
           ++(camera.type == bot_core::images_t::LEFT ? summary.left_pictures : summary.right_pictures);
-        } catch (const FileError& error) {
+        } catch (const DeviceError&) {  // of the log that is written
+          throw;
+        } catch (const Error& error) {
           camera.bad.add(error);
         }
       }

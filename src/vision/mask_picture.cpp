@@ -1,13 +1,22 @@
 #include "bodyschema/vision/mask_picture.hpp"
 
+#include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/file_size.hpp"
 
 namespace bodyschema {
 namespace {
+
+constexpr std::uintmax_t kMaxBytes = 64u << 20;
+constexpr int kMaxSide_px = 16384;
 
 void write(const std::filesystem::path& file, const cv::Mat& picture) {
   std::error_code ignored;
@@ -74,12 +83,22 @@ void write_overlay_png(const std::filesystem::path& file, const Image& image,
   write(file, picture);
 }
 
-Image read_picture(const std::filesystem::path& file) {
+Image read_picture(const std::filesystem::path& file, const std::function<void(PictureSize)>& check_size) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) throw FileError(file.string() + ": no such file");
+  file_size_at_most(file, kMaxBytes);
+  std::ifstream in(file, std::ios::binary);
+  const std::vector<std::uint8_t> bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  const auto size = picture_size(bytes);
+  if (!size) throw FileError(file.string() + ": not a picture that can be read, expected PNG, JPEG, PPM or PGM");
+  if (size->width < 1 || size->height < 1 || size->width > kMaxSide_px || size->height > kMaxSide_px) {
+    throw FileError(file.string() + ": header says " + std::to_string(size->width) + "x" +
+                    std::to_string(size->height) + " px; expected 1 to " + std::to_string(kMaxSide_px) + " a side");
+  }
+  if (check_size) check_size(*size);
   cv::Mat picture;
   try {
-    picture = cv::imread(file.string(), cv::IMREAD_ANYCOLOR);
+    picture = cv::imdecode(bytes, cv::IMREAD_ANYCOLOR);
   } catch (const cv::Exception&) {
     // Broken file; reported below.
   }

@@ -58,13 +58,14 @@ BackgroundModel load_background(const VisionSetup& setup, const std::string& cam
   if (found == setup.background_pictures.end()) {
     throw ConfigurationError("vision.background_pictures: no picture for camera '" + camera + "'");
   }
-  const Image picture = read_picture(found->second);
-  if (picture.width != width || picture.height != height) {
-    throw FileError(found->second.string() + ": background picture is " +
-                    std::to_string(picture.width) + "x" + std::to_string(picture.height) +
-                    ", camera '" + camera + "' is " + std::to_string(width) + "x" +
+  const auto check_size = [&](PictureSize size) {
+    if (size == PictureSize{width, height}) return;
+    throw FileError(found->second.string() + ": background picture is " + std::to_string(size.width) + "x" +
+                    std::to_string(size.height) + ", camera '" + camera + "' is " + std::to_string(width) + "x" +
                     std::to_string(height));
-  }
+  };
+  const Image picture = read_picture(found->second, check_size);
+  check_size({picture.width, picture.height});  // a JPEG may be turned by what its header says besides
   BackgroundModel model(width, height, picture.channels);
   model.noise_sd = std::max(static_cast<float>(setup.noise_levels), kLeastNoiseSd);
   for (std::size_t i = 0; i < model.pixels(); ++i) {

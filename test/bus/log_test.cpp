@@ -180,6 +180,29 @@ TEST_F(LogFiles, WithAHugeLengthDoNotTakeMemory) {
   EXPECT_EQ(readable().size(), 2u);
 }
 
+// Headers every 64 bytes, each of an event of 8 MiB that ends in the middle of something, or that has no name: were
+// all of each read, this would take hours.
+TEST_F(LogFiles, FullOfEventsThatAreNoneAreReadOnce) {
+  for (const bool ends_well : {false, true}) {
+    constexpr std::size_t kSize = 16 << 20, kEvery = 64;
+    Content bytes(kSize + kEvery, 0);
+    const auto put = [&](std::size_t at, std::uint32_t value) {
+      for (int i = 0; i < 4; ++i) bytes[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
+    };
+    for (std::size_t at = 0; at < kSize; at += kEvery) {
+      put(at, 0xEDA1DA01);
+      put(at + 20, 1);
+      put(at + 24, (8 << 20) - 29 + (ends_well ? 0 : 1));
+      bytes[at + 28] = ends_well ? 1 : 'c';
+    }
+    spit(bytes);
+    LogReader reader(file_);
+    LogEvent event;
+    EXPECT_FALSE(reader.next(event));
+    EXPECT_EQ(reader.skipped_bytes(), kSize + kEvery);
+  }
+}
+
 TEST_F(LogFiles, ThatAreNotLogsAreRefused) {
   EXPECT_NE(error_of(directory_ / "missing.log").find("no such log file"), std::string::npos);
   EXPECT_NE(error_of(directory_).find("not a file"), std::string::npos);

@@ -198,6 +198,14 @@ TEST_F(YarpImport, LeavesOutAFewBadLinesAndCountsThem) {
   EXPECT_EQ(import().bad_lines, 1u);
 }
 
+TEST_F(YarpImport, RefusesMoreRowsThanMemoryIsMeantFor) {
+  write_recording();
+  std::string rows;
+  for (int i = 0; i <= 7'200'000; ++i) rows += "1 1 a\n";
+  write("left/data.log", rows);
+  EXPECT_THAT(error(), AllOf(HasSubstr("left/data.log: more than 7200000 rows")));
+}
+
 TEST_F(YarpImport, LeavesOutAFewBadPicturesAndCountsThem) {
   write_recording();
   std::string lines;
@@ -211,6 +219,15 @@ TEST_F(YarpImport, LeavesOutAFewBadPicturesAndCountsThem) {
   EXPECT_EQ(summary.bad_pictures, 2u);
   EXPECT_EQ(summary.bad_lines, 0u);
   EXPECT_THAT(summary.first_bad, AllOf(HasSubstr("left/data.log:6"), HasSubstr("gone.ppm is missing")));
+  // A name that the file system does not take, and a picture that no log does.
+  write("left/vast.ppm", "P5 16384 16384 255\n");  // sparse
+  std::filesystem::resize_file(directory_ / "left/vast.ppm", 300'000'000);
+  std::string tail;
+  for (int i = 41; i < 61; ++i) tail += "-1 " + std::to_string(100.0 + 0.01 * i) + " a.ppm\n";
+  write("left/data.log", lines + tail + "-1 101 " + std::string(300, 'x') + "\n");
+  EXPECT_EQ(import().bad_pictures, 3u);
+  write("left/data.log", "-1 99.9 vast.ppm\n" + lines + tail);
+  EXPECT_EQ(import().bad_pictures, 3u);
   write("left/data.log", lines + "-1 100.5 gone.ppm\n");
   EXPECT_THAT(error(), AllOf(HasSubstr("left/data.log:6"), HasSubstr("the first of 3 bad pictures of 41")));
 }

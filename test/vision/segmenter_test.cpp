@@ -1,6 +1,9 @@
 #include "bodyschema/vision/segmenter.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <fstream>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/vision/mask_picture.hpp"
@@ -379,6 +382,21 @@ TEST(Segmenter, BackgroundPictureMustBeThereAndFit) {
   EXPECT_THROW(Segmenter(setup, "right", 10, 10), ConfigurationError);
   EXPECT_THROW(Segmenter(setup, "left", 10, 11), FileError);
   EXPECT_NO_THROW(Segmenter(setup, "left", 10, 10));
+  // Refused for what its header says, before memory for 900 million pixels is taken.
+  {
+    std::ofstream large(file, std::ios::binary | std::ios::in);
+    large.seekp(16);
+    large.write("\0\0\x40\0\0\0\x40\0", 8);
+  }
+  EXPECT_THAT([&] { Segmenter(setup, "left", 10, 10); },
+              testing::ThrowsMessage<FileError>(testing::HasSubstr("background picture is 16384x16384, camera 'left'")));
+  {
+    std::ofstream larger(file, std::ios::binary | std::ios::in);
+    larger.seekp(16);
+    larger.write("\0\0\x75\x30\0\0\x75\x30", 8);
+  }
+  EXPECT_THAT([&] { Segmenter(setup, "left", 10, 10); },
+              testing::ThrowsMessage<FileError>(testing::HasSubstr("header says 30000x30000 px")));
   setup.background_pictures["left"] = "/nonexistent/picture.png";
   EXPECT_THROW(Segmenter(setup, "left", 10, 10), FileError);
   std::filesystem::remove(file);

@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <vector>
 
+#include "bodyschema/core/picture_size.hpp"
 #include "bodyschema/geometry/binary_mask.hpp"
 #include "bodyschema/geometry/image.hpp"
 
@@ -21,7 +23,8 @@ void write_coverage_png(const std::filesystem::path& file, int width, int height
 /// The picture with the mask's outline drawn in green and invalid pixels tinted red.
 void write_overlay_png(const std::filesystem::path& file, const Image& image,
                        const BinaryMask& mask, const BinaryMask& valid = {});
-/// A PNG, JPEG or PPM file as gray or RGB. Throws FileError.
-Image read_picture(const std::filesystem::path& file);
+/// A PNG, JPEG, PPM or PGM file of at most 64 MiB and 16384 px a side as gray or RGB. `check_size` may throw on
+/// account of what the header says, before memory for pixels is taken. Throws FileError.
+Image read_picture(const std::filesystem::path& file, const std::function<void(PictureSize)>& check_size = {});
 
 }  // namespace bodyschema
