@@ -8,6 +8,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/effects/catalogue.hpp"
 #include "candidates.hpp"
+#include "detectable.hpp"
 #include "extension.hpp"
 #include "findings.hpp"
 #include "model_fit.hpp"
@@ -210,7 +211,7 @@ class Diagnoser {
     const auto& plan = fitter_.plan();
     Found found{make_candidates(source_, at, plan, layout_, nuisances, excluded_), {}, baseline_, {}};
     auto& set = found.set;
-    set_tolerances(set);
+    set_sizes(set);
     const auto bare = only_offsets(source_, layout_, at, model);
     const auto statistics = accumulate(bare, plan, set.pointers(), set.offsets.size());
     progress(0.6);
@@ -282,13 +283,17 @@ class Diagnoser {
     return typical_distance_px(misfit(at, outline_points(at))) > kFar_px;
   }
 
-  void set_tolerances(CandidateSet& set) const {
+  /// Which sizes are worth naming, in units of the candidates' columns.
+  void set_sizes(CandidateSet& set) const {
     for (auto& candidate : set.candidates) {
-      const auto at = options_.tolerances.find(candidate.name);
-      if (!(candidate.nuisance || candidate.slip) || at == options_.tolerances.end()) continue;
+      if (candidate.generic()) continue;
       const auto effect = make_effect(candidate.name, candidate.target, source_.roles());
       const auto& p = std::as_const(*effect).parameters()[0];
-      candidate.tolerance = at->second * p.si_per_unit / p.typical;
+      const double column_per_unit = p.si_per_unit / p.typical;
+      candidate.detectable = detectable_size(candidate.name, candidate.target, source_.roles()) * column_per_unit;
+      const auto at = options_.tolerances.find(candidate.name);
+      if (!(candidate.nuisance || candidate.slip) || at == options_.tolerances.end()) continue;
+      candidate.tolerance = at->second * column_per_unit;
     }
   }
 

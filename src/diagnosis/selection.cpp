@@ -381,9 +381,8 @@ class Selector {
       const auto& smallest = list[list.size() - 1 - result.set_aside.size()];
       const double gain = smallest.score.gain, without_it = left + crowd - rest + gain;
       const bool alone = !many && crowd <= options_.gain_floor * left;
-      const double floor =
-          candidates_[smallest.candidate].temporal() ? options_.crowd_floor_in_time : options_.crowd_floor;
-      if ((alone || gain > floor * without_it) && gain > options_.crowd_ratio * crowd) break;
+      const bool large = alone || (gain > options_.crowd_floor * without_it && !too_small_for_a_crowd(smallest.candidate));
+      if (large && gain > options_.crowd_ratio * crowd) break;
       crowd += gain;
       result.set_aside.push_back(smallest);
     }
@@ -394,6 +393,11 @@ class Selector {
       if (contains(causes_, cause.candidate)) remove(cause.candidate);
     }
     result.crowded = crowd > options_.crowd_worth * (left + crowd);
+  }
+
+  [[nodiscard]] bool too_small_for_a_crowd(std::size_t c) const {
+    const auto columns = static_cast<Eigen::Index>(candidates_[c].columns.size());
+    return current_.estimate.segment(position(model_, c), columns).norm() < candidates_[c].detectable;
   }
 
   /// One cause outside the baseline can look like several nuisances inside it. Where one candidate

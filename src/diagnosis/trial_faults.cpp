@@ -1,47 +1,14 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstdlib>
 
 #include "bodyschema/diagnosis/trials.hpp"
 #include "bodyschema/effects/catalogue.hpp"
+#include "detectable.hpp"
 #include "trial_random.hpp"
 
 namespace bodyschema {
 namespace {
-
-/// Smallest sizes to be found 90 % of the time in a log of 50 s, shoulder to wrist; 0: not
-/// visible there.
-std::array<double, 7> detectable_by_joint(const std::string& name) {
-  if (name == "compliance") return {0.1, 0.1, 0.3, 0.6, 0, 0, 0};
-  if (name == "backlash") return {0.1, 0.15, 0.2, 0.2, 0.4, 0.3, 0.3};
-  if (name == "encoder_gain") return {0.5, 0.6, 0.8, 0.8, 1.2, 2.0, 2.0};
-  if (name == "eccentricity") return {0.3, 0.35, 0.45, 0.45, 0.7, 1.15, 1.15};
-  if (name == "joint_coupling") return {0.5, 0.6, 0.7, 0.7, 1.2, 1.8, 1.8};
-  if (name == "link_length") return {0, 0, 1.0, 0, 1.0, 0, 0};
-  if (name == "axis_tilt") return {0.3, 0.35, 0.4, 0.4, 0.7, 1.0, 1.0};
-  if (name == "drift") return {0.2, 0.2, 0.25, 0.25, 0.4, 0.35, 0.35};
-  if (name == "slip") return {0.2, 0.2, 0.3, 0.3, 0.8, 0.6, 0.6};
-  if (name == "wobble") return {0.2, 0.2, 0.2, 0.2, 0.4, 0.35, 0.35};
-  if (name == "velocity_lag") return {10, 10, 12, 12, 25, 20, 20};
-  if (name == "acceleration_lag") return {0.2, 0.2, 0.25, 0.25, 0.5, 0.4, 0.4};
-  if (name == "local_kink" || name == "random_walk") return {0.3, 0.3, 0.3, 0.3, 0.6, 0.5, 0.5};
-  return {};
-}
-
-double detectable_of_robot(const std::string& name) {
-  if (name == "payload") return 0.25;
-  if (name == "latency") return 5.0;
-  if (name == "camera_skew") return 5.6;
-  if (name == "vergence") return 0.09;
-  if (name == "baseline") return 0.4;
-  if (name == "focal_length") return 0.55;
-  if (name == "principal_point") return 0.4;
-  if (name == "distortion") return 0.026;
-  if (name == "silhouette_bias") return 0.23;
-  if (name == "mesh_scale") return 0.6;
-  if (name == "finger_posture") return 0.1;
-  return 0.0;
-}
 
 bool one_sided(const std::string& name) {
   return name == "compliance" || name == "payload" || name == "backlash" || name == "wobble" ||
@@ -137,44 +104,26 @@ TrialOptions draw_trial(const TrialRobot& robot, TrialRow row, std::uint64_t see
 
 std::vector<TrialFault> trial_faults(const TrialRobot& robot, bool outside_catalogue) {
   const auto roles = JointRoles::of(robot.model, robot.setup, robot.rig);
-  const auto joint = [&](std::size_t i) { return roles.names[static_cast<std::size_t>(roles.arm[i])]; };
   std::vector<TrialFault> list;
-  const auto by_joint = [&](const std::string& name) {
-    const auto sizes = detectable_by_joint(name);
-    for (std::size_t i = 0; i < roles.arm.size() && i < sizes.size(); ++i) {
-      if (sizes[i] > 0.0) list.push_back({{name, joint(i), ""}, 0.0, 0.0, sizes[i]});
-    }
+  const auto add = [&](const std::string& name, const EffectTarget& target) {
+    const double size = diagnosis::detectable_size(name, target, roles);
+    if (size > 0.0) list.push_back({{name, target.joint, target.source}, 0.0, 0.0, size});
   };
   if (outside_catalogue) {
     for (const char* name : {"wobble", "velocity_lag", "acceleration_lag", "local_kink", "random_walk"}) {
-      by_joint(name);
+      for (const auto joint : roles.arm) add(name, {roles.names[static_cast<std::size_t>(joint)], ""});
     }
     return list;
   }
+  const auto place_in_arm = [&](const std::string& joint) {
+    return std::find(roles.arm.begin(), roles.arm.end(), roles.index(joint)) - roles.arm.begin();
+  };
   for (const auto& name : effect_names()) {
-    if (name == "joint_offset") continue;
-    if (name == "joint_coupling") {
-      const auto sizes = detectable_by_joint(name);
-      for (std::size_t i = 0; i < roles.arm.size() && i < sizes.size(); ++i) {
-        if (i > 0) list.push_back({{name, joint(i), joint(i - 1)}, 0.0, 0.0, sizes[i]});
-        if (i + 1 < roles.arm.size()) list.push_back({{name, joint(i), joint(i + 1)}, 0.0, 0.0, sizes[i]});
-      }
-    } else if (name == "head_offset") {
-      constexpr std::array<double, 4> kSizes = {0.3, 0.2, 0.3, 0.4};
-      const auto targets = effect_targets(name, roles);
-      for (std::size_t i = 0; i < targets.size(); ++i) {
-        list.push_back({{name, targets[i].joint, ""}, 0.0, 0.0, kSizes[i]});
-      }
-    } else if (name == "principal_point") {
-      for (const char* where : {"difference", "left", "right"}) {
-        list.push_back({{name, "", where}, 0.0, 0.0, detectable_of_robot(name)});
-      }
-    } else if (detectable_of_robot(name) > 0.0) {
-      if (!effect_targets(name, roles).empty()) {
-        list.push_back({{name, "", ""}, 0.0, 0.0, detectable_of_robot(name)});
-      }
-    } else {
-      by_joint(name);
+    for (const auto& target : effect_targets(name, roles)) {
+      // Couplings of neighbours; shifts of the picture that are no matter of neck and eyes.
+      if (name == "joint_coupling" && std::abs(place_in_arm(target.joint) - place_in_arm(target.source)) > 1) continue;
+      if (name == "principal_point" && target.source == "common") continue;
+      add(name, target);
     }
   }
   return list;

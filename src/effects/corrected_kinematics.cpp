@@ -6,10 +6,14 @@
 namespace bodyschema {
 namespace {
 
+/// Across the axis and the coordinate axis it is least aligned with; of several the first, whatever rounding says,
+/// so that an extended model means the same on every machine.
 Eigen::Vector3d perpendicular(const Eigen::Vector3d& axis) {
-  Eigen::Index smallest = 0;
-  axis.cwiseAbs().minCoeff(&smallest);
-  return axis.cross(Eigen::Vector3d::Unit(smallest)).normalized();
+  constexpr double kAlike = 1e-6;
+  const Eigen::Vector3d aligned = axis.cwiseAbs();
+  Eigen::Index first = 0;
+  while (aligned[first] > aligned.minCoeff() + kAlike) ++first;
+  return axis.cross(Eigen::Vector3d::Unit(first)).normalized();
 }
 
 }  // namespace
@@ -47,8 +51,9 @@ CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model
     const Eigen::Vector3d axis_P = X_W_[joints_[j].parent].linear().transpose() * axis.direction_W;
     joints_[j].tilt_P[0] = perpendicular(axis_P);
     joints_[j].tilt_P[1] = axis_P.cross(joints_[j].tilt_P[0]).normalized();
+    // The next joint may hang on a link that is fixed to this joint's.
     for (std::size_t k = 0; k < joints.size(); ++k) {
-      if (joints[k].parent_link != joints[j].child_link) continue;
+      if (!joints_[k].moves_something || !fk_->moves(static_cast<Eigen::Index>(j), joints_[k].parent)) continue;
       const Eigen::Vector3d on = fk_->joint_axis(static_cast<Eigen::Index>(k)).point_W - axis.point_W;
       const double along = axis.direction_W.dot(on);
       if (std::abs(along) < 1e-6) continue;

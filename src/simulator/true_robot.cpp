@@ -68,18 +68,21 @@ TrueKinematics::TrueKinematics(std::shared_ptr<const RobotModel> model, const Tr
     const Eigen::Matrix3d R_PW = X_W_[m.parent].linear().transpose();
     const Eigen::Vector3d axis_P = R_PW * axis.direction_W;
     // First perpendicular: across the axis and the coordinate axis it is least aligned with.
+    // Of two it is equally aligned with, the first: not rounding decides.
+    const double least_aligned = axis_P.cwiseAbs().minCoeff();
     Eigen::Index least = 0;
-    axis_P.cwiseAbs().minCoeff(&least);
+    while (std::abs(axis_P[least]) > least_aligned + 1e-6) ++least;
     m.tilt_1_P = axis_P.cross(Eigen::Vector3d::Unit(least)).normalized();
     m.tilt_2_P = axis_P.cross(m.tilt_1_P).normalized();
     // Outwards: towards the next joint beyond this one along the chain.
     m.outwards = 1.0;
     for (Eigen::Index j = m.change.joint + 1; j < model->joint_count(); ++j) {
       const auto& next = model->joints()[static_cast<std::size_t>(j)];
-      if (next.parent_link != model->joints()[static_cast<std::size_t>(m.change.joint)].child_link) continue;
-      ForwardKinematics beyond(model, {next.child_link});
-      Pose X_W;
-      beyond.compute(Eigen::VectorXd::Zero(model->joint_count()), {&X_W, 1});
+      ForwardKinematics beyond(model, {next.child_link, next.parent_link});
+      if (!beyond.moves(m.change.joint, 1)) continue;
+      std::array<Pose, 2> X_WL;
+      beyond.compute(Eigen::VectorXd::Zero(model->joint_count()), X_WL);
+      const Pose& X_W = X_WL.front();
       const double along = axis.direction_W.dot(X_W.translation() - X_W_[m.parent + 1].translation());
       if (std::abs(along) > 1e-6) {
         m.outwards = along > 0.0 ? 1.0 : -1.0;

@@ -125,5 +125,46 @@ TEST_F(CorrectedKinematicsTest, BaseShiftMovesEveryLinkAlikeInTheRootFrame) {
   EXPECT_LT((X[0].translation() - first.translation() - corrections.base_shift_m).norm(), 1e-12);
 }
 
+/// Two joints with a sensor fixed between them, as in the upper arm of the official iCub; the arm hangs down
+/// its first joint's axis.
+std::shared_ptr<const RobotModel> sensor_between(const std::string& axis) {
+  const auto file = std::filesystem::temp_directory_path() /
+                    ("bodyschema_sensor_between_" + std::to_string(::getpid()) + ".urdf");
+  std::ofstream(file) << R"(<robot name="two"><link name="root"/><link name="one"/><link name="sensor"/>
+    <link name="two"/><link name="eye"/>
+    <joint name="a" type="revolute"><parent link="root"/><child link="one"/><axis xyz=")" << axis << R"("/>
+      <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+    <joint name="s" type="fixed"><parent link="one"/><child link="sensor"/><origin xyz="0 0 -0.1"/></joint>
+    <joint name="b" type="revolute"><parent link="sensor"/><child link="two"/><axis xyz="0 1 0"/>
+      <origin xyz="0 0 -0.2"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+    <joint name="e" type="fixed"><parent link="root"/><child link="eye"/></joint>
+    </robot>)";
+  RobotModelOptions options;
+  options.urdf = file;
+  auto model = RobotModel::load(options);
+  std::filesystem::remove(file);
+  return model;
+}
+
+TEST(CorrectedKinematics, LongerIsAwayFromTheRootAlsoBehindASensor) {
+  CorrectedKinematics kinematics(sensor_between("0 0 1"), {"two"}, {"eye"});
+  Corrections longer(2);
+  longer.adjustments[0].along_m = 0.01;
+  Pose X;
+  kinematics.compute(Eigen::Vector2d(0.4, 0.2), longer, 0, {&X, 1});
+  EXPECT_NEAR(X.translation().z(), -0.31, 1e-12);
+}
+
+/// Turned frames leave 1e-16 in an axis. What tilt_1 means must not depend on which of them is smaller.
+TEST(CorrectedKinematics, RoundingDoesNotDecideAboutWhatATiltTurns) {
+  const auto first_tilt = [](const std::string& axis) {
+    CorrectedKinematics kinematics(sensor_between(axis), {"two"}, {"eye"});
+    Pose X;
+    kinematics.compute(Eigen::Vector2d::Zero(), Corrections(2), 0, {&X, 1});
+    return kinematics.tilt_axis(0, 0);
+  };
+  EXPECT_LT((first_tilt("1e-12 0 1") - first_tilt("0 1e-12 1")).norm(), 1e-9);
+}
+
 }  // namespace
 }  // namespace bodyschema

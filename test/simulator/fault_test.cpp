@@ -1,8 +1,11 @@
 #include "bodyschema/simulator/fault.hpp"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <set>
 
@@ -294,6 +297,28 @@ TEST(LinkLength, PutsElbowAndWristFurtherOut) {
   EXPECT_NEAR(distance("link_length:joint=r_shoulder_yaw,value=-5", "r_shoulder_2", "r_elbow_1") - upper, -5e-3, 2e-4);
   const double fore = distance("link_length:joint=r_wrist_prosup,value=0", "r_elbow_1", "r_wrist_1");
   EXPECT_NEAR(distance("link_length:joint=r_wrist_prosup,value=5", "r_elbow_1", "r_wrist_1") - fore, 5e-3, 1e-4);
+}
+
+/// In the upper arm of the official iCub a sensor is fixed between two joints, and the arm hangs down its axis.
+TEST(LinkLength, IsAwayFromTheRootAlsoBehindASensor) {
+  const auto file = std::filesystem::temp_directory_path() /
+                    ("bodyschema_true_sensor_" + std::to_string(::getpid()) + ".urdf");
+  std::ofstream(file) << R"(<robot name="two"><link name="root"/><link name="one"/><link name="sensor"/><link name="two"/>
+    <joint name="a" type="revolute"><parent link="root"/><child link="one"/><axis xyz="0 0 1"/>
+      <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+    <joint name="s" type="fixed"><parent link="one"/><child link="sensor"/><origin xyz="0 0 -0.1"/></joint>
+    <joint name="b" type="revolute"><parent link="sensor"/><child link="two"/><axis xyz="0 1 0"/>
+      <origin xyz="0 0 -0.2"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>)";
+  const auto model = RobotModel::load({.urdf = file, .mesh_search_roots = {}, .rendered_links = {}});
+  std::filesystem::remove(file);
+  TrueBody longer;
+  JointMisplacement& upper_arm = longer.misplacements.emplace_back();
+  upper_arm.joint = 0;
+  upper_arm.lengthening_m = 0.01;
+  TrueKinematics kinematics(model, longer, {"two"});
+  Pose X;
+  kinematics.compute(Eigen::Vector2d(0.4, 0.2), {&X, 1});
+  EXPECT_NEAR(X.translation().z(), -0.31, 1e-12);
 }
 
 TEST(AxisTilt, LeavesTheZeroPostureAndTurnsAboutATiltedAxis) {
