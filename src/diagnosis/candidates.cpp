@@ -136,7 +136,7 @@ int turning_points(std::span<const JointSample> stream, Eigen::Index joint) {
       count += direction < 0;
       direction = 1;
       extreme = q;
-    } else if ((direction >= 0 && q > extreme) || (direction < 0 && q < extreme)) {
+    } else if ((direction > 0 && q > extreme) || (direction < 0 && q < extreme)) {
       extreme = q;
     }
   }
@@ -346,8 +346,8 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
   }
   if (roles.head.empty()) {
     exclude_all("base_shift", "the cameras do not move against the base: a shifted base looks like errors of their place");
-  } else if (const double range = largest_range(source.views(), roles.head); range < kHeadStill) {
-    exclude_all("base_shift", "the head moved " + number(range / kDeg, 1) +
+  } else if (const double range = largest_range(source.views(), roles.neck); range < kHeadStill) {
+    exclude_all("base_shift", "the neck moved " + number(range / kDeg, 1) +
                                   " deg: a shifted base looks like errors of neck and eyes");
   }
   const bool masses = !at.instants.empty() && at.instants.front().gravity_torque.size() > 0;
@@ -411,7 +411,8 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
 std::vector<CauseName> lookalikes(const MeasurementSource& source, const CauseName& cause) {
   const auto& roles = source.roles();
   std::vector<CauseName> list;
-  const bool head_moved = largest_range(source.views(), roles.head) >= kHeadStill;
+  // Eyes that pan move within the head: they tell nothing about what lies below it.
+  const bool head_moved = largest_range(source.views(), roles.neck) >= kHeadStill;
   if (cause.name != "base_shift" || head_moved) return list;
   for (const auto& target : effect_targets("head_offset", roles)) {
     list.push_back({"head_offset", target.joint, target.source});

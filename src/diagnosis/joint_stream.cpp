@@ -20,19 +20,58 @@ std::map<std::string, double> resting_joints(const RobotModel& robot, const Robo
 }  // namespace
 
 JointStream::JointStream(const RobotModel& robot, const RobotSetup& setup, const BusOptions& bus)
-    : limits_(bus.limits), assembler_(names_of(robot), resting_joints(robot, setup)) {}
+    : limits_(bus.limits), clock_step_(bus.synchroniser.clock_step), assembler_(names_of(robot), resting_joints(robot, setup)) {
+  for (const auto& name : names_of(robot)) index_.emplace(name, index_.size());
+}
 
 void JointStream::take(Bytes message) {
   if (!decode(message, joints_, limits_).ok()) return;
+  if (begins_anew()) assembler_.forget();
   const JointSample* sample = assembler_.take(joints_);
   if (sample == nullptr) return;
+  while (!stream_.empty() && stream_.back().utime > sample->utime) {
+    stream_.pop_back();
+    read_.pop_back();
+  }
   if (!stream_.empty() && stream_.back().utime == sample->utime) {
     stream_.back() = *sample;  // head and arm apart, with one stamp
   } else {
     stream_.push_back(*sample);
+    read_.emplace_back(index_.size(), false);
+  }
+  mark_read();
+}
+
+bool JointStream::begins_anew() {
+  constexpr int kEvidence = 3;
+  const bool far_before = !stream_.empty() && stream_.back().utime - joints_.utime > clock_step_;
+  older_in_a_row_ = far_before ? older_in_a_row_ + 1 : 0;
+  return older_in_a_row_ == kEvidence;
+}
+
+void JointStream::mark_read() {
+  for (const auto& name : joints_.names) {
+    if (const auto at = index_.find(std::string(name)); at != index_.end()) read_.back()[at->second] = true;
   }
 }
 
-std::vector<JointSample> JointStream::finish() { return std::move(stream_); }
+std::vector<JointSample> JointStream::finish() {
+  constexpr Microseconds kFarApart = 100'000;  // a joint of which so long nothing comes has stopped coming
+  for (std::size_t j = 0; j < index_.size(); ++j) {
+    const auto joint = static_cast<Eigen::Index>(j);
+    std::size_t last = 0;
+    for (std::size_t i = 0; i < stream_.size(); ++i) {
+      if (!read_[i][j]) continue;
+      const JointSample &from = stream_[last], &to = stream_[i];
+      const bool between_readings = read_[last][j] && to.utime - from.utime <= kFarApart;
+      for (std::size_t k = last + 1; between_readings && k < i; ++k) {
+        const double share = seconds(stream_[k].utime - from.utime) / seconds(to.utime - from.utime);
+        stream_[k].q[joint] = from.q[joint] + share * (to.q[joint] - from.q[joint]);
+      }
+      last = i;
+    }
+  }
+  return std::move(stream_);
+}
 
 }  // namespace bodyschema::diagnosis

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <map>
+#include <string>
 #include <vector>
 
 #include "bodyschema/bus/bus_options.hpp"
@@ -11,20 +13,31 @@
 
 namespace bodyschema::diagnosis {
 
-/// Joint messages of a log as samples of all joints, in order of time.
+/// Joint messages of a log as samples of all joints, in order of time. Where head and arm come apart, a joint
+/// of one stands between its readings when the other comes: repeating its last value would make stairs of quick
+/// motion.
 class JointStream {
  public:
   JointStream(const RobotModel& robot, const RobotSetup& setup, const BusOptions& bus);
-  /// A message that does not decode or names none of the robot's joints is left out.
+  /// A message that does not decode or names none of the robot's joints is left out, and one that is older than
+  /// the last. Where the stamps begin anew (three in a row far before the last, as for Synchroniser), what has a
+  /// later one is taken back: a single stamp far in the future costs no more than itself.
   void take(Bytes message);
   /// The samples; velocities as published, which set_motion replaces.
   std::vector<JointSample> finish();
 
  private:
+  [[nodiscard]] bool begins_anew();
+  void mark_read();
+
   DecodeLimits limits_;
+  Microseconds clock_step_;
+  int older_in_a_row_ = 0;
   JointStateMessage joints_;
   JointAssembler assembler_;
+  std::map<std::string, std::size_t> index_;
   std::vector<JointSample> stream_;
+  std::vector<std::vector<bool>> read_;  ///< which joints a sample's own messages carried
 };
 
 }  // namespace bodyschema::diagnosis

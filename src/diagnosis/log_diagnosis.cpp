@@ -123,11 +123,16 @@ class LogDiagnosis {
     if (auto turn = describe(pipeline_.background_turn()); !turn.empty()) {
       report.warnings.insert(report.warnings.begin(), turn + "; nothing found here holds until then");
     }
+    if (const auto steps = facts_.bus.synchroniser.clock_steps; steps > 0) {
+      report.warnings.push_back(fmt::format("the clock of the time stamps stepped {}: what depends on speed, or on when "
+                                            "it happened, may be wrong; record again with one steady clock",
+                                            steps == 1 ? "once" : fmt::format("{} times", steps)));
+    }
     if (auto lost = lost_pictures(facts_.bus, kTolerableLoss); !lost.empty()) {
       report.warnings.push_back(std::move(lost));
     }
     const auto& roles = measurement_.roles();
-    if (!roles.head.empty() && largest_range(measurement_.views(), roles.head) < kStill_rad) {
+    if (!roles.neck.empty() && largest_range(measurement_.views(), roles.neck) < kStill_rad) {
       report.warnings.push_back(
           "the head stood still: errors of neck and eye tilt, a shifted base (base_shift), lengths between base and "
           "eyes and a common shift of the pictures look nearly alike; move the head by 20 to 30 deg");

@@ -107,6 +107,21 @@ TEST(Untestable, ReadingsThatJumpKnowNoDirection) {
   }
 }
 
+/// A joint that sets out upwards turns round as often as one that sets out downwards.
+TEST(Untestable, CountsTheFirstTurnWhicheverWayAJointSetsOut) {
+  const auto log = make_synthetic_log(test::robot(), {}, 1);
+  const auto elbow = log->roles().index("r_elbow");
+  for (const double way : {1.0, -1.0}) {
+    auto turning = test::EditedLog::whole(*log);
+    auto& stream = turning.stream_for_editing();
+    for (std::size_t i = 0; i < stream.size(); ++i) {
+      const double third = 3.0 * static_cast<double>(i) / static_cast<double>(stream.size());  // to, fro, to
+      stream[i].q[elbow] = way * (third < 1.0 ? third : third < 2.0 ? 2.0 - third : third - 2.0);
+    }
+    EXPECT_EQ(find(untestable(turning, at_zero(turning)), {"backlash", "r_elbow", ""}), nullptr) << way;
+  }
+}
+
 TEST(Lookalikes, OfAShiftedBaseAreNeckAndEyesWhileTheHeadStandsStill) {
   const auto log = make_synthetic_log(test::robot(), {}, 1);
   auto still = test::EditedLog::whole(*log), moving = test::EditedLog::whole(*log);
@@ -121,6 +136,13 @@ TEST(Lookalikes, OfAShiftedBaseAreNeckAndEyesWhileTheHeadStandsStill) {
   }
   EXPECT_TRUE(lookalikes(still, {"latency", "", ""}).empty());
   EXPECT_TRUE(lookalikes(moving, {"base_shift", "", ""}).empty());
+  // Eyes that pan on a still neck tell nothing about what lies below it.
+  auto panning = test::EditedLog::whole(*log);
+  for (std::size_t v = 0; v < log->views().size(); ++v) {
+    for (const auto joint : log->roles().neck) panning.views_for_editing()[v].joints.q[joint] = 0.1;
+    panning.views_for_editing()[v].joints.q[log->roles().left_pan] = v % 2 == 0 ? 0.1 : 0.3;
+  }
+  EXPECT_FALSE(lookalikes(panning, {"base_shift", "", ""}).empty());
 }
 
 TEST(SplittingMotion, IsSaidForEveryAliasOfTheHandbook) {
