@@ -214,7 +214,9 @@ class LogDiagnosis {
       if (due >= 0 && observation.utime < due) return;
       // Keep to the raster, so that the mean rate is the wanted one whatever the cameras' is.
       due = due < 0 || observation.utime > due + period ? observation.utime + period : due + period;
-      if (started) {
+      if (started && pipeline_.masks_need_estimates()) {
+        pipeline_.process(observation);
+      } else if (started) {
         pipeline_.segment(observation);
       } else {
         const auto estimate = pipeline_.process(observation);

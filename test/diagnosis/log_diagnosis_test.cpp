@@ -34,7 +34,8 @@ TEST(LostPictures, AreSaidWithTheReasonsMostFrequentFirst) {
 
 /// A log of 25 s whose head looks about in a room, with `missing_share` of its encoder readings missing, or with
 /// left and right exchanged.
-void record(const fs::path& file, bool clutter, double missing_share, bool swapped = false) {
+void record(const fs::path& file, bool clutter, double missing_share, bool swapped = false,
+            const std::string& fault = "") {
   const Configuration c = Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml");
   const RobotSetup setup = RobotSetup::from(c.section("robot"));
   auto settings = simulator::SimulatorSettings::from(c.section("simulator"));
@@ -46,6 +47,7 @@ void record(const fs::path& file, bool clutter, double missing_share, bool swapp
   plan.seed = 5;
   plan.motion = simulator::Motion::kBabble;
   plan.seconds = 25.0;
+  if (!fault.empty()) plan.faults = {simulator::FaultSpec::parse(fault)};
   simulator::Simulator simulator(setup.load(), setup, StereoRig::from(c.section("cameras")), settings, plan);
   LogWriter log(file);
   simulator::FramePublisher publisher(simulator.joint_names(), {});
@@ -56,10 +58,11 @@ void record(const fs::path& file, bool clutter, double missing_share, bool swapp
   }
 }
 
-DiagnosisReport diagnosis(const fs::path& log) {
+DiagnosisReport diagnosis(const fs::path& log, const std::string& method = "learned_background") {
   Configuration c = Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml",
                                         {"silhouette.engine=contour", "filter.particles=50",
-                                         "bus.max_image_gap_ms=1000", "bus.max_encoder_gap_ms=1000"});
+                                         "bus.max_image_gap_ms=1000", "bus.max_encoder_gap_ms=1000",
+                                         "vision.method=" + method});
   LogDiagnosisOptions options;
   options.log = log;
   options.quiet = true;
@@ -88,6 +91,20 @@ TEST(LogDiagnosis, IntervalsOfOffsetsIncludeWhatAllPicturesPlaceAlike) {
   for (const auto& [joint, ci] : report.offsets_ci95_deg) {
     EXPECT_GT(0.5 * (ci[1] - ci[0]), 1.96 * 0.03) << joint;
   }
+  fs::remove(log);
+}
+
+/// `statistics` looks for the robot near where it is predicted. The prediction was that of the log's first seconds:
+/// where the arm had slipped since, it was cut off.
+TEST(LogDiagnosis, FollowsASlipWhereMasksNeedAPrediction) {
+  const fs::path log = fs::temp_directory_path() / ("log_diagnosis_slip_" + std::to_string(getpid()) + ".lcmlog");
+  record(log, true, 0.0, false, "slip:joint=r_shoulder_pitch,value=4,at=12");
+  const auto report = diagnosis(log, "statistics");
+  ASSERT_FALSE(report.causes.empty()) << report.sentence;
+  EXPECT_EQ(report.causes.front().cause.text(), "slip of r_shoulder_pitch") << report.sentence;
+  ASSERT_FALSE(report.causes.front().parameters.empty());
+  EXPECT_NEAR(report.causes.front().parameters.front().estimate, 4.0, 0.2) << report.sentence;
+  EXPECT_GT(report.after.outline_found, 0.8);
   fs::remove(log);
 }
 

@@ -55,6 +55,8 @@ class Pipeline {
   /// `finish_learning`.
   void learn_from(const Observation& observation);
   void finish_learning();
+  /// Whether masks are looked for near where the robot is estimated to be (`vision.method: statistics`).
+  [[nodiscard]] bool masks_need_estimates() const { return vision_.method == SegmentationMethod::kStatistics; }
   /// Whether the background is learned from pictures (`vision.method: learned_background`).
   [[nodiscard]] bool learns_background() const { return vision_.method == SegmentationMethod::kLearnedBackground; }
 
