@@ -12,6 +12,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/robot/robot_model.hpp"
 
 namespace bodyschema {
 namespace {
@@ -39,19 +40,29 @@ std::string package_of(const std::string& mesh) {
   return mesh.substr(kScheme.size(), mesh.find('/', kScheme.size()) - kScheme.size());
 }
 
+constexpr const char* kNotAUrdf = "not a URDF (xacro files are converted first: xacro arm.urdf.xacro > arm.urdf)";
+
+/// Throws where the service could not load it: too large, nested too deep, no tree, and the like.
+void check(const fs::path& urdf) {
+  try {
+    (void)RobotModel::load({urdf, {}, {}});
+  } catch (const FileError& error) {
+    const std::string why = error.what(), start = urdf.string() + ": not a usable URDF: ";
+    if (!why.starts_with(start)) throw;
+    throw FileError(urdf.string() + ": " + kNotAUrdf + ": " + why.substr(start.size()));
+  }
+}
+
 /// Which link hangs on which, and which have a shape.
 class Tree {
  public:
   explicit Tree(const fs::path& urdf) : urdf_(urdf) {
+    check(urdf);
     tinyxml2::XMLDocument document;
     const auto error = document.LoadFile(urdf.c_str());
-    if (error == tinyxml2::XML_ERROR_FILE_NOT_FOUND)
-      throw FileError(urdf.string() + ": URDF not found");
     const XMLElement* robot = document.FirstChildElement("robot");
     if (error != tinyxml2::XML_SUCCESS || robot == nullptr) {
-      throw FileError(
-          urdf.string() +
-          ": not a URDF (xacro files are converted first: xacro arm.urdf.xacro > arm.urdf)");
+      throw FileError(urdf.string() + ": " + kNotAUrdf);
     }
     for (auto* link = robot->FirstChildElement("link"); link != nullptr;
          link = link->NextSiblingElement("link")) {
@@ -136,9 +147,18 @@ class Tree {
 std::string yaml(const std::string& name) {
   static constexpr const char* kPlain =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-";
-  return !name.empty() && name.find_first_not_of(kPlain) == std::string::npos && name[0] != '-'
-             ? name
-             : "'" + name + "'";
+  if (!name.empty() && name.find_first_not_of(kPlain) == std::string::npos && name[0] != '-') return name;
+  std::string text = "\"";
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte == 0x7f) {
+      text += fmt::format("\\x{:02x}", byte);
+    } else {
+      if (c == '"' || c == '\\') text += '\\';
+      text += c;
+    }
+  }
+  return text + "\"";
 }
 
 std::string list(const std::vector<std::string>& names) {
@@ -209,7 +229,7 @@ std::string robot_yaml(const StarterOptions& options, const Parts& parts,
       "  rendered_links: {}\n  hand_link: {}\n"
       "  fingertip_links: []               # links at the fingertips, for errors there\n"
       "  estimated_joints: {}\n",
-      options.urdf.filename().string(),
+      yaml(options.urdf.filename().string()),
       yaml(from_here(options.urdf)), list(roots), list(parts.rendered), yaml(options.hand_link), list(parts.arm));
   if (!parts.head.empty()) text += fmt::format("  head_joints: {}\n", list(parts.head));
   const auto fix = [&](const char* unit, const std::vector<std::string>& joints) {

@@ -8,6 +8,7 @@
 
 #include <fstream>
 #include <lcm/lcm-cpp.hpp>
+#include <limits>
 #include <random>
 
 #include "bodyschema/core/error.hpp"
@@ -178,6 +179,19 @@ TEST_F(LogFiles, WithAHugeLengthDoNotTakeMemory) {
   bytes[24] = 0x7f;  // data length of the first event becomes two gigabytes
   spit(bytes);
   EXPECT_EQ(readable().size(), 2u);
+}
+
+TEST_F(LogFiles, WithTimesThatCannotBeGiveTimesThatCanBeSubtracted) {
+  {
+    LogWriter writer(file_);
+    writer.publish("C", std::numeric_limits<Microseconds>::min(), content(1));
+    writer.publish("C", std::numeric_limits<Microseconds>::max(), content(1));
+  }
+  LogReader reader(file_);
+  LogEvent first, last;
+  ASSERT_TRUE(reader.next(first));
+  ASSERT_TRUE(reader.next(last));
+  EXPECT_EQ(last.time_us - first.time_us, 18'000'000'000'000'000);
 }
 
 // Headers every 64 bytes, each of an event of 8 MiB that ends in the middle of something, or that has no name: were

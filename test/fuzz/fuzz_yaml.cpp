@@ -20,6 +20,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     fuzz::refuse_or_accept([&] { (void)YarpImportOptions::from(c.section("yarp_import")); });
     fuzz::refuse_or_accept([&] { (void)simulator::SimulatorSettings::from(c.section("simulator")); });
     fuzz::refuse_or_accept([&] { (void)EstimatorOptions::from(c); });
+    fuzz::refuse_or_accept([&] { (void)VisionSetup::from(c.section("vision")); });
     (void)c.print();
     c.reject_unknown_keys();
   });

@@ -3,9 +3,11 @@
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <limits>
 
 #include <nlohmann/json.hpp>
 
+#include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "recorded_log.hpp"
@@ -40,6 +42,19 @@ TEST(LogSummary, CountsChannelsRatesAndGaps) {
   EXPECT_NEAR(left.stamps.longest_gap_s, 1.1, 1e-6);
   EXPECT_EQ(summary.pictures[1].camera, "right");
   EXPECT_EQ(summary.pictures[1].encoding, "JPEG");
+}
+
+TEST(LogSummary, SpansTimesThatCannotBe) {
+  const auto file = std::filesystem::temp_directory_path() / "bodyschema_impossible_times.lcmlog";
+  {
+    LogWriter writer(file);
+    const std::uint8_t byte = 0;
+    for (const Microseconds t : {std::numeric_limits<Microseconds>::max(), std::numeric_limits<Microseconds>::min()}) {
+      writer.publish("C", t, {&byte, 1});
+    }
+  }
+  EXPECT_GT(summarise_log(file).duration_s, 1e9);
+  std::filesystem::remove(file);
 }
 
 TEST(LogSummary, TellsHowJointsMoved) {

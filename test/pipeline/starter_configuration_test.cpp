@@ -136,6 +136,34 @@ TEST_F(StarterConfiguration, JointsThatSlideAreGivenInMetresAndNotEstimated) {
   EXPECT_THAT(pipeline.setup().estimated_joints, testing::Not(testing::Contains("joint1")));
 }
 
+TEST_F(StarterConfiguration, NamesOfAnyLettersComeBackAsTheyAre) {
+  const std::vector<std::string> names = {"lift's joint", "say \"a\": [b] # c", "back\\slash", "two\nlines"};
+  auto o = options();
+  std::ifstream in(o.urdf);
+  std::string text((std::istreambuf_iterator<char>(in)), {});
+  const auto written = [](std::string name) {
+    for (const auto& [from, to] : {std::pair<std::string, std::string>{"'", "&apos;"}, {"\"", "&quot;"}, {"\n", "&#10;"}}) {
+      for (std::size_t at = 0; (at = name.find(from, at)) != std::string::npos; at += to.size()) {
+        name.replace(at, from.size(), to);
+      }
+    }
+    return name;
+  };
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string from = "\"joint" + std::to_string(i + 1) + "\"";
+    for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos;) {
+      text.replace(at, from.size(), "\"" + written(names[i]) + "\"");
+    }
+  }
+  fs::copy(o.urdf.parent_path(), folder_ / "arm", fs::copy_options::recursive);
+  o.urdf = folder_ / "arm/it's.urdf";
+  std::ofstream(o.urdf) << text;
+  EXPECT_THAT(write_starter_configuration(o), HasSubstr("robot and meshes load"));
+  const auto setup = RobotSetup::from(Configuration::load(o.out / "robot.yaml").section("robot"));
+  ASSERT_EQ(setup.estimated_joints.size(), 7u);
+  for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ(setup.estimated_joints[i], names[i]);
+}
+
 TEST_F(StarterConfiguration, ReplacesNothing) {
   (void)write_starter_configuration(options());
   EXPECT_THROW((void)write_starter_configuration(options()), FileError);
@@ -162,6 +190,13 @@ TEST_F(StarterConfiguration, WrongInputIsNamed) {
   EXPECT_THAT(error_of(o), HasSubstr("README.md: not a URDF"));
   o.urdf = "/nonexistent.urdf";
   EXPECT_THAT(error_of(o), HasSubstr("/nonexistent.urdf: URDF not found"));
+  o.urdf = folder_ / "bad.urdf";
+  std::ofstream(o.urdf) << "<robot name='r'/>";
+  fs::resize_file(o.urdf, (16u << 20) + 1);
+  EXPECT_THAT(error_of(o), HasSubstr("at most 16777216"));
+  std::ofstream(o.urdf) << "<robot name='r'><link name='hand'/><joint name='j' type='fixed'><parent link='hand'/>"
+                           "<child link='hand'/></joint></robot>";
+  EXPECT_THAT(error_of(o), HasSubstr("is its own ancestor"));
   EXPECT_FALSE(fs::exists(o.out)) << "nothing is written for wrong input";
 }
 
