@@ -1,11 +1,14 @@
 #include "bodyschema/service/daemon.hpp"
 
+#include <fcntl.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -93,6 +96,22 @@ std::filesystem::path free_name(const std::filesystem::path& wanted) {
   return file;
 }
 
+/// Throws DeviceError where the file cannot be created for a reason that passes, a full disk for one: who restarts
+/// the service then is to try again. A folder that is not there is wrong input and said by who opens it.
+void try_to_create(const std::filesystem::path& file) {
+  std::error_code none;
+  if (std::filesystem::exists(file, none) && !std::filesystem::is_regular_file(file, none)) return;  // a pipe or device
+  const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
+  if (descriptor >= 0) {
+    ::close(descriptor);
+    return;
+  }
+  const int reason = errno;
+  for (const int passes : {ENOSPC, EDQUOT, EROFS, EIO, EMFILE, ENFILE, ENOMEM}) {
+    if (reason == passes) throw DeviceError(file.string() + ": cannot be created: " + std::strerror(reason));
+  }
+}
+
 /// Everything that belongs to one load of the configuration. Takes in messages once its receiver is started.
 struct Session {
   Session(std::unique_ptr<Pipeline> loaded, const std::string& lcm_url, Recorder* recorder)
@@ -176,9 +195,14 @@ class Daemon {
   }
 
   void open_files() {
-    if (options_.record) recorder_ = std::make_unique<Recorder>(free_name(*options_.record));
+    if (options_.record) {
+      const auto file = free_name(*options_.record);
+      try_to_create(file);
+      recorder_ = std::make_unique<Recorder>(file);
+    }
     if (!options_.estimates) return;
     estimates_file_ = free_name(*options_.estimates);
+    try_to_create(estimates_file_);
     estimates_.open(estimates_file_);
     if (!estimates_) throw FileError(estimates_file_.string() + ": cannot be written");
   }
@@ -187,7 +211,7 @@ class Daemon {
     recorder_.reset();
     if (!options_.estimates) return;
     estimates_.flush();
-    if (!estimates_) throw FileError(estimates_file_.string() + ": cut short, is the disk full?");
+    if (!estimates_) throw DeviceError(estimates_file_.string() + ": cut short, is the disk full?");
   }
 
   /// Puts a loaded pipeline to work in place of the present one, which stays where that fails.

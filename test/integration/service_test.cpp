@@ -380,6 +380,26 @@ TEST_F(Service, EstimatesThatCannotBeWrittenAreSaidAtOnce) {
   EXPECT_TRUE(listener.wait_offsets(estimates + 10, Seconds(20))) << "estimating goes on";
 }
 
+// Systemd does not try again after exit status 2, and a disk may have room again.
+TEST_F(Service, FilesThatAFullDiskDoesNotTakeAreNoWrongInput) {
+  for (const std::string option : {"--record", "--estimates"}) {
+    const auto disk = scratch_ / "disk";
+    std::filesystem::create_directories(disk);
+    // A file system of its own, with room for its own folder only.
+    const std::string program = std::string(BODYSCHEMA_BINARY_DIR) + "/bin/bodyschemad";
+    Process service({"unshare", "-rm", "sh", "-c",
+                     "mount -t tmpfs -o size=64k,nr_inodes=1 full \"$1\" || exit 77; shift; exec \"$@\"", "sh", disk.string(),
+                     program, "--config", reach_configuration(), "-l", url_, option, (disk / "file").string()},
+                    scratch_.folder());
+    const auto status = service.wait(kStart);
+    if (status == 77 || status == 127 || (status && service.err().find("unshare") != std::string::npos)) {
+      GTEST_SKIP() << "no file system can be mounted here: " << service.err();
+    }
+    EXPECT_EQ(status, 1) << service.err();
+    EXPECT_THAT(service.err(), HasSubstr("disk/file: cannot be created: No space left on device"));
+  }
+}
+
 TEST_F(Service, StatusFollowsWhatHappens) {
   Listener listener(url_);
   Process service(daemon(), scratch_.folder());
