@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMaxLineBytes = 1 << 16;
 constexpr std::uintmax_t kMaxDataBytes = 256u << 20;  // rows are kept; an hour of an arm at 100 Hz has some 50 MB
-constexpr std::uint64_t kMaxRows = 10 * 3600 * 200;   // ten hours at 200 Hz: a short row takes more memory than its text
+constexpr std::uint64_t kMaxRows = 10 * 3600 * 200;   // ten hours at 200 Hz; rows take more than their text
 
 Microseconds parse_stamp(const std::string& text, const std::string& where) {
   double stamp_s = 0.0;

@@ -144,7 +144,9 @@ struct Pictures {
     }
     const auto file = folder / name;
     std::error_code unreadable;  // a name of more than 255 bytes, for one
-    if (!std::filesystem::is_regular_file(file, unreadable)) throw FileError(where + ": picture " + name + " is missing");
+    if (!std::filesystem::is_regular_file(file, unreadable)) {
+      throw FileError(where + ": picture " + name + " is missing");
+    }
     const Image image = read_picture_file(file);
     if (std::max(image.width, image.height) > kMaxSide_px) {
       throw FileError(where + ": " + name + " is " + std::to_string(image.width) + "x" + std::to_string(image.height) +

@@ -201,7 +201,7 @@ TEST_F(LogFiles, FullOfEventsThatAreNoneAreReadOnce) {
     constexpr std::size_t kSize = 16 << 20, kEvery = 64;
     Content bytes(kSize + kEvery, 0);
     const auto put = [&](std::size_t at, std::uint32_t value) {
-      for (int i = 0; i < 4; ++i) bytes[at + static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
+      for (std::size_t i = 0; i < 4; ++i) bytes[at + i] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
     };
     for (std::size_t at = 0; at < kSize; at += kEvery) {
       put(at, 0xEDA1DA01);

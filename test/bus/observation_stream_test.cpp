@@ -109,8 +109,8 @@ TEST(ObservationStream, CarriesWhatTheExtendedModelKnowsAtEachExposure) {
 TEST(ObservationStream, ALegThatFallsSilentIsNotMissed) {
   TemporaryFolder folder;
   const auto joint = [](const std::string& name, const std::string& child) {
-    return "<link name='" + child + "'/><joint name='" + name + "' type='continuous'><parent link='base'/><child link='" +
-           child + "'/><axis xyz='0 0 1'/></joint>";
+    return "<link name='" + child + "'/><joint name='" + name +
+           "' type='continuous'><parent link='base'/><child link='" + child + "'/><axis xyz='0 0 1'/></joint>";
   };
   RobotSetup setup;
   setup.model.urdf = folder.write("robot.urdf", "<robot name='r'><link name='base'/>" + joint("arm", "hand") +

@@ -409,8 +409,8 @@ TEST_F(World, RefusalsAddUpOverAReload) {
   ASSERT_TRUE(listener.wait_offsets(3, Seconds(30)));
   LcmLink other(url_);
   robot.set_faults(faults::second_publisher(other));
-  const auto before =
-      listener.wait_status([](const offsets_status_t& s) { return counter(s, "refused.second_source") > 20; }, Seconds(20));
+  const auto before = listener.wait_status(
+      [](const offsets_status_t& s) { return counter(s, "refused.second_source") > 20; }, Seconds(20));
   ASSERT_TRUE(before) << said(listener);
   robot.set_faults({});
   service.signal(SIGHUP);

@@ -388,8 +388,8 @@ TEST_F(Service, FilesThatAFullDiskDoesNotTakeAreNoWrongInput) {
     // A file system of its own, with room for its own folder only.
     const std::string program = std::string(BODYSCHEMA_BINARY_DIR) + "/bin/bodyschemad";
     Process service({"unshare", "-rm", "sh", "-c",
-                     "mount -t tmpfs -o size=64k,nr_inodes=1 full \"$1\" || exit 77; shift; exec \"$@\"", "sh", disk.string(),
-                     program, "--config", reach_configuration(), "-l", url_, option, (disk / "file").string()},
+                     "mount -t tmpfs -o size=64k,nr_inodes=1 full \"$1\" || exit 77; shift; exec \"$@\"", "sh",
+                     disk.string(), program, "--config", reach_configuration(), "-l", url_, option, (disk / "file").string()},
                     scratch_.folder());
     const auto status = service.wait(kStart);
     if (status == 77 || status == 127 || (status && service.err().find("unshare") != std::string::npos)) {

@@ -142,7 +142,8 @@ TEST_F(StarterConfiguration, NamesOfAnyLettersComeBackAsTheyAre) {
   std::ifstream in(o.urdf);
   std::string text((std::istreambuf_iterator<char>(in)), {});
   const auto written = [](std::string name) {
-    for (const auto& [from, to] : {std::pair<std::string, std::string>{"'", "&apos;"}, {"\"", "&quot;"}, {"\n", "&#10;"}}) {
+    const std::vector<std::pair<std::string, std::string>> escapes = {{"'", "&apos;"}, {"\"", "&quot;"}, {"\n", "&#10;"}};
+    for (const auto& [from, to] : escapes) {
       for (std::size_t at = 0; (at = name.find(from, at)) != std::string::npos; at += to.size()) {
         name.replace(at, from.size(), to);
       }

@@ -104,7 +104,8 @@ TEST_F(BadInput, UrdfWhoseNestingIsHidden) {
 }
 // The same for what TinyXML in particular reads otherwise than it looks.
 TEST_F(BadInput, UrdfThatTheParserReadsOtherwise) {
-  for (const std::string hidden : {"<a><?xml version=\"?></a>\"?>", "<a><?XML version='?></a>'?>", "<a><?x y='?></a>'?>",
+  for (const std::string hidden : {"<a><?xml version=\"?></a>\"?>", "<a><?XML version='?></a>'?>",
+                                   "<a><?x y='?></a>'?>",
                                    "<1 '><a>'/>", "< '><a>'/>", "<a b=\"&#x\"></a>x41;\">", "<a>&#x</a>x41;",
                                    "<a>&#</a>#65;", "<a>\xC2</a>", "<a>\xE2\x82</a>", "<a b='\xF0'></a>'>"}) {
     SCOPED_TRACE(hidden);
@@ -114,16 +115,19 @@ TEST_F(BadInput, UrdfThatTheParserReadsOtherwise) {
   }
   std::string nested;
   for (int i = 0; i < 60'000; ++i) nested += "<a>";
-  for (const std::string begin : {"<?xml version='?><!--'?>", "<?xml x=\"a version=\"?><!--\"?>", "<?xml \" version=\"?><!--\"?>",
+  for (const std::string begin : {"<?xml version='?><!--'?>", "<?xml x=\"a version=\"?><!--\"?>",
+                                  "<?xml \" version=\"?><!--\"?>",
                                   "<?xml version='1.0'?><?xml version='?><!--'?>"}) {
     SCOPED_TRACE(begin);
     EXPECT_THAT(urdf_message(begin + "<robot name='r'>" + nested + "-->"), HasSubstr("it declares"));
   }
   // What is nothing of the kind stays allowed.
-  for (const std::string begin : {"", "\xEF\xBB\xBF<?xml version=\"1.0\" ?>\n", "\n<?xml version = '1.0' encoding='utf-8' standalone=\"yes\"?>",
+  for (const std::string begin : {"", "\xEF\xBB\xBF<?xml version=\"1.0\" ?>\n",
+                                  "\n<?xml version = '1.0' encoding='utf-8' standalone=\"yes\"?>",
                                   "<?xml version='1.0' encoding='iso-8859-1'?><!-- Andr\xE9 said -->"}) {
     SCOPED_TRACE(begin);
-    const auto good = folder_.write("good.urdf", begin + robot("<link name='caf\xC3\xA9'/><!-- &#x20AC; a -> b, \xE2\x82\xAC -->"));
+    const std::string inside = "<link name='caf\xC3\xA9'/><!-- &#x20AC; a -> b, \xE2\x82\xAC -->";
+    const auto good = folder_.write("good.urdf", begin + robot(inside));
     EXPECT_NO_THROW(RobotModel::load({good, {}, {}}));
   }
 }
@@ -146,7 +150,8 @@ TEST_F(BadInput, UrdfOfMoreLinksThanARobotHas) {
       const std::string name = std::to_string(i), above = std::to_string(i - 1);
       inside += "<link name='l" + name + "'/>" +
                 joint("j" + name, "l" + above, "l" + name,
-                      "<axis xyz='1 0 0'/>" + (i > 1 ? "<mimic joint='j" + above + "'/>" : std::string()), "continuous");
+                      "<axis xyz='1 0 0'/>" + (i > 1 ? "<mimic joint='j" + above + "'/>" : std::string()),
+                      "continuous");
     }
     return robot(inside);
   };
@@ -284,8 +289,8 @@ TEST_F(BadInput, ScaleBeyondAllMeasure) {
     EXPECT_THAT(urdf_message(one_part_urdf(mesh_visual("a.obj", scale)), {"part"}),
                 AllOf(HasSubstr("link 'part'"), HasSubstr("reaches further than 1e6 m")));
   }
-  EXPECT_THAT(urdf_message(one_part_urdf("<visual><origin xyz='0 1e30 0'/><geometry><box size='1 1 1'/></geometry></visual>"),
-                           {"part"}),
+  const std::string far = "<visual><origin xyz='0 1e30 0'/><geometry><box size='1 1 1'/></geometry></visual>";
+  EXPECT_THAT(urdf_message(one_part_urdf(far), {"part"}),
               HasSubstr("reaches further than 1e6 m"));
 }
 TEST_F(BadInput, MoreTrianglesThanARobotHas) {
