@@ -372,7 +372,7 @@ class Selector {
     for (const auto c : reported()) list.push_back({c, test(c).score, {}, false});
     std::stable_sort(list.begin(), list.end(), [](const auto& a, const auto& b) { return a.score.gain > b.score.gain; });
     const double left = share_left(), rest = std::max(0.0, result.rest_gain);
-    const bool many = list.size() >= options_.crowd;
+    const bool many = list.size() >= options_.crowd || (list.size() > 1 && too_small_for_a_crowd(list.front().candidate));
     if (!many && result.rest_t <= options_.crowd_rest_t) return;
     // The crowd is what stands below the last cause that is large in what the larger ones leave, and larger
     // than all the smaller ones together. Of one or two causes none needs to be large beside next to nothing.

@@ -182,6 +182,12 @@ TEST(Selection, InACrowdNamesOnlyWhatIsLargeEnoughToBeFoundAnywhere) {
     EXPECT_TRUE(below.causes.empty() && below.crowded) << "seed " << test::seed() + i;
     ASSERT_FALSE(below.set_aside.empty());
     EXPECT_EQ(below.set_aside.front().candidate, 5u) << "seed " << test::seed() + i;
+    // Two make a crowd if the larger is one of the small.
+    const auto pair = log_with({0.0, 0.0, 0.0, 0.0, 0.3, 0.8}, test::seed() + i);
+    EXPECT_TRUE(select_causes(pair, {{0}}, candidates).causes.empty()) << "seed " << test::seed() + i;
+    candidates[5].detectable = 0.7;
+    EXPECT_EQ(found(select_causes(pair, {{0}}, candidates)), (std::vector<std::size_t>{4, 5})) << "seed " << test::seed() + i;
+    candidates[5].detectable = 0.9;
     // Alone it is what is wrong, whatever its size.
     const auto alone = log_with({0.0, 0.0, 0.0, 0.0, 0.0, 0.8}, test::seed() + i);
     EXPECT_EQ(found(select_causes(alone, {{0}}, candidates)), (std::vector<std::size_t>{5})) << "seed " << test::seed() + i;

@@ -57,8 +57,10 @@ struct SelectionOptions {
   double least_worse = 1e-3;   ///< ... provided the loss grows by this share of the baseline's
   double t_generic = 2.0;      ///< a generic feature must beat named causes by this much
   int max_causes = 6;
-  /// Many small errors may live together where so many causes were found, or where all others together, each a
-  /// little, would still take away held-out loss (paired t above this; on a clean log it is below -1.5).
+  /// Many small errors may live together where so many causes were found, or several of which the largest is below
+  /// Candidate::detectable, or where all others together, each a little, would still take away held-out loss (paired
+  /// t above this; on a clean log it is below -1.5). Of 200 logs with fifteen small errors twelve were left with two
+  /// names by the first and the last alone.
   std::size_t crowd = 3;
   double crowd_rest_t = 0.0;
   /// Then a cause must stand out: be of a size that is found without a crowd (Candidate::detectable), take away
