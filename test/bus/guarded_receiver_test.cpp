@@ -69,6 +69,9 @@ class Sender {
 class OneSource : public testing::Test {
  protected:
   void SetUp() override {
+    // Before the receiver's thread begins and until it has ended: spdlog's loggers may not be exchanged beside it.
+    spdlog::set_default_logger(std::make_shared<spdlog::logger>(
+        "test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log_)));
     try {
       link_ = std::make_unique<LcmLink>("udpm://239.255.76.67:" + std::to_string(port_) + "?ttl=0", 60.0);
     } catch (const Error& e) {
@@ -83,6 +86,10 @@ class OneSource : public testing::Test {
     }
     sizes_.clear();
   }
+  void TearDown() override {
+    link_.reset();
+    spdlog::set_default_logger(logger_before_);
+  }
   /// Until all that was sent before has come in.
   template <class Condition>
   static bool eventually(Condition condition) {
@@ -91,6 +98,8 @@ class OneSource : public testing::Test {
   }
 
   const int port_ = 32'100 + getpid() % 400;
+  std::shared_ptr<spdlog::logger> logger_before_ = spdlog::default_logger();
+  std::ostringstream log_;
   std::unique_ptr<LcmLink> link_;
   Sender sender_{port_};
   std::vector<std::size_t> sizes_;
@@ -128,10 +137,6 @@ TEST_F(OneSource, WhenTooManyWaitTheOldestGoAndAreCounted) {
 }
 
 TEST_F(OneSource, TwoOthersInTurnDoNotFillTheLog) {
-  std::ostringstream written;
-  const auto before = spdlog::default_logger();
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
-      "test", std::make_shared<spdlog::sinks::ostream_sink_mt>(written)));
   Sender one(port_), other(port_);
   for (int i = 0; i < 500; ++i) {
     one.message();
@@ -141,8 +146,7 @@ TEST_F(OneSource, TwoOthersInTurnDoNotFillTheLog) {
   EXPECT_TRUE(eventually([this] { return link_->refused_sources().messages >= 900; }))
       << link_->refused_sources().messages;
   link_.reset();
-  spdlog::set_default_logger(before);
-  const std::string text = written.str();
+  const std::string text = log_.str();
   const auto lines = std::count(text.begin(), text.end(), '\n');
   EXPECT_GE(lines, 1);
   EXPECT_LE(lines, 2) << text;

@@ -180,8 +180,8 @@ TEST_F(LivePageTest, StopsWithinASecondWhateverItsClientsDo) {
   PageClient does_not_read(port());
   does_not_read.send("GET /chart.js HTTP/1.1\r\nHost: localhost\r\n\r\n");
   std::atomic<bool> stopped{false};
-  std::jthread dribbling([&] {
-    PageClient client(port());
+  std::jthread dribbling([&stopped, to = port()] {
+    PageClient client(to);
     client.send("GET / HTTP/1.1\r\nX: ");
     while (!stopped && client.send("a")) std::this_thread::sleep_for(50ms);
   });
