@@ -44,8 +44,9 @@ using diagnosis::LogPictures;
 
 class LogDiagnosis {
  public:
-  LogDiagnosis(const Configuration& configuration, const LogDiagnosisOptions& options)
-      : options_(options), pipeline_(configuration),
+  LogDiagnosis(const Configuration& configuration, const LogDiagnosisOptions& options,
+               std::optional<SegmentationMethod> method = std::nullopt)
+      : options_(options), pipeline_(configuration, method),
         measurement_(pipeline_.shared_robot(), pipeline_.setup(), pipeline_.rig(), options.threads) {
     configuration.reject_unknown_keys();
     if (pipeline_.error_model()) {
@@ -55,13 +56,22 @@ class LogDiagnosis {
     }
   }
 
-  DiagnosisReport run() {
+  void look() {
     learn();
     read();
     // Said at once: it may well be why the log is refused.
     if (const auto turn = describe(pipeline_.background_turn()); !turn.empty()) {
       spdlog::warn("{}: {}", options_.log.string(), turn);
     }
+  }
+  /// Whether a learned background is of no use: the head turned before a room.
+  [[nodiscard]] bool background_turned() const {
+    const auto& turn = pipeline_.background_turn();
+    return pipeline_.learns_background() &&
+           static_cast<double>(turn.changed) > kTolerableLoss * static_cast<double>(turn.pictures);
+  }
+  /// @param other_masks  the masks are not those of the configured method, which the head's motion spoilt
+  DiagnosisReport conclude(bool other_masks) {
     refuse_unusable();
     auto diagnosis = options_.diagnosis;
     if (diagnosis.nuisances.empty()) diagnosis.nuisances = usual_nuisances(measurement_.roles());
@@ -86,6 +96,11 @@ class LogDiagnosis {
     diagnosis.selection.shape_error = kSystematicShare;
     auto report = diagnosed(diagnosis);
     add_remarks(report);
+    if (other_masks) {
+      report.warnings.insert(report.warnings.begin(),
+                             "the head turned before a room, and a learned background is of no use then: masks were looked "
+                             "for around the predicted robot, as by vision.method: statistics");
+    }
     LogPictures::place_hand(pipeline_, measurement_.views(), report);
     if (!options_.out.empty()) {
       report.write(options_.out);
@@ -302,7 +317,15 @@ std::string lost_pictures(const BusStatistics& bus, double tolerable_share) {
 }
 
 DiagnosisReport diagnose_log(const Configuration& configuration, const LogDiagnosisOptions& options) {
-  return LogDiagnosis(configuration, options).run();
+  {
+    LogDiagnosis diagnosis(configuration, options);
+    diagnosis.look();
+    if (!diagnosis.background_turned()) return diagnosis.conclude(false);
+    spdlog::warn("{}: once more, as by vision.method: statistics", options.log.string());
+  }
+  LogDiagnosis diagnosis(configuration, options, SegmentationMethod::kStatistics);
+  diagnosis.look();
+  return diagnosis.conclude(true);
 }
 
 }  // namespace bodyschema

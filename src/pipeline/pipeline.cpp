@@ -79,11 +79,16 @@ std::shared_ptr<const RobotModel> load(const RobotSetup& setup, const StereoRig&
   return robot;
 }
 
+VisionSetup by(std::optional<SegmentationMethod> method, VisionSetup vision) {
+  if (method) vision.method = *method;
+  return vision;
+}
+
 }  // namespace
 
-Pipeline::Pipeline(const Configuration& configuration)
+Pipeline::Pipeline(const Configuration& configuration, std::optional<SegmentationMethod> method)
     : setup_(RobotSetup::from(configuration.section("robot"))),
-      vision_(VisionSetup::from(configuration.section("vision"))),
+      vision_(by(method, VisionSetup::from(configuration.section("vision")))),
       bus_(BusOptions::from(configuration.section("bus"))),
       options_(EstimatorOptions::from(configuration)),
       robot_(load(setup_, StereoRig::from(configuration.section("cameras")))),

@@ -26,7 +26,8 @@ namespace bodyschema {
 class Pipeline {
  public:
   /// Reads the whole configuration, robot and meshes, opens the silhouette engine. Throws Error.
-  explicit Pipeline(const Configuration& configuration);
+  /// @param method  instead of the configured one, where that proved to be of no use
+  explicit Pipeline(const Configuration& configuration, std::optional<SegmentationMethod> method = std::nullopt);
 
   /// A fresh decoder and synchroniser for this robot and rig; its observations carry what the
   /// extended model knows, where there is one.
