@@ -281,7 +281,7 @@ TEST_F(Service, ReloadsOnSighupAndRefusesABrokenConfiguration) {
                            "estimated_joints: [j]}\n"
                            "cameras: {left: {link: part, width: 64, height: 48, fx: 50, fy: 50, cx: 32, cy: 24}}\n";
   service.signal(SIGHUP);
-  EXPECT_TRUE(service.said("mesh 'far.obj' reaches further than 1e6 m", kStart)) << service.err();
+  EXPECT_TRUE(service.said("silhouette part 0 'part' has a vertex", kStart)) << service.err();
   EXPECT_TRUE(service.running());
 
   write("filter: {particles: 60}\n");
