@@ -91,8 +91,12 @@ ObservationStream::ObservationStream(const std::vector<std::string>& joint_names
 
 ObservationStream::ObservationStream(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
                                      const StereoRig& rig, const BusOptions& options)
-    : ObservationStream(joint_names(*robot), resting_joints(*robot, setup, idle_joints(robot, setup, rig)), rig.cameras,
-                        with_idle_joints(options, idle_joints(robot, setup, rig))) {}
+    : ObservationStream(*robot, setup, rig.cameras, with_idle_joints(options, idle_joints(robot, setup, rig))) {}
+
+ObservationStream::ObservationStream(const RobotModel& robot, const RobotSetup& setup,
+                                     const std::vector<CameraModel>& cameras, const BusOptions& options)
+    : ObservationStream(joint_names(robot), resting_joints(robot, setup, options.synchroniser.joints.idle_joints),
+                        cameras, options) {}
 
 bool ObservationStream::receive(std::string_view channel, Bytes message, std::int64_t arrival_us) {
   if (channel == channels_.joint_state) {

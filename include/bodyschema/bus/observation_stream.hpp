@@ -86,6 +86,9 @@ class ObservationStream {
     std::chrono::steady_clock::time_point last{};
     std::uint64_t held_back = 0;
   };
+  /// With the idle joints in `options`.
+  ObservationStream(const RobotModel& robot, const RobotSetup& setup, const std::vector<CameraModel>& cameras,
+                    const BusOptions& options);
   void receive_joints(Bytes message);
   void show_follower();
   void annotate(Observation& observation);
