@@ -109,7 +109,7 @@ struct Estimator::Impl {
       contradicted = false;
       best_likelihood = 0.0;
     } else {
-      const bool swapped = starts_swapped();
+      const bool swapped = starts_swapped(observation);
       if (!swapped) score_particles();
       if (swapped) {
         begin_again();
@@ -192,17 +192,39 @@ struct Estimator::Impl {
     return exchanged < 2.0 * options.lock_distance && EyeOrder::clearly_exchanged(scorer.distance(known), exchanged);
   }
 
-  /// Without one: by the guesses that the search began with, which no wrong minimum has led astray.
-  bool starts_swapped() {
+  /// Without one: by how near the arm can be brought to them from the guesses that the search began with, which
+  /// no wrong minimum has led astray.
+  bool starts_swapped(const Observation& observation) {
     if (particles_only() || eye_order.settled() || !scorer.can_be_exchanged()) return false;
+    Observation exchanged = observation;
+    std::swap(exchanged.cameras[0]->mask, exchanged.cameras[1]->mask);
+    std::swap(exchanged.cameras[0]->valid, exchanged.cameras[1]->valid);
+    std::swap(exchanged.cameras[0]->coverage, exchanged.cameras[1]->coverage);
+    const Eigen::VectorXd other_guesses = guess_distances(exchanged), guesses = guess_distances(observation);
+    double other_distance = other_guesses.minCoeff(), as_they_are = guesses.minCoeff();
+    if (EyeOrder::worth_searches(as_they_are, other_distance)) {
+      other_distance = nearest_distance(exchanged, other_guesses);
+      as_they_are = nearest_distance(observation, guesses);  // last: leaves the scorer with this frame
+    }
+    return eye_order.exchanged(as_they_are, other_distance);
+  }
+
+  Eigen::VectorXd guess_distances(const Observation& observation) {
+    scorer.observe(observation, options.min_mask_px);
     Eigen::VectorXd x = Eigen::VectorXd::Zero(state.size());
     const auto n = static_cast<std::size_t>(first_guesses.cols());
     for (std::size_t i = 0; i < n; ++i) {
       x.head(joints) = first_guesses.col(static_cast<Eigen::Index>(i));
       scorer.place(x, i);
     }
-    const double as_they_are = scorer.score(n).minCoeff();
-    return eye_order.exchanged(as_they_are, scorer.smallest_exchanged(n));
+    return scorer.score(n);
+  }
+
+  /// @param distances  of the first guesses
+  double nearest_distance(const Observation& observation, const Eigen::VectorXd& distances) {
+    scorer.observe(observation, options.min_mask_px);
+    constexpr std::size_t kStarts = 12;  // from three, one arm in 300 that began far off was not found
+    return search(observation, first_guesses, distances, Eigen::VectorXd::Zero(state.size()), kStarts).distance;
   }
 
   /// From pictures that seem to be exchanged.
@@ -324,7 +346,7 @@ struct Estimator::Impl {
   /// What was known until now no longer fits: most likely one joint slipped. The worse half of the
   /// particles makes way for slips of each joint, both ways and of all sizes up to the largest.
   void suspect_slips() {
-    const std::vector<Eigen::Index> order = by_distance();
+    const std::vector<Eigen::Index> order = in_order(distance);
     const Eigen::Index slips = filter.states().cols() / 2;
     const Eigen::Index sizes = std::max<Eigen::Index>(1, slips / (2 * joints));  // each way
     Eigen::VectorXd x(joints);
@@ -338,20 +360,26 @@ struct Estimator::Impl {
     score_particles();
   }
 
-  /// Particles, the one whose silhouette fits best first.
-  [[nodiscard]] std::vector<Eigen::Index> by_distance() const {
-    std::vector<Eigen::Index> order(static_cast<std::size_t>(weights.size()));
+  /// Smallest distance first.
+  [[nodiscard]] static std::vector<Eigen::Index> in_order(const Eigen::VectorXd& distances) {
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(distances.size()));
     std::iota(order.begin(), order.end(), Eigen::Index{0});
     std::stable_sort(order.begin(), order.end(),
-                     [&](Eigen::Index a, Eigen::Index b) { return distance(a) < distance(b); });
+                     [&](Eigen::Index a, Eigen::Index b) { return distances(a) < distances(b); });
     return order;
   }
 
   /// The best of the three most likely particles once they are moved onto the outline.
   OutlineFit search(const Observation& observation) {
-    const std::vector<Eigen::Index> order = by_distance();
-    std::vector<Eigen::VectorXd> starts(std::min<std::size_t>(3, order.size()), state);
-    for (std::size_t i = 0; i < starts.size(); ++i) starts[i].head(joints) = filter.states().col(order[i]);
+    return search(observation, filter.states(), distance, state, 3);
+  }
+  /// The same of the first `count` of any offsets.
+  /// @param rest  its nuisances go with them
+  OutlineFit search(const Observation& observation, const Eigen::MatrixXd& offsets, const Eigen::VectorXd& distances,
+                    const Eigen::VectorXd& rest, std::size_t count) {
+    const std::vector<Eigen::Index> order = in_order(distances);
+    std::vector<Eigen::VectorXd> starts(std::min(count, order.size()), rest);
+    for (std::size_t i = 0; i < starts.size(); ++i) starts[i].head(joints) = offsets.col(order[i]);
     return fitter.search(observation, starts);
   }
 

@@ -13,7 +13,7 @@ HypothesisScorer::HypothesisScorer(BodyPoseModel& body, const SilhouetteModel& s
     : body_(body), cameras_(std::move(cameras)),
       scorer_(make_silhouette_scorer(silhouettes, cameras_, options, &engine_reason_)), observed_(cameras_.size()),
       slots_(slots), X_CB_((slots + 1) * cameras_.size() * body.part_count()), counts_(slots * cameras_.size()),
-      distances_(static_cast<Eigen::Index>(slots)), other_distances_(static_cast<Eigen::Index>(slots)) {}
+      distances_(static_cast<Eigen::Index>(slots)), one_distance_(1) {}
 
 bool HypothesisScorer::observe(const Observation& observation, std::size_t min_mask_px) {
   observation_ = &observation;
@@ -67,8 +67,8 @@ const Eigen::VectorXd& HypothesisScorer::score(std::size_t n) {
 
 double HypothesisScorer::distance(const Eigen::VectorXd& x) {
   place(x, slots_);
-  score_slots(slots_, 1, other_distances_);
-  return other_distances_(0);
+  score_slots(slots_, 1, one_distance_);
+  return one_distance_(0);
 }
 
 bool HypothesisScorer::can_be_exchanged() const {
@@ -79,14 +79,6 @@ bool HypothesisScorer::can_be_exchanged() const {
 void HypothesisScorer::exchange() {
   std::swap(observed_[0], observed_[1]);
   scorer_->set_observation(observed_);
-}
-
-double HypothesisScorer::smallest_exchanged(std::size_t n) {
-  if (!can_be_exchanged()) return 1.0;
-  exchange();
-  score_slots(0, n, other_distances_);
-  exchange();
-  return other_distances_.head(static_cast<Eigen::Index>(n)).minCoeff();
 }
 
 double HypothesisScorer::distance_exchanged(const Eigen::VectorXd& x) {

@@ -34,9 +34,7 @@ class HypothesisScorer {
 
   /// Whether the frame has two pictures of one size.
   [[nodiscard]] bool can_be_exchanged() const;
-  /// The same two against the pictures of the other eye: the smallest of slots 0 to n - 1, or that of one
-  /// hypothesis. 1 where they cannot be exchanged.
-  double smallest_exchanged(std::size_t n);
+  /// The distance of one hypothesis from the pictures of the other eye. 1 where they cannot be exchanged.
   double distance_exchanged(const Eigen::VectorXd& x);
 
   /// The predicted silhouette of one pose of all parts in a camera.
@@ -60,7 +58,7 @@ class HypothesisScorer {
   std::size_t slots_;  ///< and one more behind them, for `distance`
   std::vector<Eigen::Isometry3f> X_CB_;  ///< [slot][camera][part]
   std::vector<SilhouetteCounts> counts_;
-  Eigen::VectorXd distances_, other_distances_;
+  Eigen::VectorXd distances_, one_distance_;
   double scoring_ms_ = 0.0;
 };
 

@@ -299,36 +299,29 @@ TEST_F(EstimatorOnOwnRobot, PicturesThatGetExchangedAreNoticedAtOnceAndTeachNoth
   EXPECT_LT((after.offset_rad - before.offset_rad).cwiseAbs().maxCoeff(), radians(0.1));
 }
 
-// Cables or channels that have been mixed up from the beginning. Of 480 draws of the offsets 471 show it within four
-// frames (docs/reliability.md); where no guess comes near the hand, nothing may converge meanwhile.
+// Cables or channels that have been mixed up from the beginning.
 TEST_F(EstimatorOnOwnRobot, PicturesThatAreExchangedFromTheBeginningAreNoticed) {
   constexpr double kFrames = 60.0;
   const char* given = std::getenv("BODYSCHEMA_SEED");
   const auto seed = given != nullptr ? static_cast<unsigned>(std::stoul(given)) : std::random_device{}();
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0.0, radians(4.0));
-  int noticed = 0;
   for (int trial = 0; trial < 5; ++trial) {
     SCOPED_TRACE("BODYSCHEMA_SEED=" + std::to_string(seed) + ", trial " + std::to_string(trial));
-    bool in_time = true;
     Eigen::VectorXd offset = offset_rad_;
     if (trial > 0) std::generate(offset.begin(), offset.end(), [&] { return normal(random); });
     SyntheticReach reach(robot_, setup_, rig_, offset);
     Estimator estimator(robot_, setup_, rig_, options_);
     for (int frame = 0; frame < 20; ++frame) {
       const Estimate estimate = estimator.step(exchanged(seen(reach, frame, kFrames)));
-      in_time = in_time && (estimate.cameras_swapped || frame < 3);
+      EXPECT_TRUE(estimate.cameras_swapped) << frame;
       EXPECT_NE(estimate.state, EstimatorState::kConverged) << frame;
     }
     for (int frame = 20; frame < 40; ++frame) {
-      const bool swapped = estimator.step(seen(reach, frame, kFrames)).cameras_swapped;
-      EXPECT_TRUE(!swapped || frame < 22) << frame;
+      EXPECT_FALSE(estimator.step(seen(reach, frame, kFrames)).cameras_swapped) << frame;
     }
     EXPECT_EQ(follow(estimator, reach, 40, 41, kFrames).state, EstimatorState::kConverged);
-    EXPECT_TRUE(in_time || trial > 0);
-    noticed += in_time;
   }
-  EXPECT_GE(noticed, 3) << "BODYSCHEMA_SEED=" << seed;
 }
 
 // Frames of one eye say nothing about which is which: the other camera may come later.

@@ -37,6 +37,12 @@ TEST(EyeOrder, WhatNoGuessComesNearSaysNothing) {
   for (int i = 0; i < 1000; ++i) EXPECT_FALSE(order.exchanged(0.99, i % 2 == 0 ? 0.9 : 0.5));
 }
 
+TEST(EyeOrder, SearchesOnlyWhereSomeGuessIsNear) {
+  EXPECT_TRUE(EyeOrder::worth_searches(0.48, 0.95));
+  EXPECT_TRUE(EyeOrder::worth_searches(0.95, 0.48));
+  EXPECT_FALSE(EyeOrder::worth_searches(0.92, 0.96)) << "masks full of background";
+}
+
 // A reach that came into view from the side, before a background with a mark in one picture.
 TEST(EyeOrder, AnArmThatIsComingInIsNotTakenForExchanged) {
   EyeOrder order;
