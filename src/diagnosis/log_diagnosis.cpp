@@ -42,6 +42,20 @@ const char* in_words(DropReason reason) {
 using diagnosis::JointStream;
 using diagnosis::LogPictures;
 
+/// Picks frames on a raster, so that their mean rate is the wanted one whatever the cameras' is.
+class Raster {
+ public:
+  explicit Raster(double rate_hz) : period_(microseconds(1.0 / rate_hz)) {}
+  bool takes(Microseconds utime) {
+    if (due_ >= 0 && utime < due_) return false;
+    due_ = due_ < 0 || utime > due_ + period_ ? utime + period_ : due_ + period_;
+    return true;
+  }
+
+ private:
+  Microseconds period_, due_ = -1;
+};
+
 class LogDiagnosis {
  public:
   LogDiagnosis(const Configuration& configuration, const LogDiagnosisOptions& options,
@@ -57,7 +71,7 @@ class LogDiagnosis {
   }
 
   void look() {
-    learn();
+    if (!pipeline_.masks_need_estimates()) learn();
     read();
     // Said at once: it may well be why the log is refused.
     if (const auto turn = describe(pipeline_.background_turn()); !turn.empty()) {
@@ -67,8 +81,9 @@ class LogDiagnosis {
   /// Whether a learned background is of no use: the head turned before a room.
   [[nodiscard]] bool background_turned() const {
     const auto& turn = pipeline_.background_turn();
+    const auto pictures = std::max<std::size_t>(turn.pictures, pictures_to_see_);
     return pipeline_.learns_background() &&
-           static_cast<double>(turn.changed) > kTolerableLoss * static_cast<double>(turn.pictures);
+           static_cast<double>(turn.changed) > kTolerableLoss * static_cast<double>(pictures);
   }
   /// @param other_masks  the masks are not those of the configured method, which the head's motion spoilt
   DiagnosisReport conclude(bool other_masks) {
@@ -112,6 +127,7 @@ class LogDiagnosis {
   }
 
  private:
+  /// @param action  of every observation; whether to go on
   template <class Action>
   void for_each(const std::string& label, JointStream* recorder, Action action) {
     LogReader log(options_.log);
@@ -120,10 +136,11 @@ class LogDiagnosis {
     std::optional<ProgressBar> bar;
     if (!options_.quiet) bar.emplace(label, log.size());
     LogEvent event;
+    bool wanted = true;
     const auto drain = [&] {
-      while (auto arrived = stream.next()) action(arrived->observation);
+      while (auto arrived = wanted ? stream.next() : std::nullopt) wanted = action(arrived->observation);
     };
-    while (log.next(event)) {
+    while (wanted && log.next(event)) {
       if (recorder != nullptr && event.channel == channels.joint_state) recorder->take(event.data);
       if (stream.receive(event.channel, event.data, event.time_us)) drain();
       if (bar) bar->set(log.position());
@@ -211,24 +228,27 @@ class LogDiagnosis {
 
   void learn() {
     Microseconds last = -1;
+    Raster raster(options_.picture_rate_hz);
     for_each("learning the background", nullptr, [&](Observation& o) {
-      if (last >= 0 && o.utime - last < kLearnEvery) return;
+      if (raster.takes(o.utime)) {
+        pictures_to_see_ += static_cast<std::size_t>(std::count_if(
+            o.cameras.begin(), o.cameras.end(), [](const auto& camera) { return camera.has_value(); }));
+      }
+      if (last >= 0 && o.utime - last < kLearnEvery) return true;
       last = o.utime;
       pipeline_.learn_from(o);
+      return true;
     });
     pipeline_.finish_learning();
   }
 
   void read() {
     JointStream recorder(pipeline_.robot(), pipeline_.setup(), pipeline_.bus());
-    const auto period = microseconds(1.0 / options_.picture_rate_hz);
-    Microseconds due = -1;
+    Raster raster(options_.picture_rate_hz);
     int frames = 0, converged = 0;
     bool started = false;
     for_each("masks", &recorder, [&](Observation& observation) {
-      if (due >= 0 && observation.utime < due) return;
-      // Keep to the raster, so that the mean rate is the wanted one whatever the cameras' is.
-      due = due < 0 || observation.utime > due + period ? observation.utime + period : due + period;
+      if (!raster.takes(observation.utime)) return true;
       if (started && pipeline_.masks_need_estimates()) {
         pipeline_.process(observation);
       } else if (started) {
@@ -252,6 +272,7 @@ class LogDiagnosis {
       }
       measurement_.add(observation);
       pictures_.offer(observation);
+      return !background_turned();  // these masks are not used then
     });
     measurement_.set_stream(recorder.finish());
   }
@@ -281,6 +302,7 @@ class LogDiagnosis {
     BusStatistics bus;
     std::vector<std::string> missing_joints;
   } facts_;  ///< of the last pass over the log
+  std::size_t pictures_to_see_ = 0;  ///< of the whole log, counted where a background is learned
   std::size_t pictures_seen_ = 0, pictures_with_arm_ = 0;
   std::size_t frames_looked_at_ = 0, frames_swapped_ = 0;  ///< at the beginning
 };

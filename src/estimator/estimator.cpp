@@ -230,12 +230,23 @@ struct Estimator::Impl {
   /// From pictures that seem to be exchanged.
   void learn_nothing() {
     cameras_swapped = true;
-    current = EstimatorState::kDiverged;
     contradicted = fusion.frames() > 0.5;
-    if (fusion.frames() > 0.5) state = fusion.mean();
+    fall_back_on(fusion.frames() > 0.5 ? fusion.mean() : state, EstimatorState::kDiverged);
+  }
+
+  /// A frame that said nothing of the offsets: reports `x` in doubt.
+  void fall_back_on(const Eigen::VectorXd& x, EstimatorState doubt) {
+    current = doubt;
+    state = x;
     frame_state = first_look.frame_state();
     frame_state.x = state;
     best_likelihood = 1.0 - scorer.distance(state);
+  }
+
+  /// Whether a search has run off from masks that are not the arm's: further than any arm whose joints are all
+  /// within three standard deviations.
+  [[nodiscard]] bool strayed(const Eigen::VectorXd& offsets) const {
+    return offsets.norm() > 3.0 * std::sqrt(static_cast<double>(joints)) * options.filter.initial_sd_rad;
   }
 
   // --- mode best ------------------------------------------------------------------------------
@@ -318,6 +329,14 @@ struct Estimator::Impl {
           surprised_frames = good ? 0 : surprised_frames;
           if (!good) filter.reset(state.head(joints));
         }
+      }
+      if (!good && fusion.frames() < 0.5 && strayed(found->x.head(joints))) {
+        times.refinement_ms += elapsed_ms(start);
+        const bool lost = surprised_frames > 0;
+        begin_again();
+        contradicted = false;
+        fall_back_on(state, lost ? EstimatorState::kDiverged : EstimatorState::kConverging);
+        return;
       }
       best = std::move(*found);
       if (good) {
