@@ -29,11 +29,10 @@ TEST(ModelFitter, EndsAtTheSamePlaceWhereverItBegins) {
   EXPECT_LT((near.offsets() - far.offsets()).cwiseAbs().maxCoeff(), 0.02 * kDeg);
 }
 
-/// A log whose regression points the wrong way, as it does where every counterpart belongs to
-/// another part of the outline.
-class Misleading final : public MeasurementSource {
+/// A log, as it is.
+class Forwarded : public MeasurementSource {
  public:
-  explicit Misleading(MeasurementSource& log) : log_(log) {}
+  explicit Forwarded(MeasurementSource& log) : log_(log) {}
   const JointRoles& roles() const override { return log_.roles(); }
   std::span<const ViewInput> views() const override { return log_.views(); }
   std::span<const JointSample> stream() const override { return log_.stream(); }
@@ -42,7 +41,6 @@ class Misleading final : public MeasurementSource {
   }
   void compress(std::span<const Corrections> corrections, std::vector<CompressedView>& out) override {
     log_.compress(corrections, out);
-    for (auto& view : out) view.vector *= -3.0;
   }
   Eigen::MatrixXd hand_jacobian(std::size_t view, const Corrections& c) override {
     return log_.hand_jacobian(view, c);
@@ -50,6 +48,17 @@ class Misleading final : public MeasurementSource {
 
  private:
   MeasurementSource& log_;
+};
+
+/// A log whose regression points the wrong way, as it does where every counterpart belongs to
+/// another part of the outline.
+class Misleading final : public Forwarded {
+ public:
+  using Forwarded::Forwarded;
+  void compress(std::span<const Corrections> corrections, std::vector<CompressedView>& out) override {
+    Forwarded::compress(corrections, out);
+    for (auto& view : out) view.vector *= -3.0;
+  }
 };
 
 TEST(ModelFitter, TakesNoStepThatMakesTheOutlinesWorse) {
@@ -65,26 +74,14 @@ TEST(ModelFitter, TakesNoStepThatMakesTheOutlinesWorse) {
 }
 
 /// Counts how often a log is looked at.
-class Counted final : public MeasurementSource {
+class Counted final : public Forwarded {
  public:
-  explicit Counted(MeasurementSource& log) : log_(log) {}
-  const JointRoles& roles() const override { return log_.roles(); }
-  std::span<const ViewInput> views() const override { return log_.views(); }
-  std::span<const JointSample> stream() const override { return log_.stream(); }
-  void instant(std::size_t view, const Eigen::VectorXd& offsets, Instant& out) override {
-    log_.instant(view, offsets, out);
-  }
+  using Forwarded::Forwarded;
   void compress(std::span<const Corrections> corrections, std::vector<CompressedView>& out) override {
     ++looks;
-    log_.compress(corrections, out);
-  }
-  Eigen::MatrixXd hand_jacobian(std::size_t view, const Corrections& c) override {
-    return log_.hand_jacobian(view, c);
+    Forwarded::compress(corrections, out);
   }
   int looks = 0;
-
- private:
-  MeasurementSource& log_;
 };
 
 /// A free curve stays beside the model, so its step never shrinks.

@@ -3,20 +3,28 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <fstream>
 #include <filesystem>
+#include <fstream>
 
 #include "bodyschema/geometry/pose.hpp"
 
 namespace bodyschema {
 namespace {
 
-/// A planar arm of two links with a camera at its base; the second joint's frame lies 0.3 m along x.
-std::shared_ptr<const RobotModel> robot() {
+std::shared_ptr<const RobotModel> load(const std::string& urdf) {
   const auto file = std::filesystem::temp_directory_path() /
                     ("bodyschema_corrected_kinematics_" + std::to_string(::getpid()) + ".urdf");
-  std::ofstream(file)
-      << R"(<robot name="two"><link name="root"/><link name="one"/><link name="two"/>
+  std::ofstream(file) << urdf;
+  RobotModelOptions options;
+  options.urdf = file;
+  auto model = RobotModel::load(options);
+  std::filesystem::remove(file);
+  return model;
+}
+
+/// A planar arm of two links with a camera at its base; the second joint's frame lies 0.3 m along x.
+std::shared_ptr<const RobotModel> robot() {
+  return load(R"(<robot name="two"><link name="root"/><link name="one"/><link name="two"/>
     <link name="eye"/><link name="tip"/>
     <joint name="a" type="revolute"><parent link="root"/><child link="one"/><axis xyz="0 0 1"/>
       <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
@@ -24,12 +32,7 @@ std::shared_ptr<const RobotModel> robot() {
       <origin xyz="0.3 0 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
     <joint name="t" type="fixed"><parent link="two"/><child link="tip"/><origin xyz="0.2 0 0"/></joint>
     <joint name="e" type="fixed"><parent link="root"/><child link="eye"/><origin xyz="0 0 -1"/></joint>
-    </robot>)";
-  RobotModelOptions options;
-  options.urdf = file;
-  auto model = RobotModel::load(options);
-  std::filesystem::remove(file);
-  return model;
+    </robot>)");
 }
 
 class CorrectedKinematicsTest : public testing::Test {
@@ -128,22 +131,15 @@ TEST_F(CorrectedKinematicsTest, BaseShiftMovesEveryLinkAlikeInTheRootFrame) {
 /// Two joints with a sensor fixed between them, as in the upper arm of the official iCub; the arm hangs down
 /// its first joint's axis.
 std::shared_ptr<const RobotModel> sensor_between(const std::string& axis) {
-  const auto file = std::filesystem::temp_directory_path() /
-                    ("bodyschema_sensor_between_" + std::to_string(::getpid()) + ".urdf");
-  std::ofstream(file) << R"(<robot name="two"><link name="root"/><link name="one"/><link name="sensor"/>
+  return load(R"(<robot name="two"><link name="root"/><link name="one"/><link name="sensor"/>
     <link name="two"/><link name="eye"/>
-    <joint name="a" type="revolute"><parent link="root"/><child link="one"/><axis xyz=")" << axis << R"("/>
+    <joint name="a" type="revolute"><parent link="root"/><child link="one"/><axis xyz=")" + axis + R"("/>
       <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
     <joint name="s" type="fixed"><parent link="one"/><child link="sensor"/><origin xyz="0 0 -0.1"/></joint>
     <joint name="b" type="revolute"><parent link="sensor"/><child link="two"/><axis xyz="0 1 0"/>
       <origin xyz="0 0 -0.2"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
     <joint name="e" type="fixed"><parent link="root"/><child link="eye"/></joint>
-    </robot>)";
-  RobotModelOptions options;
-  options.urdf = file;
-  auto model = RobotModel::load(options);
-  std::filesystem::remove(file);
-  return model;
+    </robot>)");
 }
 
 TEST(CorrectedKinematics, LongerIsAwayFromTheRootAlsoBehindASensor) {
