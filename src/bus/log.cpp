@@ -24,7 +24,6 @@ constexpr std::size_t kHeaderBytes = 28;
 constexpr std::uint32_t kMaxChannelBytes = 63;  // LCM_MAX_CHANNEL_NAME_LENGTH
 constexpr std::uint32_t kMaxDataBytes = 256u << 20;
 constexpr int kReportedDamages = 5;
-constexpr Microseconds kFarthestTime = 9'000'000'000'000'000;  // year 2255; the difference of two is a number
 
 using Header = std::array<std::uint8_t, kHeaderBytes>;
 
@@ -125,8 +124,8 @@ LogReader::Outcome LogReader::read_event(LogEvent& event) {
     return Outcome::kDamaged;
   }
   event.number = static_cast<std::int64_t>(get<std::uint64_t>(header.data() + 4));
-  event.time_us = std::clamp(static_cast<Microseconds>(get<std::uint64_t>(header.data() + 12)), -kFarthestTime,
-                             kFarthestTime);
+  event.time_us = std::clamp(static_cast<Microseconds>(get<std::uint64_t>(header.data() + 12)), -kLatestStamp,
+                             kLatestStamp);
   event.channel.resize(lengths.channel);
   if (std::fread(event.channel.data(), 1, lengths.channel, stream_.get()) != lengths.channel ||
       !printable(event.channel)) {

@@ -4,10 +4,6 @@
 
 namespace bodyschema {
 
-namespace {
-constexpr Microseconds kLatestStamp = 9'000'000'000'000'000;  // year 2255
-}
-
 void WireReader::fail(MessageFault fault, std::string detail) {
   if (!result_.ok()) return;  // the first fault explains the others
   result_ = {fault, std::move(detail)};

@@ -1,6 +1,7 @@
 #include "bodyschema/pipeline/truth.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -23,6 +24,15 @@ Pose pose_from(const Json& rows) {
   Pose pose;
   pose.matrix() = m;
   return pose;
+}
+
+/// @param unit_us  of the number
+Microseconds time_from(const Json& number, const char* key, double unit_us) {
+  const double time_us = number.get<double>() * unit_us;
+  if (!(std::abs(time_us) <= static_cast<double>(kLatestStamp))) {
+    throw FileError(std::string(key) + " is " + number.dump() + ", expected a time of acquisition");
+  }
+  return static_cast<Microseconds>(std::llround(time_us));
 }
 
 std::vector<Eigen::Vector3d> points_from(const Json& list) {
@@ -56,8 +66,8 @@ Truth Truth::load(const std::filesystem::path& file, const std::vector<std::stri
     if (json.contains("poses")) {  // the recording: still poses that hold for a while
       for (const auto& pose : json.at("poses")) {
         TruthInstant instant;
-        instant.begin = microseconds(pose.at("time_s").at(0).get<double>());
-        instant.end = microseconds(pose.at("time_s").at(1).get<double>());
+        instant.begin = time_from(pose.at("time_s").at(0), "time_s", 1e6);
+        instant.end = time_from(pose.at("time_s").at(1), "time_s", 1e6);
         instant.X_CP = hand_in(cameras, pose);
         instant.fingertips_P = common_tips;
         truth.instants_.push_back(std::move(instant));
@@ -65,7 +75,7 @@ Truth Truth::load(const std::filesystem::path& file, const std::vector<std::stri
     } else {  // the simulator: one entry per picture
       for (const auto& frame : json.at("frames")) {
         TruthInstant instant;
-        instant.begin = instant.end = frame.at("utime").get<Microseconds>();
+        instant.begin = instant.end = time_from(frame.at("utime"), "utime", 1.0);
         instant.X_CP = hand_in(cameras, frame);
         instant.fingertips_P = frame.contains("fingertips_in_hand_m")
                                    ? points_from(frame.at("fingertips_in_hand_m"))
@@ -89,6 +99,8 @@ Truth Truth::load(const std::filesystem::path& file, const std::vector<std::stri
     }
   } catch (const Json::exception& e) {
     throw FileError(file.string() + ": not a truth file: " + e.what());
+  } catch (const FileError& e) {
+    throw FileError(file.string() + ": " + e.what());
   }
   if (truth.instants_.empty()) throw FileError(file.string() + ": holds no pose");
   std::sort(truth.instants_.begin(), truth.instants_.end(),

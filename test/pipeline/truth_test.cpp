@@ -13,6 +13,7 @@
 namespace bodyschema {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
@@ -66,6 +67,17 @@ TEST_F(TruthFile, ErrorsNameTheFile) {
   EXPECT_THROW(Truth::load("/nonexistent/truth.json"), FileError);
   std::filesystem::resize_file(path_, std::uintmax_t{4} << 30);  // without a byte on the disk
   EXPECT_THAT([&] { Truth::load(path_, {"left", "right"}); }, ThrowsMessage<FileError>(HasSubstr("at most 1073741824 expected")));
+}
+
+TEST_F(TruthFile, TimesThatNoClockShows) {
+  for (const char* time : {"1.6e+140", "-1e300", "9300000000000000", "18446744073709551615"}) {
+    SCOPED_TRACE(time);
+    const std::string poses = std::string(R"(, "hand_in_left_camera": )") + kPose + R"(, "hand_in_right_camera": )" + kPose;
+    EXPECT_THAT(error_of(std::string(R"({"frames": [{"utime": )") + time + poses + "}]}"),
+                AllOf(HasSubstr(path_.string()), HasSubstr("utime is "), HasSubstr("expected a time")));
+    EXPECT_THAT(error_of(std::string(R"({"poses": [{"time_s": [0, )") + time + "]" + poses + "}]}"),
+                HasSubstr("time_s is "));
+  }
 }
 
 TEST(TruthOfTheRecording, HoldsSeventyThreePoses) {
