@@ -50,7 +50,8 @@ struct ContourExtractor::Impl {
   std::vector<std::uint32_t> found;
   std::vector<Eigen::Vector3f> vertices;
   std::vector<OutlineSegment> segments;
-  std::vector<Crossing> crossings;
+  std::vector<Crossing> crossings, by_line;
+  std::vector<std::size_t> line_ends;  // of the crossings of a line, once they are sorted
   std::vector<ContourPoint> points;
 
   void collect(std::span<const Eigen::Isometry3f> X_CB, const contour::Camera& camera) {
@@ -105,11 +106,7 @@ struct ContourExtractor::Impl {
                              a < b ? segment.weight : -segment.weight});
       }
     }
-    std::sort(crossings.begin(), crossings.end(), [](const Crossing& x, const Crossing& y) {
-      if (x.line != y.line) return x.line < y.line;
-      if (x.at != y.at) return x.at < y.at;
-      return x.segment < y.segment;
-    });
+    sort_crossings(static_cast<std::size_t>(last_line) + 1);
 
     // A run of cover on a line: from crossing `begin` to crossing `end`.
     for (std::size_t i = 0; i < crossings.size();) {
@@ -135,6 +132,23 @@ struct ContourExtractor::Impl {
         covered_until = crossings[end].at;
       }
     }
+  }
+
+  /// By line, then along it. There are many short lines: they are filled first and sorted one by one.
+  void sort_crossings(std::size_t lines) {
+    line_ends.assign(lines + 1, 0);
+    for (const Crossing& c : crossings) ++line_ends[static_cast<std::size_t>(c.line) + 1];
+    for (std::size_t line = 1; line <= lines; ++line) line_ends[line] += line_ends[line - 1];
+    by_line.resize(crossings.size());
+    for (const Crossing& c : crossings) by_line[line_ends[static_cast<std::size_t>(c.line)]++] = c;
+    std::size_t begin = 0;
+    for (std::size_t line = 0; line < lines; ++line) {
+      std::sort(by_line.begin() + static_cast<std::ptrdiff_t>(begin),
+                by_line.begin() + static_cast<std::ptrdiff_t>(line_ends[line]),
+                [](const Crossing& x, const Crossing& y) { return x.at != y.at ? x.at < y.at : x.segment < y.segment; });
+      begin = line_ends[line];
+    }
+    crossings.swap(by_line);
   }
 
   void emit(const Crossing& crossing, int axis, double outward, const PinholeIntrinsics& k,
