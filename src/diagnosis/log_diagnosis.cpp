@@ -71,7 +71,7 @@ class LogDiagnosis {
   }
 
   void look() {
-    if (!pipeline_.masks_need_estimates()) learn();
+    if (!pipeline_.masks_need_estimates()) learn();  // such masks learn nothing
     read();
     // Said at once: it may well be why the log is refused.
     if (const auto turn = describe(pipeline_.background_turn()); !turn.empty()) {

@@ -51,6 +51,15 @@ Eigen::VectorXd encoder_sds(const std::vector<Parameter>& parameters, std::size_
   return sd;
 }
 
+/// Both eyes, each with what the other one saw of the robot.
+Observation with_eyes_exchanged(Observation observation) {
+  CameraObservation &one = *observation.cameras[0], &other = *observation.cameras[1];
+  std::swap(one.mask, other.mask);
+  std::swap(one.valid, other.valid);
+  std::swap(one.coverage, other.coverage);
+  return observation;
+}
+
 }  // namespace
 
 const char* to_string(EstimatorState state) {
@@ -186,43 +195,42 @@ struct Estimator::Impl {
   // --- pictures of the wrong eye --------------------------------------------------------------
 
   /// With a memory: whether it explains the pictures once they are exchanged, and only then.
-  bool turned_swapped() {
+  bool turned_swapped(const Observation& observation) {
+    if (!scorer.can_be_exchanged()) return false;
     const Eigen::VectorXd known = fusion.mean();
-    const double exchanged = scorer.distance_exchanged(known);
-    return exchanged < 2.0 * options.lock_distance && EyeOrder::clearly_exchanged(scorer.distance(known), exchanged);
+    const Observation exchanged = with_eyes_exchanged(observation);
+    scorer.observe(exchanged, options.min_mask_px);
+    const double other_distance = scorer.distance(known);
+    scorer.observe(observation, options.min_mask_px);
+    return other_distance < 2.0 * options.lock_distance &&
+           EyeOrder::clearly_exchanged(scorer.distance(known), other_distance);
   }
 
   /// Without one: by how near the arm can be brought to them from the guesses that the search began with, which
   /// no wrong minimum has led astray.
   bool starts_swapped(const Observation& observation) {
     if (particles_only() || eye_order.settled() || !scorer.can_be_exchanged()) return false;
-    Observation exchanged = observation;
-    std::swap(exchanged.cameras[0]->mask, exchanged.cameras[1]->mask);
-    std::swap(exchanged.cameras[0]->valid, exchanged.cameras[1]->valid);
-    std::swap(exchanged.cameras[0]->coverage, exchanged.cameras[1]->coverage);
-    const Eigen::VectorXd other_guesses = guess_distances(exchanged), guesses = guess_distances(observation);
-    double other_distance = other_guesses.minCoeff(), as_they_are = guesses.minCoeff();
-    if (EyeOrder::worth_searches(as_they_are, other_distance)) {
-      other_distance = nearest_distance(exchanged, other_guesses);
-      as_they_are = nearest_distance(observation, guesses);  // last: leaves the scorer with this frame
-    }
-    return eye_order.exchanged(as_they_are, other_distance);
-  }
-
-  Eigen::VectorXd guess_distances(const Observation& observation) {
-    scorer.observe(observation, options.min_mask_px);
     Eigen::VectorXd x = Eigen::VectorXd::Zero(state.size());
     const auto n = static_cast<std::size_t>(first_guesses.cols());
     for (std::size_t i = 0; i < n; ++i) {
       x.head(joints) = first_guesses.col(static_cast<Eigen::Index>(i));
       scorer.place(x, i);
     }
-    return scorer.score(n);
+    const Eigen::VectorXd distances = scorer.score(n);
+    const Observation exchanged = with_eyes_exchanged(observation);
+    scorer.observe(exchanged, options.min_mask_px);
+    const Eigen::VectorXd other_distances = scorer.score(n);
+
+    double as_they_are = distances.minCoeff(), other_distance = other_distances.minCoeff();
+    const bool worth_searches = EyeOrder::worth_searches(as_they_are, other_distance);
+    if (worth_searches) other_distance = nearest_distance(exchanged, other_distances);
+    scorer.observe(observation, options.min_mask_px);
+    if (worth_searches) as_they_are = nearest_distance(observation, distances);
+    return eye_order.exchanged(as_they_are, other_distance);
   }
 
-  /// @param distances  of the first guesses
+  /// Of the arm that is found from the first guesses, with these distances, in a frame that the scorer has.
   double nearest_distance(const Observation& observation, const Eigen::VectorXd& distances) {
-    scorer.observe(observation, options.min_mask_px);
     constexpr std::size_t kStarts = 12;  // from three, one arm in 300 that began far off was not found
     return search(observation, first_guesses, distances, Eigen::VectorXd::Zero(state.size()), kStarts).distance;
   }
@@ -299,7 +307,7 @@ struct Estimator::Impl {
         accepted = found->distance > kClearlyBetter * scorer.distance(best.x) || !fitter.fits(found->evidence);
       }
     }
-    if (!accepted && fusion.frames() > 0.5 && turned_swapped()) {
+    if (!accepted && fusion.frames() > 0.5 && turned_swapped(observation)) {
       times.refinement_ms += elapsed_ms(start);
       learn_nothing();
       return;

@@ -76,19 +76,6 @@ bool HypothesisScorer::can_be_exchanged() const {
          cameras_[0].height == cameras_[1].height;
 }
 
-void HypothesisScorer::exchange() {
-  std::swap(observed_[0], observed_[1]);
-  scorer_->set_observation(observed_);
-}
-
-double HypothesisScorer::distance_exchanged(const Eigen::VectorXd& x) {
-  if (!can_be_exchanged()) return 1.0;
-  exchange();
-  const double result = distance(x);
-  exchange();
-  return result;
-}
-
 std::string HypothesisScorer::description() const {
   return scorer_->description() + (engine_reason_.empty() ? "" : ": " + engine_reason_);
 }

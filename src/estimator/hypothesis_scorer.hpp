@@ -32,10 +32,8 @@ class HypothesisScorer {
   /// The distance of one hypothesis; slots and their distances stay as they are.
   double distance(const Eigen::VectorXd& x);
 
-  /// Whether the frame has two pictures of one size.
+  /// Whether the frame has two pictures of one size: each could be the other eye's.
   [[nodiscard]] bool can_be_exchanged() const;
-  /// The distance of one hypothesis from the pictures of the other eye. 1 where they cannot be exchanged.
-  double distance_exchanged(const Eigen::VectorXd& x);
 
   /// The predicted silhouette of one pose of all parts in a camera.
   BinaryMask render(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera) { return scorer_->render(X_CB, camera); }
@@ -46,7 +44,6 @@ class HypothesisScorer {
 
  private:
   void score_slots(std::size_t begin, std::size_t n, Eigen::VectorXd& distances);
-  void exchange();
 
   BodyPoseModel& body_;
   std::vector<PinholeIntrinsics> cameras_;
