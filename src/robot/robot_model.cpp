@@ -147,14 +147,16 @@ void build_tree(const UrdfTree& urdf_tree, const std::string& file, RobotModel::
 
 constexpr std::size_t kMaxTriangles = 4'000'000;  // of all rendered links together
 
-constexpr double kMaxReach_m = 1e9;  // beyond, what is computed with vertices overflows
+constexpr double kMaxReach_m = 1e6;  // beyond, what is computed with vertices overflows
 
 /// Scales and places a mesh in the link frame; a mirroring scale turns the winding back.
 void place(TriangleMesh& mesh, const Eigen::Vector3d& scale, const Pose& X_LM, const std::string& where) {
   for (auto& p : mesh.vertices) {
     const Eigen::Vector3d placed = X_LM * scale.cwiseProduct(p.cast<double>());
-    if (!(placed.cwiseAbs().maxCoeff() <= kMaxReach_m) || !placed.allFinite()) {
-      throw FileError(where + ": mesh '" + mesh.name + "' reaches further than 1e9 m from its link, expected metres; " +
+    // A mesh that is itself so large is named, with its part, where silhouettes are made of it.
+    const double allowed_m = std::max(kMaxReach_m, static_cast<double>(p.cwiseAbs().maxCoeff()));
+    if (!(placed.cwiseAbs().maxCoeff() <= allowed_m) || !placed.allFinite()) {
+      throw FileError(where + ": mesh '" + mesh.name + "' reaches further than 1e6 m from its link, expected metres; " +
                       "are scale and origin right?");
     }
     p = placed.cast<float>();
