@@ -20,7 +20,8 @@ constexpr std::uint64_t kMaxRows = 10 * 3600 * 200;   // ten hours at 200 Hz; ro
 Microseconds parse_stamp(const std::string& text, const std::string& where) {
   double stamp_s = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), stamp_s);
-  if (error != std::errc{} || end != text.data() + text.size() || !(stamp_s >= 0.0) || stamp_s > seconds(kLatestStamp)) {
+  const bool plausible = stamp_s >= 0.0 && stamp_s <= seconds(kLatestStamp);
+  if (error != std::errc{} || end != text.data() + text.size() || !plausible) {
     throw FileError(where + ": '" + text + "' is not a time stamp in seconds");
   }
   return microseconds(stamp_s);

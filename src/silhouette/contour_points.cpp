@@ -145,7 +145,9 @@ struct ContourExtractor::Impl {
     for (std::size_t line = 0; line < lines; ++line) {
       std::sort(by_line.begin() + static_cast<std::ptrdiff_t>(begin),
                 by_line.begin() + static_cast<std::ptrdiff_t>(line_ends[line]),
-                [](const Crossing& x, const Crossing& y) { return x.at != y.at ? x.at < y.at : x.segment < y.segment; });
+                [](const Crossing& x, const Crossing& y) {
+                  return x.at != y.at ? x.at < y.at : x.segment < y.segment;
+                });
       begin = line_ends[line];
     }
     crossings.swap(by_line);
