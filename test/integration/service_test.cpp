@@ -301,14 +301,27 @@ TEST_F(Service, ReloadsOnSighupAndRefusesABrokenConfiguration) {
 }
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-/// Arenas of glibc's allocator beside the main one: each begins on a multiple of 64 MiB.
+/// Heaps of glibc's arenas beside the main one. Each reserves 64 MiB on a multiple of 64 MiB: what is used of it
+/// can be written, the rest, which follows at once, cannot be read. (That other mappings begin there by chance is
+/// less rare than one thinks: Linux lays those of whole huge pages on multiples of 2 MiB.)
 int arenas_of(pid_t pid) {
+  constexpr std::uint64_t kHeap = 64u << 20;
   int arenas = 0;
+  std::uint64_t used_from = 0;
+  std::uint64_t used_to = 0;
   std::ifstream maps("/proc/" + std::to_string(pid) + "/maps");
   for (std::string line; std::getline(maps, line);) {
-    const std::uint64_t begin = std::stoull(line, nullptr, 16);
+    std::size_t dash = 0;
+    const std::uint64_t begin = std::stoull(line, &dash, 16);
+    const std::uint64_t end = std::stoull(line.substr(dash + 1), nullptr, 16);
     const bool nameless = line.find_first_of("/[") == std::string::npos;
-    if (nameless && begin % (64u << 20) == 0 && line.find(" rw-p ") != std::string::npos) ++arenas;
+    if (nameless && begin % kHeap == 0 && line.find(" rw-p ") != std::string::npos) {
+      used_from = begin;
+      used_to = end;
+    } else if (nameless && used_to == begin && used_to < used_from + kHeap && end >= used_from + kHeap &&
+               line.find(" ---p ") != std::string::npos) {
+      ++arenas;
+    }
   }
   return arenas;
 }
