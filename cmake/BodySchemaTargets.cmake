@@ -59,6 +59,13 @@ function(bodyschema_warnings target)
   endif()
 endfunction()
 
+# bodyschema_patient(<variable> <seconds>)
+#   The time a test may take: of a release build, times BODYSCHEMA_TEST_PATIENCE (sanitizers are slow).
+function(bodyschema_patient variable seconds)
+  math(EXPR limit "${seconds} * ${BODYSCHEMA_TEST_PATIENCE}")
+  set(${variable} ${limit} PARENT_SCOPE)
+endfunction()
+
 # bodyschema_test(<folder> SOURCES ... [LINKS lib...] [LABELS ...] [TIMEOUT seconds] [RUN_SERIAL])
 #   One GoogleTest program per folder of test/, named test_<folder>. RUN_SERIAL: no other test beside its own.
 function(bodyschema_test folder)
@@ -77,7 +84,9 @@ function(bodyschema_test folder)
   if(NOT ARG_LABELS)
     set(ARG_LABELS unit)
   endif()
+  bodyschema_patient(timeout ${ARG_TIMEOUT})
   include(GoogleTest)
   gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60
-    PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" RUN_SERIAL ${ARG_RUN_SERIAL})
+    PROPERTIES TIMEOUT ${timeout} LABELS "${ARG_LABELS}" RUN_SERIAL ${ARG_RUN_SERIAL}
+               ENVIRONMENT BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE})
 endfunction()

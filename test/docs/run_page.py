@@ -17,6 +17,7 @@ import subprocess
 import sys
 
 SKIPPED = 77
+PATIENCE = float(os.environ.get("BODYSCHEMA_TEST_PATIENCE", "1"))  # sanitizers are slow
 BLOCK = re.compile(r"^```(sh|text)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -57,7 +58,7 @@ def main():
             print(content, flush=True)
             done = subprocess.run(["bash", "-euo", "pipefail", "-c", content], cwd=scratch, text=True,
                                   env=environment, stdin=subprocess.DEVNULL, check=False,
-                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=240)
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=240 * PATIENCE)
             output = done.stdout
             print(output, flush=True)
             if done.returncode != 0 and not lcm_works():

@@ -11,6 +11,7 @@ import subprocess
 import sys
 
 SKIPPED = 77
+PATIENCE = float(os.environ.get("BODYSCHEMA_TEST_PATIENCE", "1"))  # sanitizers are slow
 
 
 def main():
@@ -27,12 +28,12 @@ def main():
 
     def simulate(file, *motion):
         subprocess.run(["bodyschema-sim", "--config", "config/icub_right/simulator.yaml", *motion, "--log", file],
-                       check=True, env=environment, stderr=subprocess.DEVNULL, timeout=120)
+                       check=True, env=environment, stderr=subprocess.DEVNULL, timeout=120 * PATIENCE)
 
     def workflow(*more):
         done = subprocess.run(["snakemake", "-s", source / "workflow/Snakefile", "--cores", "2", "--config",
                                f"logs={logs}", f"out={out}", *more], cwd=scratch, env=environment, text=True,
-                              check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=400)
+                              check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=400 * PATIENCE)
         print(done.stdout)
         return done
 

@@ -7,7 +7,8 @@ add_test(NAME install.consumer
     -D GENERATOR=${CMAKE_GENERATOR}
     -D CXX_FLAGS=${CMAKE_CXX_FLAGS}
     -P ${PROJECT_SOURCE_DIR}/test/install/run.cmake)
-set_tests_properties(install.consumer PROPERTIES LABELS install TIMEOUT 300)
+bodyschema_patient(timeout 300)
+set_tests_properties(install.consumer PROPERTIES LABELS install TIMEOUT ${timeout})
 
 find_package(Python3 COMPONENTS Interpreter QUIET)
 if(TARGET lcmtypes_python AND Python3_FOUND)
@@ -17,7 +18,8 @@ if(TARGET lcmtypes_python AND Python3_FOUND)
       COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/install/python_example.py
         ${PROJECT_SOURCE_DIR}/docs/examples/${example}.py
         ${PROJECT_BINARY_DIR}/lcmtypes-python ${PROJECT_BINARY_DIR}/venv-lcm)
-    set_tests_properties(install.python_example_${example} PROPERTIES LABELS install TIMEOUT 240
+    bodyschema_patient(timeout 240)
+    set_tests_properties(install.python_example_${example} PROPERTIES LABELS install TIMEOUT ${timeout}
       SKIP_RETURN_CODE 77 RESOURCE_LOCK venv-lcm)
   endforeach()
 
@@ -26,7 +28,8 @@ if(TARGET lcmtypes_python AND Python3_FOUND)
     COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/install/mcap_reads_back.py
       $<TARGET_FILE:bodyschema> ${PROJECT_BINARY_DIR}/lcmtypes-python
       ${PROJECT_BINARY_DIR}/venv-mcap ${PROJECT_BINARY_DIR}/test-mcap)
-  set_tests_properties(install.mcap_reads_back PROPERTIES LABELS install TIMEOUT 300
+  bodyschema_patient(timeout 300)
+  set_tests_properties(install.mcap_reads_back PROPERTIES LABELS install TIMEOUT ${timeout}
     SKIP_RETURN_CODE 77 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 endif()
 
@@ -42,7 +45,8 @@ if(BODYSCHEMA_DPKG_DEB AND BODYSCHEMA_DPKG_SHLIBDEPS AND BODYSCHEMA_PROGRAMS AND
       -D CPACK=${CMAKE_CPACK_COMMAND} -D DPKG_DEB=${BODYSCHEMA_DPKG_DEB}
       -D "PROGRAMS=${BODYSCHEMA_PROGRAMS}"
       -P ${PROJECT_SOURCE_DIR}/test/install/package.cmake)
-  set_tests_properties(install.package PROPERTIES LABELS install TIMEOUT 300)
+  bodyschema_patient(timeout 300)
+  set_tests_properties(install.package PROPERTIES LABELS install TIMEOUT ${timeout})
 endif()
 
 find_program(BODYSCHEMA_SYSTEMD_ANALYZE systemd-analyze)
@@ -52,13 +56,15 @@ if(BODYSCHEMA_SYSTEMD_ANALYZE)
   add_test(NAME install.unit_is_hardened
     COMMAND ${BODYSCHEMA_SYSTEMD_ANALYZE} security --offline=true --threshold=20 --no-pager
       ${PROJECT_SOURCE_DIR}/config/service/bodyschemad.service)
-  set_tests_properties(install.unit_is_hardened PROPERTIES LABELS install TIMEOUT 60)
+  bodyschema_patient(timeout 60)
+  set_tests_properties(install.unit_is_hardened PROPERTIES LABELS install TIMEOUT ${timeout})
 endif()
 
 add_test(NAME docs.pages_agree_with_the_tree
   COMMAND ${CMAKE_COMMAND} -D SOURCE_DIR=${PROJECT_SOURCE_DIR} -D "STOREYS=${BODYSCHEMA_STOREYS}"
     -P ${PROJECT_SOURCE_DIR}/test/install/docs.cmake)
-set_tests_properties(docs.pages_agree_with_the_tree PROPERTIES LABELS docs TIMEOUT 60)
+bodyschema_patient(timeout 60)
+set_tests_properties(docs.pages_agree_with_the_tree PROPERTIES LABELS docs TIMEOUT ${timeout})
 
 if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
   # Every page with a block of commands.
@@ -74,7 +80,9 @@ if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
       COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/docs/run_page.py
         ${file} ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_SOURCE_DIR}
         ${PROJECT_BINARY_DIR}/test-docs/${page})
-    set_tests_properties(docs.${page} PROPERTIES LABELS docs TIMEOUT 900 SKIP_RETURN_CODE 77)
+    bodyschema_patient(timeout 900)
+    set_tests_properties(docs.${page} PROPERTIES LABELS docs TIMEOUT ${timeout} SKIP_RETURN_CODE 77
+      ENVIRONMENT BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE})
   endforeach()
 endif()
 
@@ -85,14 +93,17 @@ if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
   add_test(NAME install.help_has_examples
     COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/install/help.py
       ${PROJECT_SOURCE_DIR}/cmake/manual.py ${PROJECT_BINARY_DIR}/test-help ${help_programs})
-  set_tests_properties(install.help_has_examples PROPERTIES LABELS install TIMEOUT 120
+  bodyschema_patient(timeout 120)
+  set_tests_properties(install.help_has_examples PROPERTIES LABELS install TIMEOUT ${timeout}
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 
   # Skipped where snakemake is not installed.
   add_test(NAME fleet.workflow
     COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/fleet/workflow.py
       ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/test-fleet)
-  set_tests_properties(fleet.workflow PROPERTIES LABELS integration TIMEOUT 600 SKIP_RETURN_CODE 77)
+  bodyschema_patient(timeout 600)
+  set_tests_properties(fleet.workflow PROPERTIES LABELS integration TIMEOUT ${timeout} SKIP_RETURN_CODE 77
+    ENVIRONMENT BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE})
 endif()
 
 find_program(BODYSCHEMA_JAVA java)
@@ -103,6 +114,7 @@ if(TARGET lcmtypes_jar AND BODYSCHEMA_JAVA)
       -cp ${BODYSCHEMA_LCM_JAR}:${PROJECT_BINARY_DIR}/bodyschema-lcmtypes.jar
       ${PROJECT_SOURCE_DIR}/test/install/LcmSpyTypes.java)
   list(LENGTH lcm_files type_count)
-  set_tests_properties(install.lcm_spy_knows_our_types PROPERTIES LABELS install TIMEOUT 120
+  bodyschema_patient(timeout 120)
+  set_tests_properties(install.lcm_spy_knows_our_types PROPERTIES LABELS install TIMEOUT ${timeout}
     PASS_REGULAR_EXPRESSION "Found ${type_count} LCM types\n")
 endif()

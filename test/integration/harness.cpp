@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -32,7 +33,7 @@ std::string contents(const fs::path& file) {
 }
 
 bool eventually(const std::function<bool()>& condition, Seconds limit) {
-  const auto end = Clock::now() + limit;
+  const auto end = Clock::now() + limit * patience();
   while (!condition()) {
     if (Clock::now() > end) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -41,6 +42,11 @@ bool eventually(const std::function<bool()>& condition, Seconds limit) {
 }
 
 }  // namespace
+
+double patience() {
+  const char* text = std::getenv("BODYSCHEMA_TEST_PATIENCE");
+  return text != nullptr ? std::max(1.0, std::atof(text)) : 1.0;
+}
 
 // --- Process -------------------------------------------------------------------------------------
 
@@ -217,7 +223,7 @@ std::optional<offsets_status_t> Listener::wait_status(
   std::unique_lock lock(mutex_);
   std::size_t next = statuses_.size();
   std::optional<offsets_status_t> found;
-  arrived_.wait_for(lock, limit, [&] {
+  arrived_.wait_for(lock, limit * patience(), [&] {
     for (; next < statuses_.size(); ++next) {
       if (!wanted(statuses_[next])) continue;
       found = statuses_[next];
@@ -230,7 +236,7 @@ std::optional<offsets_status_t> Listener::wait_status(
 
 bool Listener::wait_offsets(std::size_t count, Seconds limit) {
   std::unique_lock lock(mutex_);
-  return arrived_.wait_for(lock, limit, [&] { return offsets_.size() >= count; });
+  return arrived_.wait_for(lock, limit * patience(), [&] { return offsets_.size() >= count; });
 }
 
 Player::Player(const std::string& lcm_url, fs::path log, double speed, Change change)

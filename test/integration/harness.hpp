@@ -24,6 +24,10 @@ namespace bodyschema::integration {
 
 using Seconds = std::chrono::duration<double>;
 
+/// How many times as long everything may take: BODYSCHEMA_TEST_PATIENCE, for builds with sanitizers. Limits given to
+/// this file's functions are of a release build.
+double patience();
+
 /// A program started by the test; killed when the test is done with it.
 class Process {
  public:
