@@ -101,6 +101,11 @@ class World : public testing::Test {
     const bool going = listener.wait_status(good, Seconds(30)).has_value();
     if (const auto reason = too_busy(listener, start); !reason.empty()) GTEST_SKIP() << reason;
     ASSERT_TRUE(going) << "never got going";
+    // An estimate that has only just converged may say "converging" once more, whatever happens.
+    constexpr std::size_t kSettled = 45;
+    if (fault.quiet_s >= 0.0) {
+      ASSERT_TRUE(listener.wait_offsets(listener.offsets().size() + kSettled, Seconds(20)));
+    }
 
     const ProcessorWait wait(service.pid());
     robot.set_faults(fault.faults);
@@ -396,7 +401,8 @@ TEST_F(World, SecondSourceIsRefusedWhenConfigured) {
           .lasts_s = 5.0}, {"--set", "bus.one_source=true"});
   if (IsSkipped()) return;
   ASSERT_FALSE(last_.empty());
-  EXPECT_GT(counter("refused.second_source"), 20);
+  // Of the second source's pictures in those five seconds, more than a quarter.
+  EXPECT_GT(counter("refused.second_source"), 40.0 * speed());
   EXPECT_EQ(counter("dropped.out_of_order"), 0) << "none of its pictures came in";
 }
 
@@ -489,7 +495,7 @@ TEST_F(World, ConfigurationReloadedUnderLoad) {
   }
   check_honest(listener.offsets());
   robot.stop();
-  std::this_thread::sleep_for(std::chrono::seconds(2));
+  std::this_thread::sleep_for(Seconds(2) * patience());  // what waits is estimated first
   service.signal(SIGTERM);
   EXPECT_EQ(service.wait(Seconds(10)), 0);
   last_ = listener.statuses();

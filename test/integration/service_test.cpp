@@ -40,6 +40,8 @@ class Service : public testing::Test {
 };
 
 constexpr Seconds kStart{60};  // loading the robot, on a busy machine
+/// After which a service that has nothing more to do may end.
+const std::string kIdle_s = std::to_string(3.0 * patience());
 
 /// Pictures and encoders as fast as the daemon keeps up: the next picture goes out once the
 /// estimate for one three frames earlier is back, so that nothing is shed on any machine.
@@ -47,7 +49,7 @@ Player::Change in_step_with(const Listener& listener) {
   return [&listener, sent = std::size_t{0}](LogEvent& event, LcmLink&) mutable {
     if (event.channel != "ICUB_CAMERAS") return true;
     ++sent;
-    for (int i = 0; i < 500 && listener.offsets().size() + 3 < sent; ++i) {
+    for (int i = 0; i < 500 * patience() && listener.offsets().size() + 3 < sent; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     return true;
@@ -58,7 +60,7 @@ TEST_F(Service, AgreesWithReplayBitForBit) {
   const auto log = reach_log();
   Listener listener(url_);
   const auto file = scratch_ / "estimates.jsonl";
-  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", "3"}), scratch_.folder());
+  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", kIdle_s}), scratch_.folder());
   ASSERT_TRUE(service.said("waiting for", kStart));
   Player player(url_, log, 1000.0, in_step_with(listener));
   player.wait();
@@ -94,7 +96,7 @@ effects:
   const auto log = reach_log();
   Listener listener(url_);
   const auto file = scratch_ / "estimates.jsonl";
-  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", "3", "--extended-model", model.string()}),
+  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", kIdle_s, "--extended-model", model.string()}),
                   scratch_.folder());
   ASSERT_TRUE(service.said("extended model: backlash of r_elbow width 1 deg; latency delay 25 ms", kStart))
       << service.err();
@@ -113,12 +115,14 @@ TEST_F(Service, AgreesWithReplayOverLcmLogplayer) {
   const auto log = reach_log();
   const auto expected = replay_estimates(log, scratch_ / "replay");
   // Real time where the machine keeps up, slower where it does not: the promise holds without drops.
-  for (const char* speed : {"1", "0.25", "0.08"}) {
+  std::vector<std::string> speeds{"1", "0.25", "0.08"};
+  if (patience() > 1.0) speeds = {"0.02"};
+  for (const std::string& speed : speeds) {
     const std::string url = private_lcm_url();
     Listener listener(url);
-    const auto file = scratch_ / (std::string("estimates-") + speed + ".jsonl");
+    const auto file = scratch_ / ("estimates-" + speed + ".jsonl");
     Process service({"bodyschemad", "--config", reach_configuration(), "-l", url, "--estimates", file.string(),
-                     "--stop-after-idle", "3"},
+                     "--stop-after-idle", kIdle_s},
                     scratch_.folder());
     ASSERT_TRUE(service.said("waiting for", kStart));
     Process player({"lcm-logplayer", "--speed", speed, "--lcm-url", url, log.string()}, scratch_.folder());
@@ -130,7 +134,7 @@ TEST_F(Service, AgreesWithReplayOverLcmLogplayer) {
     EXPECT_EQ(live, expected) << "at speed " << speed;
     return;
   }
-  FAIL() << "frames were lost even at a twelfth of real time";
+  FAIL() << "frames were lost even at " << speeds.back() << " of real time";
 }
 
 TEST_F(Service, TwoReplaysAreIdentical) {
@@ -142,7 +146,7 @@ TEST_F(Service, MalformedMessagesAreCountedAndChangeNothing) {
   const auto log = reach_log();
   Listener listener(url_);
   const auto file = scratch_ / "estimates.jsonl";
-  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", "3"}), scratch_.folder());
+  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", kIdle_s}), scratch_.folder());
   ASSERT_TRUE(service.said("waiting for", kStart));
   auto in_step = in_step_with(listener);
   int sent = 0;
@@ -181,7 +185,7 @@ TEST_F(Service, StopsWithinASecondIdleAndBusy) {
       service.signal(number);
       EXPECT_EQ(service.wait(Seconds(20)), 0);
       const double took_s = Seconds(std::chrono::steady_clock::now() - begin).count();
-      EXPECT_LT(took_s, 1.0) << (busy ? "busy" : "idle");
+      EXPECT_LT(took_s, 1.0 * patience()) << (busy ? "busy" : "idle");
       EXPECT_THAT(service.err(), HasSubstr("stopped after"));
     }
   }
@@ -431,7 +435,7 @@ TEST_F(Service, StatusFollowsWhatHappens) {
         [](const offsets_status_t& status) { return status.state == "converged"; }, Seconds(20));
     ASSERT_TRUE(tracking);
     EXPECT_LE(tracking->level, offsets_status_t::WARN) << tracking->sentence;
-    EXPECT_GT(tracking->frame_rate_hz, 1.0);
+    EXPECT_GT(tracking->frame_rate_hz, 1.0 / patience());
     EXPECT_GT(tracking->latency_median_ms, 0.0);
     EXPECT_GT(tracking->resident_bytes, 1'000'000);
     EXPECT_GT(tracking->best_likelihood, 0.8);
