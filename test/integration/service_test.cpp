@@ -428,7 +428,7 @@ TEST_F(Service, StatusFollowsWhatHappens) {
   };
   EXPECT_TRUE(listener.wait_status(says(HealthLevel::kStale, "no pictures yet on ICUB_CAMERAS"), Seconds(5)));
   {
-    Player player(url_, reach_log());
+    Player player(url_, reach_log(), 1.0 / patience());
     ASSERT_TRUE(listener.wait_status(says(HealthLevel::kWarn, "hand not in view"), Seconds(10)));
     // Frames are shed on a slow machine, which the sentence may say instead; the state is there too.
     const auto tracking = listener.wait_status(
