@@ -101,11 +101,9 @@ class World : public testing::Test {
     const bool going = listener.wait_status(good, Seconds(30)).has_value();
     if (const auto reason = too_busy(listener, start); !reason.empty()) GTEST_SKIP() << reason;
     ASSERT_TRUE(going) << "never got going";
-    // An estimate that has only just converged may say "converging" once more, whatever happens.
-    constexpr std::size_t kSettled = 45;
-    if (fault.quiet_s >= 0.0) {
-      ASSERT_TRUE(listener.wait_offsets(listener.offsets().size() + kSettled, Seconds(20)));
-    }
+    // What has only just converged may say "converging" once more. At the usual speed that is over by the first good
+    // status; slower, it takes as many frames.
+    if (fault.quiet_s >= 0.0) std::this_thread::sleep_for(Seconds(1.5 / speed() - 3.0));
 
     const ProcessorWait wait(service.pid());
     robot.set_faults(fault.faults);
@@ -398,11 +396,10 @@ TEST_F(World, SecondSourceIsRefusedWhenConfigured) {
   LcmLink other(url_);
   auto fault = faults::second_publisher(other);
   suffer({.name = "second source, one_source: true", .faults = fault, .words = "of a second source on ICUB_CAMERAS",
-          .lasts_s = 5.0}, {"--set", "bus.one_source=true"});
+          .lasts_s = 2.5 / speed()}, {"--set", "bus.one_source=true"});
   if (IsSkipped()) return;
   ASSERT_FALSE(last_.empty());
-  // Of the second source's pictures in those five seconds, more than a quarter.
-  EXPECT_GT(counter("refused.second_source"), 40.0 * speed());
+  EXPECT_GT(counter("refused.second_source"), 20);
   EXPECT_EQ(counter("dropped.out_of_order"), 0) << "none of its pictures came in";
 }
 

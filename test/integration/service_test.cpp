@@ -96,7 +96,8 @@ effects:
   const auto log = reach_log();
   Listener listener(url_);
   const auto file = scratch_ / "estimates.jsonl";
-  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", kIdle_s, "--extended-model", model.string()}),
+  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", kIdle_s,
+                          "--extended-model", model.string()}),
                   scratch_.folder());
   ASSERT_TRUE(service.said("extended model: backlash of r_elbow width 1 deg; latency delay 25 ms", kStart))
       << service.err();
