@@ -502,8 +502,8 @@ struct Estimator::Impl {
     if (particles_only() || !read_encoders(observation)) return;
     const bool remembers = fusion.frames() > kSettled_frames;
     const bool settled = remembers && !contradicted;
-    stalled.look(reading, estimate.offset_rad, estimate.covariance_rad2.diagonal().cwiseMax(0.0).cwiseSqrt(), explained,
-                 settled, remembers);
+    stalled.look(1e-6 * static_cast<double>(observation.utime), reading, estimate.offset_rad,
+                 estimate.covariance_rad2.diagonal().cwiseMax(0.0).cwiseSqrt(), explained, settled, remembers);
     const auto drift = stalled.drift_rad().array().square();
     estimate.covariance_rad2.diagonal().array() += drift;
     frame_state.covariance.diagonal().head(joints).array() += drift;

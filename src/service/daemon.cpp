@@ -169,13 +169,17 @@ class Daemon {
       loop(signals);
     }
     notifier_.stopping();
-    session_->receiver.stop();
+    session_->receiver.finish();
+    {
+      const std::lock_guard progress_lock(progress_mutex_);
+      progress_.left = session_->waiting();
+    }
     report();  // the last word, with the final counts
     finish_files();
     const auto facts = received();
-    spdlog::info("stopped after {} estimates; {} pictures came in, {} were dropped, {} frames shed",
+    spdlog::info("stopped after {} estimates; {} pictures came in, {} were dropped, {} frames shed, {} left",
                  progress_.estimated, facts.bus.synchroniser.images,
-                 facts.bus.synchroniser.total_dropped(), progress_.shed);
+                 facts.bus.synchroniser.total_dropped(), progress_.shed, progress_.left);
     if (options_.timings) std::fputs(all_stages_.table().c_str(), stdout);
     if (loading()) {  // which cannot be broken off: all else is done, so the process ends under it
       spdlog::default_logger()->flush();

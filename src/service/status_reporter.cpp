@@ -115,7 +115,7 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
       instants(s.total_dropped() + bus.images_malformed, identity_.camera_count);
   m.frames_in = static_cast<std::int64_t>(s.observations + lost_before_queue);
   m.frames_estimated = static_cast<std::int64_t>(progress.estimated);
-  m.frames_dropped = static_cast<std::int64_t>(progress.shed + progress.failed + lost_before_queue);
+  m.frames_dropped = static_cast<std::int64_t>(progress.shed + progress.left + progress.failed + lost_before_queue);
   m.gaps = static_cast<std::int64_t>(s.gaps);
   const double elapsed_s = last_report_us_ < 0 ? seconds(m.uptime_us) : seconds(now - last_report_us_);
   m.frame_rate_hz = elapsed_s > 0.0 ? static_cast<double>(facts.estimated_since_last) / elapsed_s : 0.0;
@@ -126,7 +126,8 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
     m.counter_name.push_back(name);
     m.counter_value.push_back(static_cast<std::int64_t>(value));
   };
-  // pictures.arrived is the sum of used, refused, all dropped.* and the few that wait.
+  // pictures.arrived is the sum of used, refused, all dropped.* and the few that wait; those used and once more
+  // those of `mono` are two for every frame estimated, shed, failed, or left when the service stopped.
   count("messages", bus.messages);
   count("pictures.arrived", s.images + bus.images_malformed);
   count("pictures.used", s.images_used);
@@ -134,6 +135,7 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
   for (const auto& [name, value] : bus.counters()) count(name, value);
   count("refused.second_source", received.refused.messages);
   count("shed.queue", progress.shed);
+  count("left", progress.left);
   count("failed", progress.failed);
   count("mono", s.mono_observations);
   count("publishing_failed", progress.publishing_failures);

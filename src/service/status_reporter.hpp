@@ -20,6 +20,7 @@ namespace bodyschema {
 struct Progress {
   std::uint64_t estimated = 0;
   std::uint64_t shed = 0;           ///< by the queue
+  std::uint64_t left = 0;           ///< frames that still wait as the service stops
   std::int64_t busy_since_us = -1;  ///< monotonic_us() when the present frame was begun; -1: idle
   std::int64_t last_estimate_us = -1;
   Estimate estimate;

@@ -252,31 +252,35 @@ TEST_F(EstimatorOnOwnRobot, WhatAStallTaughtDoesNotOutliveIt) {
   const int elbow = 3;
   const Eigen::Index index = robot_->joint_index(setup_.estimated_joints[elbow]);
   const char* given = std::getenv("BODYSCHEMA_SEED");
-  const auto seed = given != nullptr ? static_cast<unsigned>(std::stoul(given)) : std::random_device{}();
-  std::mt19937 random(seed);
-  const auto between = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
-  int converged_after = 0;
-  constexpr int kTrials = 6;
-  for (int trial = 0; trial < kTrials; ++trial) {
-    Estimator estimator(robot_, setup_, rig_, options_);
-    const int stalls = between(30, 90), lives = stalls + between(20, 200), end = lives + 60;
-    const int period = between(40, 120);
-    SCOPED_TRACE("BODYSCHEMA_SEED=" + std::to_string(seed) + ", stalls from frame " + std::to_string(stalls) + " to " +
-                 std::to_string(lives) + ", there and back in " + std::to_string(period));
-    Stall stall{.joint = index, .offset = elbow, .from = stalls, .to = lives};
-    for (int frame = 0; frame < end; ++frame) {
-      if (between(0, 3) == 0 && frame != stalls) continue;
-      const double s = 0.5 - 0.5 * std::cos(2.0 * kPi * frame / period);
-      Eigen::VectorXd q = pose(3.0 * s - 1.0);
-      Observation seen = reach_->observe(q, frame * 33'333);
-      const Eigen::VectorXd truth = stall.befall(frame, seen, offset_rad_);
-      const Estimate estimate = estimator.step(seen);
-      if (estimate.state != EstimatorState::kConverged) continue;
-      converged_after += frame >= lives;
-      expect_honest(estimate, truth, frame);
+  const auto drawn = given != nullptr ? static_cast<unsigned>(std::stoul(given)) : std::random_device{}();
+  // With the fixed one a stall begins in the middle of a motion of 12 deg/s: for three frames the memory agrees
+  // with what is wrong by up to 1.1 deg.
+  for (const unsigned seed : {2007u, drawn}) {
+    std::mt19937 random(seed);
+    const auto between = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+    int converged_after = 0;
+    constexpr int kTrials = 6;
+    for (int trial = 0; trial < kTrials; ++trial) {
+      Estimator estimator(robot_, setup_, rig_, options_);
+      const int stalls = between(30, 90), lives = stalls + between(20, 200), end = lives + 60;
+      const int period = between(40, 120);
+      SCOPED_TRACE("BODYSCHEMA_SEED=" + std::to_string(seed) + ", stalls from frame " + std::to_string(stalls) + " to " +
+                   std::to_string(lives) + ", there and back in " + std::to_string(period));
+      Stall stall{.joint = index, .offset = elbow, .from = stalls, .to = lives};
+      for (int frame = 0; frame < end; ++frame) {
+        if (between(0, 3) == 0 && frame != stalls) continue;
+        const double s = 0.5 - 0.5 * std::cos(2.0 * kPi * frame / period);
+        Eigen::VectorXd q = pose(3.0 * s - 1.0);
+        Observation seen = reach_->observe(q, frame * 33'333);
+        const Eigen::VectorXd truth = stall.befall(frame, seen, offset_rad_);
+        const Estimate estimate = estimator.step(seen);
+        if (estimate.state != EstimatorState::kConverged) continue;
+        converged_after += frame >= lives;
+        expect_honest(estimate, truth, frame);
+      }
     }
+    EXPECT_GT(converged_after, 10 * kTrials);
   }
-  EXPECT_GT(converged_after, 10 * kTrials);
 }
 
 /// The pictures of the two eyes exchanged; encoders and times stay.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "bodyschema/geometry/pose.hpp"
 
@@ -16,9 +17,10 @@ class TwoJoints : public ::testing::Test {
             bool fits = true, bool settled = true, bool remembers = true) {
     const Eigen::Vector2d reading(radians(reading_0_deg), radians(reading_1_deg));
     const Eigen::Vector2d offset(radians(offset_0_deg), radians(offset_1_deg));
-    encoders_.look(reading, offset, Eigen::Vector2d::Constant(radians(0.1)), fits, settled, remembers);
+    encoders_.look(time_s_ += 1.0 / 30.0, reading, offset, Eigen::Vector2d::Constant(radians(0.1)), fits, settled, remembers);
   }
   StalledEncoders encoders_{2};
+  double time_s_ = 0.0;
 };
 
 TEST_F(TwoJoints, AReadingThatStandsWhileTheJointMovesIsAStall) {
@@ -70,6 +72,36 @@ TEST_F(TwoJoints, TheDriftOfTheLastSecondIsTold) {
   EXPECT_EQ(encoders_.drift_rad()(1), 0.0) << "its encoder lives";
   look(30.0, 0.0, 10.0, 0.0, true, false);
   EXPECT_EQ(encoders_.drift_rad()(0), 0.0) << "a new search begins anew";
+}
+
+// At 15 deg/s, in the middle of a motion: until the pictures would have shown that the joint goes on.
+TEST_F(TwoJoints, AReadingThatStopsDeadIsDoubtedUntilThePicturesWouldHaveContradictedIt) {
+  double reading_deg = 30.0;
+  for (int frame = 0; frame < 10; ++frame) look(reading_deg += 0.5, 2.0);
+  EXPECT_EQ(encoders_.drift_rad()(0), 0.0);
+  for (int frame = 1; frame <= 5; ++frame) {
+    look(reading_deg, 2.0);
+    EXPECT_NEAR(encoders_.drift_rad()(0), radians(0.5 * frame), radians(0.11)) << frame;
+    EXPECT_EQ(encoders_.drift_rad()(1), 0.0) << "has always stood";
+  }
+  for (int frame = 0; frame < 10; ++frame) look(reading_deg, 2.0);
+  EXPECT_EQ(encoders_.drift_rad()(0), 0.0);
+}
+
+TEST_F(TwoJoints, AMotionThatSlowsDownIsNotDoubtedWhenItEnds) {
+  for (int frame = 0; frame <= 60; ++frame) {
+    look(20.0 * std::cos(kPi * std::min(frame, 30) / 30.0), 2.0);
+    EXPECT_LT(encoders_.drift_rad()(0), radians(0.1)) << frame;
+  }
+}
+
+TEST_F(TwoJoints, AReadingThatFlickersDoesNotMove) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise_deg(0.0, 0.08);
+  for (int frame = 0; frame < 3000; ++frame) {
+    look(30.0 + noise_deg(random), 2.0, 10.0 + (frame / 3 % 2 == 0 ? 0.0 : 0.15));
+    EXPECT_LT(encoders_.drift_rad().maxCoeff(), radians(0.01)) << frame;
+  }
 }
 
 TEST_F(TwoJoints, AMemoryDroppedWhileAReadingStandsIsToldForASecond) {

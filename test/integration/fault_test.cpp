@@ -492,13 +492,12 @@ TEST_F(World, ConfigurationReloadedUnderLoad) {
   }
   check_honest(listener.offsets());
   robot.stop();
-  std::this_thread::sleep_for(Seconds(2) * patience());  // what waits is estimated first
   service.signal(SIGTERM);
   EXPECT_EQ(service.wait(Seconds(10)), 0);
   last_ = listener.statuses();
   // Nothing is lost uncounted in the change from one to the other.
   const std::int64_t used = counter("pictures.used");
-  EXPECT_EQ((used + counter("mono")) / 2, last_.back().frames_estimated + counter("shed.queue"));
+  EXPECT_EQ(used + counter("mono"), 2 * (last_.back().frames_estimated + counter("shed.queue") + counter("left")));
   const std::int64_t waiting = counter("pictures.arrived") - used - counter("pictures.refused") - dropped();
   EXPECT_GE(waiting, 0);
   EXPECT_LE(waiting, 6);

@@ -192,6 +192,21 @@ TEST_F(Service, StopsWithinASecondIdleAndBusy) {
   }
 }
 
+TEST_F(Service, CountsTheFramesThatWaitWhenItStops) {
+  Listener listener(url_);
+  Process service({"bodyschemad", "--config", reach_configuration(), "-l", url_, "--frames", "3"}, scratch_.folder());
+  ASSERT_TRUE(service.said("waiting for", kStart));
+  const Player player(url_, reach_log(), 1000.0);
+  ASSERT_EQ(service.wait(Seconds(60)), 0);
+  ASSERT_FALSE(listener.statuses().empty());
+  const auto last = listener.statuses().back();
+  std::map<std::string, std::int64_t> counters;
+  for (std::size_t i = 0; i < last.counter_name.size(); ++i) counters[last.counter_name[i]] = last.counter_value[i];
+  EXPECT_GT(counters["left"], 0) << "a test that shows nothing";
+  EXPECT_EQ(counters["pictures.used"] + counters["mono"],
+            2 * (last.frames_estimated + counters["shed.queue"] + counters["failed"] + counters["left"]));
+}
+
 TEST_F(Service, StopsWhileReloading) {
   const auto config = scratch_ / "estimator.yaml";
   std::ofstream(config) << "include: [" << reach_configuration() << "]\n";

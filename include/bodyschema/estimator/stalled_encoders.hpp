@@ -15,13 +15,14 @@ class StalledEncoders {
       : tracks_(static_cast<std::size_t>(joints)), drift_rad_(Eigen::VectorXd::Zero(joints)) {}
 
   /// Frames in order of time.
+  /// @param time_s  of the frame
   /// @param reading_rad  encoders of the estimated joints
   /// @param offset_rad  their offsets as known with this frame, and one sigma
   /// @param fits  whether those offsets explain the frame's pictures; otherwise it says nothing
   /// @param settled  whether the offsets are a memory of several frames, not that of a new search
   /// @param remembers  whether there is such a memory, be it doubted at the moment
-  void look(const Eigen::VectorXd& reading_rad, const Eigen::VectorXd& offset_rad, const Eigen::VectorXd& sd_rad,
-            bool fits, bool settled, bool remembers);
+  void look(double time_s, const Eigen::VectorXd& reading_rad, const Eigen::VectorXd& offset_rad,
+            const Eigen::VectorXd& sd_rad, bool fits, bool settled, bool remembers);
   /// Whether a reading that stood under suspicion has moved again: its joint was seen to move meanwhile, or
   /// a memory was dropped in its last 300 frames while other joints moved. What has been learned since is
   /// wrong then.
@@ -29,7 +30,9 @@ class StalledEncoders {
   [[nodiscard]] bool ends(const Eigen::VectorXd& reading_rad) const;
   /// How far each offset has run in 30 frames (a second at 30 Hz) under a reading that stands, radians; zero
   /// for joints whose reading moves. A memory of frames lags behind a moving arm by about as much, which
-  /// its own covariance does not tell.
+  /// its own covariance does not tell. Of a reading that stops dead at least how far its joint would have gone
+  /// on as it slowed down, for ten frames or 3 deg: by then the pictures contradict the memory or the estimate
+  /// runs after them, if the joint did not stop.
   [[nodiscard]] const Eigen::VectorXd& drift_rad() const { return drift_rad_; }
   /// Whether a joint has been seen to move under a reading that stands, in the last 30 frames: a slip of an
   /// arm at rest, or the beginning of a stall.
@@ -61,13 +64,21 @@ class StalledEncoders {
     double moved_rad = 0.0;
     std::array<double, kRecent> recent_rad{};  ///< settled offsets, round and round
     std::size_t recent = 0;                    ///< how many there were
+    double since_s = 0.0;             ///< the first frame with this reading
+    double step_rad_s = 0.0;          ///< from the reading before to this one
+    double deceleration_rad_s2 = 0.0; ///< from step to step, 0 while it gets faster
+    double run_rad = 0.0;             ///< of all steps the same way
     [[nodiscard]] bool moved_to(double reading_rad) const;
+    /// What follows upon it.
+    [[nodiscard]] Track moved_on(double time_s, double reading_rad) const;
+    [[nodiscard]] double gone_on_rad(double time_s) const;
     [[nodiscard]] double drift_rad() const;
   };
   std::vector<Track> tracks_;
   Eigen::VectorXd drift_rad_;
   bool doubtful_ = false;
   bool dropped_while_standing_ = false;
+  bool began_ = false;                        ///< there has been a frame
   bool remembered_ = false;                   ///< there has been a memory
   std::size_t frames_since_drop_ = kTaught;
   Eigen::Index joint_ = -1;
