@@ -102,7 +102,8 @@ class RealTime {
  public:
   RealTime(double rate, Microseconds begin) : rate_(rate), begin_(begin), start_(Clock::now()) {}
   bool operator()(Microseconds due) {
-    const auto target = start_ + std::chrono::microseconds(static_cast<std::int64_t>(static_cast<double>(due - begin_) / rate_));
+    const auto target =
+        start_ + std::chrono::microseconds(static_cast<std::int64_t>(static_cast<double>(due - begin_) / rate_));
     while (!g_stop) {
       const auto now = Clock::now();
       if (now >= target) {
@@ -189,8 +190,9 @@ void run(const Arguments& a) {
     std::fprintf(stderr, "bodyschema-sim: %d frames on %s, %s times real time\n", simulator.frame_count(),
                  link->url().c_str(), CLI::detail::to_string(a.rate).c_str());
     sink = std::move(link);
-    const auto now = std::chrono::duration_cast<std::chrono::microseconds>(
-        std::chrono::system_clock::now().time_since_epoch()).count();
+    const auto now =
+        std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
+            .count();
     publishing.utime_shift = now - settings.start_utime;
     clock.emplace(a.rate, settings.start_utime);
   } else {
@@ -215,7 +217,8 @@ void run(const Arguments& a) {
   bar.reset();
   if (truth) truth->close();
   if (clock && clock->worst_s() > 0.5) {
-    std::fprintf(stderr, "bodyschema-sim: up to %.1f s behind; a smaller --rate suits this machine\n", clock->worst_s());
+    std::fprintf(stderr, "bodyschema-sim: up to %.1f s behind; a smaller --rate suits this machine\n",
+                 clock->worst_s());
   }
   std::fprintf(stderr, "bodyschema-sim: %d of %d frames %s%s\n", frames, simulator.frame_count(),
                live ? "published" : "written to ", a.log.c_str());
@@ -249,39 +252,54 @@ int main(int argc, char** argv) {
 
   auto* reach = app.add_flag("--reach", a.reach, "Reach once across the view (default)")->group("Motion");
   auto* babble = app.add_option("--babble", a.babble_s, "Move at random for this many seconds, hand in view")
-                     ->check(CLI::Range(1.0, 3600.0))->group("Motion");
+                     ->check(CLI::Range(1.0, 3600.0))
+                     ->group("Motion");
   auto* one_way = app.add_option("--one-way", a.one_way_s, "One slow reach of this many seconds, never turning back")
-                      ->check(CLI::Range(1.0, 3600.0))->group("Motion");
+                      ->check(CLI::Range(1.0, 3600.0))
+                      ->group("Motion");
   auto* poses = app.add_option("--poses", a.poses, "Stop and go: this many postures, each held still for a second")
-                    ->check(CLI::Range(2, 3600))->group("Motion");
+                    ->check(CLI::Range(2, 3600))
+                    ->group("Motion");
   reach->excludes(babble)->excludes(one_way)->excludes(poses);
   babble->excludes(one_way)->excludes(poses);
   one_way->excludes(poses);
-  app.add_option("--frames", a.frames, "Frames of a reach (default 100)")->check(CLI::Range(2, 100000))->group("Motion");
+  app.add_option("--frames", a.frames, "Frames of a reach (default 100)")
+      ->check(CLI::Range(2, 100000))
+      ->group("Motion");
   app.add_option("--background-frames", a.background_frames, "Empty frames before the arm comes in")
-      ->check(CLI::Range(0, 10000))->group("Motion");
+      ->check(CLI::Range(0, 10000))
+      ->group("Motion");
   app.add_flag("--head-moves", a.head_moves, "The head moves too")->group("Motion");
   app.add_option("--freeze", a.frozen, "Arm joint that never moves (repeatable)")->group("Motion");
   app.add_flag("--clutter", a.clutter, "Cluttered background")->group("Motion");
 
   app.add_option("--offsets", a.offsets,
                  "encoder - true in deg, by robot.estimated_joints: paper (5,4,3,-2,3,-7,3, default), random, none, "
-                 "or a list a,b,c,...")->group("Truth");
+                 "or a list a,b,c,...")
+      ->group("Truth");
   app.add_option("--fault", a.faults, "NAME:key=value,... (repeatable); see --list-faults")->group("Truth");
-  app.add_option("--hidden-fault", a.hidden, "Draw a fault from this seed; it goes to --truth only (repeatable)")->group("Truth");
-  app.add_option("--hidden-size", a.hidden_size, "Size of hidden faults, times the smallest detectable (default: drawn from 3 to 6)")
-      ->check(CLI::Range(0.01, 100.0))->group("Truth");
+  app.add_option("--hidden-fault", a.hidden, "Draw a fault from this seed; it goes to --truth only (repeatable)")
+      ->group("Truth");
+  app.add_option("--hidden-size", a.hidden_size,
+                 "Size of hidden faults, times the smallest detectable (default: drawn from 3 to 6)")
+      ->check(CLI::Range(0.01, 100.0))
+      ->group("Truth");
   app.add_flag("--hidden-outside", a.hidden_outside, "Draw hidden faults that no diagnosis can name")->group("Truth");
   app.add_flag("--list-faults", a.list_faults, "Print all faults and stop")->group("Truth");
   app.add_option("--truth", a.truth, "Write what was true to this file (JSON)")->group("Truth");
 
-  auto* log = app.add_option("--log", a.log, "Write an LCM log as fast as possible, without the network")->group("Output");
+  auto* log =
+      app.add_option("--log", a.log, "Write an LCM log as fast as possible, without the network")->group("Output");
   app.add_option("-l,--lcm-url", a.lcm_url, "LCM network (default: LCM_DEFAULT_URL, else this machine only)")
-      ->group("Output")->excludes(log);
+      ->group("Output")
+      ->excludes(log);
   app.add_option("--rate", a.rate, "Speed over the network, times real time (default 1)")
-      ->check(CLI::Range(0.001, 100.0))->group("Output")->excludes(log);
+      ->check(CLI::Range(0.001, 100.0))
+      ->group("Output")
+      ->excludes(log);
   app.add_option("--pictures", a.pictures, "rgb (default), gray or jpeg")
-      ->check(CLI::IsMember({"rgb", "gray", "jpeg"}))->group("Output");
+      ->check(CLI::IsMember({"rgb", "gray", "jpeg"}))
+      ->group("Output");
   try {
     app.parse(argc, argv);
     if (!a.list_faults && config->count() == 0) throw CLI::RequiredError("--config");

@@ -24,12 +24,13 @@ void check_configuration(const apps::CommonOptions& common, const std::string& l
   Pipeline pipeline(configuration);
   configuration.reject_unknown_keys();
   const Channels channels = pipeline.bus().channels();
-  std::printf("%s: good\nrobot: %s, %zu joints, offsets of %zu estimated\ncameras: %zu\n"
-              "silhouettes: %s\nchannels: %s and %s in, %s and %s out\n",
-              common.config.c_str(), pipeline.robot().name().c_str(), pipeline.robot().joints().size(),
-              pipeline.setup().estimated_joints.size(), pipeline.rig().cameras.size(),
-              pipeline.estimator().engine_description().c_str(), channels.joint_state.c_str(),
-              channels.cameras.c_str(), channels.joint_offsets.c_str(), channels.offsets_status.c_str());
+  std::printf(
+      "%s: good\nrobot: %s, %zu joints, offsets of %zu estimated\ncameras: %zu\n"
+      "silhouettes: %s\nchannels: %s and %s in, %s and %s out\n",
+      common.config.c_str(), pipeline.robot().name().c_str(), pipeline.robot().joints().size(),
+      pipeline.setup().estimated_joints.size(), pipeline.rig().cameras.size(),
+      pipeline.estimator().engine_description().c_str(), channels.joint_state.c_str(), channels.cameras.c_str(),
+      channels.joint_offsets.c_str(), channels.offsets_status.c_str());
   if (const auto& model = pipeline.error_model()) {
     std::printf("extended model: %s\n", describe(*model).c_str());
   }
@@ -45,8 +46,9 @@ void check_configuration(const apps::CommonOptions& common, const std::string& l
 
 /// The service: encoders and pictures in over LCM, joint offsets out.
 int main(int argc, char** argv) {
-  CLI::App app{"Body Schema's service: estimates the joint offsets of an arm from encoders and stereo\n"
-               "pictures that come in over LCM, and publishes them with each pair of pictures"};
+  CLI::App app{
+      "Body Schema's service: estimates the joint offsets of an arm from encoders and stereo\n"
+      "pictures that come in over LCM, and publishes them with each pair of pictures"};
   app.formatter(apps::help_formatter());
   app.set_version_flag("--version", BODYSCHEMA_VERSION);
   app.footer(

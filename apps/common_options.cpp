@@ -10,8 +10,7 @@
 namespace bodyschema::apps {
 
 void CommonOptions::add_to(CLI::App& app) {
-  app.add_option("-c,--config", config, "Configuration file, e.g. config/icub_right/estimator.yaml")
-      ->required();
+  app.add_option("-c,--config", config, "Configuration file, e.g. config/icub_right/estimator.yaml")->required();
   app.add_option("--set", overrides, "Override one key: --set filter.particles=500 (repeatable)");
   app.add_option("--engine", engine, "Silhouette engine: auto, atlas or contour")
       ->check(CLI::IsMember({"auto", "atlas", "contour"}));
@@ -60,7 +59,9 @@ class HelpFormatter : public CLI::Formatter {
 
 }  // namespace
 
-std::shared_ptr<CLI::Formatter> help_formatter() { return std::make_shared<HelpFormatter>(); }
+std::shared_ptr<CLI::Formatter> help_formatter() {
+  return std::make_shared<HelpFormatter>();
+}
 
 int run_and_report(const char* program, const std::function<void()>& action) {
   try {

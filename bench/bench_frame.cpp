@@ -17,10 +17,9 @@ namespace {
 using namespace bodyschema;
 
 Configuration configuration(const std::string& engine, const std::string& mode, int particles) {
-  const std::filesystem::path file =
-      std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml";
-  return Configuration::load(file, {"silhouette.engine=" + engine, "estimator.mode=" + mode,
-                                    "filter.particles=" + std::to_string(particles)});
+  const std::filesystem::path file = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml";
+  return Configuration::load(
+      file, {"silhouette.engine=" + engine, "estimator.mode=" + mode, "filter.particles=" + std::to_string(particles)});
 }
 
 /// A reach and the empty frames before it, drawn once. Masks are filled in by whoever uses it.

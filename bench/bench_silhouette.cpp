@@ -52,8 +52,8 @@ std::vector<PinholeIntrinsics> resized(const Scene& scene, Size size) {
   std::vector<PinholeIntrinsics> cameras;
   for (const auto& k : scene.cameras) {
     const double scale = size.width / static_cast<double>(k.width);
-    cameras.push_back({size.width, size.height, scale * k.fx, scale * k.fy,
-                       scale * (k.cx + 0.5) - 0.5, scale * (k.cy + 0.5) - 0.5});
+    cameras.push_back(
+        {size.width, size.height, scale * k.fx, scale * k.fy, scale * (k.cx + 0.5) - 0.5, scale * (k.cy + 0.5) - 0.5});
   }
   return cameras;
 }
@@ -75,34 +75,30 @@ bool agrees(const Scene& scene, std::span<const PinholeIntrinsics> cameras,
   for (std::size_t i = 0; i < std::min(kChecked * cameras.size(), counts.size()); ++i) {
     const std::size_t c = i % cameras.size();
     const auto mask = reference::silhouette(
-        scene.model, cameras[c],
-        std::span(scene.X_CB).subspan(i * scene.model.parts.size(), scene.model.parts.size()));
+        scene.model, cameras[c], std::span(scene.X_CB).subspan(i * scene.model.parts.size(), scene.model.parts.size()));
     const auto expected = reference::compare(mask, observed[c]);
     const auto close = [](std::uint32_t a, std::uint32_t b) {
       return std::abs(static_cast<double>(a) - b) <= std::max(3.0, 0.001 * b);
     };
-    if (!close(counts[i].predicted, expected.predicted) ||
-        !close(counts[i].intersection, expected.intersection) ||
+    if (!close(counts[i].predicted, expected.predicted) || !close(counts[i].intersection, expected.intersection) ||
         counts[i].observed != expected.observed) {
-      std::fprintf(stderr, "image %zu: predicted %u, intersection %u; reference %u, %u\n", i,
-                   counts[i].predicted, counts[i].intersection, expected.predicted,
-                   expected.intersection);
+      std::fprintf(stderr, "image %zu: predicted %u, intersection %u; reference %u, %u\n", i, counts[i].predicted,
+                   counts[i].intersection, expected.predicted, expected.intersection);
       return false;
     }
   }
   return true;
 }
 
-void score(benchmark::State& state, const std::string& engine, const std::string& triangles,
-           Size size, std::size_t particles) {
+void score(benchmark::State& state, const std::string& engine, const std::string& triangles, Size size,
+           std::size_t particles) {
   const Scene& scene = scene_of(triangles);
   const auto cameras = resized(scene, size);
   const std::size_t per_particle = cameras.size() * scene.model.parts.size();
   // Scenes hold a thousand particles; more are the same again.
   std::vector<Eigen::Isometry3f> X_CB;
   for (std::size_t i = 0; i < particles; ++i) {
-    const auto first = scene.X_CB.begin() +
-                       static_cast<std::ptrdiff_t>(i % scene.particles() * per_particle);
+    const auto first = scene.X_CB.begin() + static_cast<std::ptrdiff_t>(i % scene.particles() * per_particle);
     X_CB.insert(X_CB.end(), first, first + static_cast<std::ptrdiff_t>(per_particle));
   }
   std::unique_ptr<SilhouetteScorer> scorer;
@@ -116,9 +112,8 @@ void score(benchmark::State& state, const std::string& engine, const std::string
   std::vector<ObservedSilhouette> observed(cameras.size());
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const std::size_t parts = scene.model.parts.size();
-    observed[c].mask = reference::silhouette(
-        scene.model, cameras[c],
-        std::span(scene.X_CB).last(per_particle).subspan(c * parts, parts));
+    observed[c].mask = reference::silhouette(scene.model, cameras[c],
+                                             std::span(scene.X_CB).last(per_particle).subspan(c * parts, parts));
   }
   scorer->set_observation(observed);
   std::vector<SilhouetteCounts> counts(particles * cameras.size());
@@ -134,10 +129,10 @@ void score(benchmark::State& state, const std::string& engine, const std::string
   }
   double covered = 0.0;
   for (const auto& count : counts) covered += count.predicted;
-  state.counters["silhouettes/s"] = benchmark::Counter(
-      static_cast<double>(counts.size()), benchmark::Counter::kIsIterationInvariantRate);
-  state.counters["covered_%"] = 100.0 * covered / static_cast<double>(counts.size()) /
-                                (static_cast<double>(size.width) * size.height);
+  state.counters["silhouettes/s"] =
+      benchmark::Counter(static_cast<double>(counts.size()), benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["covered_%"] =
+      100.0 * covered / static_cast<double>(counts.size()) / (static_cast<double>(size.width) * size.height);
 }
 
 void extract(benchmark::State& state, const std::string& triangles) {
@@ -160,10 +155,8 @@ void register_all() {
           if (engine == "naive" && particles > 200) continue;  // minutes, and nobody asks
           const std::string name = engine + "/" + triangles + "/" + std::to_string(size.width) + "x" +
                                    std::to_string(size.height) + "/" + std::to_string(particles);
-          benchmark::RegisterBenchmark(name.c_str(),
-                                       [=](benchmark::State& state) {
-                                         score(state, engine, triangles, size, particles);
-                                       })
+          benchmark::RegisterBenchmark(
+              name.c_str(), [=](benchmark::State& state) { score(state, engine, triangles, size, particles); })
               ->MeasureProcessCPUTime()
               ->Unit(benchmark::kMillisecond);
         }

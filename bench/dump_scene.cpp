@@ -60,9 +60,9 @@ int run(const std::vector<std::string>& arguments) {
     for (const auto j : arm) {
       const auto& joint = robot->joints()[static_cast<std::size_t>(j)];
       const double range = joint.upper_rad - joint.lower_rad;
-      candidate[j] = attempt < 5000 ? joint.lower_rad + uniform(random) * range
-                                    : std::clamp(q[j] + 0.02 * normal(random) * range,
-                                                 joint.lower_rad, joint.upper_rad);
+      candidate[j] = attempt < 5000
+                         ? joint.lower_rad + uniform(random) * range
+                         : std::clamp(q[j] + 0.02 * normal(random) * range, joint.lower_rad, joint.upper_rad);
     }
     const double c = cost(candidate);
     if (c < best) {
@@ -70,8 +70,7 @@ int run(const std::vector<std::string>& arguments) {
       q = candidate;
     }
   }
-  std::fprintf(stderr, "%zu arm joints, hand %.0f mm from where it should be\n", arm.size(),
-               1000.0 * best);
+  std::fprintf(stderr, "%zu arm joints, hand %.0f mm from where it should be\n", arm.size(), 1000.0 * best);
 
   Scene scene;
   std::size_t triangles = 0;
@@ -94,8 +93,7 @@ int run(const std::vector<std::string>& arguments) {
     }
   }
   write_scene(arguments[0], scene);
-  std::fprintf(stderr, "%zu triangles, %zu particles -> %s\n", triangles, kParticles,
-               arguments[0].c_str());
+  std::fprintf(stderr, "%zu triangles, %zu particles -> %s\n", triangles, kParticles, arguments[0].c_str());
   return 0;
 }
 

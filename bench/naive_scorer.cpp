@@ -38,8 +38,7 @@ class NaiveScorer final : public SilhouetteScorer {
     const auto& gl = context_->functions();
     program_ = std::make_unique<gl::Program>(
         gl, "naive",
-        std::initializer_list<gl::Program::Stage>{{GL_VERTEX_SHADER, kVertex},
-                                                  {GL_FRAGMENT_SHADER, kFragment}});
+        std::initializer_list<gl::Program::Stage>{{GL_VERTEX_SHADER, kVertex}, {GL_FRAGMENT_SHADER, kFragment}});
     for (const auto& mesh : model.parts) {
       PartBuffers part;
       part.indices = static_cast<GLsizei>(3 * mesh.triangles.size());
@@ -47,11 +46,11 @@ class NaiveScorer final : public SilhouetteScorer {
       gl.BindVertexArray(part.vertex_array);
       gl.GenBuffers(2, part.buffers);
       gl.BindBuffer(GL_ARRAY_BUFFER, part.buffers[0]);
-      gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.vertices.size() * 12),
-                    mesh.vertices.data(), GL_STATIC_DRAW);
+      gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.vertices.size() * 12), mesh.vertices.data(),
+                    GL_STATIC_DRAW);
       gl.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, part.buffers[1]);
-      gl.BufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.triangles.size() * 12),
-                    mesh.triangles.data(), GL_STATIC_DRAW);
+      gl.BufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.triangles.size() * 12), mesh.triangles.data(),
+                    GL_STATIC_DRAW);
       gl.EnableVertexAttribArray(0);
       gl.VertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 12, nullptr);
       parts_.push_back(part);
@@ -73,8 +72,7 @@ class NaiveScorer final : public SilhouetteScorer {
     const GLenum points[] = {GL_COLOR_ATTACHMENT0, GL_DEPTH_ATTACHMENT};
     for (int i = 0; i < 2; ++i) {
       gl.BindRenderbuffer(GL_RENDERBUFFER, renderbuffers_[i]);
-      gl.RenderbufferStorage(GL_RENDERBUFFER, formats[i], columns_ * tile_width_,
-                             rows_ * tile_height_);
+      gl.RenderbufferStorage(GL_RENDERBUFFER, formats[i], columns_ * tile_width_, rows_ * tile_height_);
       gl.FramebufferRenderbuffer(GL_FRAMEBUFFER, points[i], GL_RENDERBUFFER, renderbuffers_[i]);
     }
     if (gl.CheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
@@ -99,15 +97,13 @@ class NaiveScorer final : public SilhouetteScorer {
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
       for (int v = 0; v < cameras_[c].height; ++v) {
         for (int u = 0; u < cameras_[c].width; ++u) {
-          observed_[c][static_cast<std::size_t>(v * cameras_[c].width + u)] =
-              observed[c].mask.at(u, v) ? 255 : 0;
+          observed_[c][static_cast<std::size_t>(v * cameras_[c].width + u)] = observed[c].mask.at(u, v) ? 255 : 0;
         }
       }
     }
   }
 
-  void score(std::span<const Eigen::Isometry3f> X_CB, std::span<SilhouetteCounts> counts,
-             std::uint32_t) override {
+  void score(std::span<const Eigen::Isometry3f> X_CB, std::span<SilhouetteCounts> counts, std::uint32_t) override {
     const gl::Context::Current current(*context_);
     const auto& gl = context_->functions();
     gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
@@ -137,8 +133,7 @@ class NaiveScorer final : public SilhouetteScorer {
         projection(2, 3) = -2.0 * kFar_m * kNear_m / (kFar_m - kNear_m);
         projection(3, 2) = 1.0;
         for (std::size_t p = 0; p < parts_.size(); ++p) {
-          const Eigen::Matrix4f m =
-              (projection * X_CB[i * parts_.size() + p].matrix().cast<double>()).cast<float>();
+          const Eigen::Matrix4f m = (projection * X_CB[i * parts_.size() + p].matrix().cast<double>()).cast<float>();
           gl.UniformMatrix4fv(uniform, 1, GL_FALSE, m.data());
           gl.BindVertexArray(parts_[p].vertex_array);
           gl.DrawElements(GL_TRIANGLES, parts_[p].indices, GL_UNSIGNED_INT, nullptr);
@@ -171,9 +166,7 @@ class NaiveScorer final : public SilhouetteScorer {
   BinaryMask render(std::span<const Eigen::Isometry3f>, std::size_t) override {
     throw std::logic_error("naive: only counts are needed");
   }
-  [[nodiscard]] std::string description() const override {
-    return "naive on " + context_->description();
-  }
+  [[nodiscard]] std::string description() const override { return "naive on " + context_->description(); }
 
  private:
   std::vector<PinholeIntrinsics> cameras_;

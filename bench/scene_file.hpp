@@ -24,9 +24,7 @@ struct Scene {
   std::vector<PinholeIntrinsics> cameras;
   std::vector<Eigen::Isometry3f> X_CB;
 
-  [[nodiscard]] std::size_t particles() const {
-    return X_CB.size() / (model.parts.size() * cameras.size());
-  }
+  [[nodiscard]] std::size_t particles() const { return X_CB.size() / (model.parts.size() * cameras.size()); }
 };
 
 namespace detail {
@@ -49,10 +47,9 @@ void get(std::istream& in, T* data, std::size_t count) {
 inline void write_scene(const std::string& file, const Scene& scene) {
   std::ofstream out(file, std::ios::binary);
   out << detail::kSceneMagic;
-  const std::uint32_t header[] = {static_cast<std::uint32_t>(scene.cameras.size()),
-                                  static_cast<std::uint32_t>(scene.model.parts.size()),
-                                  static_cast<std::uint32_t>(scene.particles()),
-                                  scene.model.culling == FaceCulling::kBack ? 1u : 0u};
+  const std::uint32_t header[] = {
+      static_cast<std::uint32_t>(scene.cameras.size()), static_cast<std::uint32_t>(scene.model.parts.size()),
+      static_cast<std::uint32_t>(scene.particles()), scene.model.culling == FaceCulling::kBack ? 1u : 0u};
   detail::put(out, header, 4);
   for (const auto& k : scene.cameras) {
     const double values[] = {k.fx, k.fy, k.cx, k.cy};
@@ -80,9 +77,8 @@ inline Scene read_scene(const std::string& file) {
   detail::get(in, magic.data(), magic.size());
   std::uint32_t header[4] = {0, 0, 0, 0};
   detail::get(in, header, 4);
-  const bool plausible = in && magic == detail::kSceneMagic && header[0] >= 1 && header[0] <= 32 &&
-                         header[1] >= 1 && header[1] <= 10000 && header[2] >= 1 &&
-                         header[2] <= 1000000;
+  const bool plausible = in && magic == detail::kSceneMagic && header[0] >= 1 && header[0] <= 32 && header[1] >= 1 &&
+                         header[1] <= 10000 && header[2] >= 1 && header[2] <= 1000000;
   if (!plausible) throw std::runtime_error(file + " is not a scene written by dump_scene");
   Scene scene;
   scene.model.culling = header[3] == 1 ? FaceCulling::kBack : FaceCulling::kNone;

@@ -27,9 +27,7 @@ void add_diagnose(CLI::App& app) {
   command->add_option("--picture-rate", a->rate_hz, "Pictures used per second and camera")
       ->capture_default_str()
       ->check(CLI::Range(0.5, 120.0));
-  command->add_option("--threads", a->threads, "Worker threads")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 256));
+  command->add_option("--threads", a->threads, "Worker threads")->capture_default_str()->check(CLI::Range(1, 256));
   a->common.add_to(*command);
   command->callback([a] {
     const Configuration configuration = a->common.load();
@@ -46,9 +44,9 @@ void add_diagnose(CLI::App& app) {
     const auto report = diagnose_log(configuration, options);
     std::printf("%s\n", report.sentence.c_str());
     for (const auto& warning : report.warnings) std::printf("note: %s\n", warning.c_str());
-    std::printf("held out: %.3f -> %.3f px, hand %.2f -> %.2f mm, %.2f -> %.2f deg\n",
-                report.before.rms_px, report.after.rms_px, report.before.hand_mm,
-                report.after.hand_mm, report.before.hand_deg, report.after.hand_deg);
+    std::printf("held out: %.3f -> %.3f px, hand %.2f -> %.2f mm, %.2f -> %.2f deg\n", report.before.rms_px,
+                report.after.rms_px, report.before.hand_mm, report.after.hand_mm, report.before.hand_deg,
+                report.after.hand_deg);
     std::printf("not testable with this log: %zu causes; report.html, report.json and extended_model.yaml in %s\n",
                 report.not_testable.size(), a->out.c_str());
   });

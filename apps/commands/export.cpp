@@ -17,8 +17,8 @@ void add_export(CLI::App& app) {
     bool anyway = false;
   };
   auto a = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand(
-      "export", "Write a result as corrected URDF, YAML by joint and iCub calibrationDelta");
+  CLI::App* command =
+      app.add_subcommand("export", "Write a result as corrected URDF, YAML by joint and iCub calibrationDelta");
   command->footer(
       "Example:\n  bodyschema export out/reach/summary.json --config config/icub_right/estimator.yaml --out out/apply");
   command->add_option("summary", a->summary, "summary.json of a replay")->required();

@@ -13,17 +13,15 @@ void add_fleet(CLI::App& app) {
     std::string out;
   };
   auto a = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand(
-      "fleet-report", "One report on many diagnosed logs: which robot, which cause, how it moved");
+  CLI::App* command =
+      app.add_subcommand("fleet-report", "One report on many diagnosed logs: which robot, which cause, how it moved");
   command->footer(
       "Example:\n"
       "  snakemake -s /usr/share/bodyschema/workflow/Snakefile --cores 4 --config logs=logs "
       "out=fleet\n"
       "diagnoses all logs of a folder and runs bodyschema fleet-report fleet/robots --out fleet at "
       "its end.");
-  command
-      ->add_option("results", a->results,
-                   "Folder with <robot>/<log>/: info.json, outcome.txt, report.json")
+  command->add_option("results", a->results, "Folder with <robot>/<log>/: info.json, outcome.txt, report.json")
       ->required();
   command->add_option("-o,--out", a->out, "Folder for report.html and fleet.json")->required();
   command->callback([a] {

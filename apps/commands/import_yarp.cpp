@@ -20,16 +20,14 @@ void add_import_yarp(CLI::App& app) {
     std::string log_level = "info";
   };
   auto a = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("import-yarp", "Turn a YARP dataplayer recording into an LCM log");
+  CLI::App* command = app.add_subcommand("import-yarp", "Turn a YARP dataplayer recording into an LCM log");
   command->footer(
       "Example:\n  bodyschema import-yarp recording/yarp --config config/icub_unity/estimator.yaml "
       "--out recording.log\n\nThe recording holds one folder per port with data.log and info.log; the "
       "section\nyarp_import of the configuration says which column is which joint. Bad lines and "
       "pictures\nare left out and counted, up to 5 % of a folder's.");
   command->add_option("recording", a->recording, "Folder of the recording")->required();
-  command->add_option("-c,--config", a->config, "Configuration file with the section yarp_import")
-      ->required();
+  command->add_option("-c,--config", a->config, "Configuration file with the section yarp_import")->required();
   command->add_option("-o,--out", a->out, "LCM log to write")->required();
   command->add_option("--set", a->overrides, "Override one key: --set bus.channel_prefix=LAB (repeatable)");
   command->add_option("--log-level", a->log_level, "trace, debug, info, warn, error or off")

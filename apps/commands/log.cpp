@@ -20,33 +20,28 @@ void add_info(CLI::App& log) {
     bool json = false;
   };
   auto a = std::make_shared<Arguments>();
-  CLI::App* command =
-      log.add_subcommand("info", "Say what a log holds: channels, rates, gaps, pictures, motion");
+  CLI::App* command = log.add_subcommand("info", "Say what a log holds: channels, rates, gaps, pictures, motion");
   command->footer(
       "Examples:\n"
       "  bodyschema log info reach.lcmlog\n"
       "  bodyschema log info reach.lcmlog --config config/icub_right/estimator.yaml");
   command->add_option("log", a->log, "LCM log")->required();
-  command->add_option("-c,--config", a->config,
-                      "Say too what a diagnosis of this robot could test with the log");
-  command->add_option("--set", a->overrides,
-                      "Override one key: --set bus.channel_prefix=LAB (repeatable)");
+  command->add_option("-c,--config", a->config, "Say too what a diagnosis of this robot could test with the log");
+  command->add_option("--set", a->overrides, "Override one key: --set bus.channel_prefix=LAB (repeatable)");
   command->add_flag("--json", a->json, "Print JSON, without what a diagnosis could test");
   command->callback([a] {
     set_up_logging("warn");
     const LogSummary summary = summarise_log(a->log);
     std::fputs((a->json ? summary.json() : summary.text()).c_str(), stdout);
     if (a->config.empty() || a->json) return;
-    const Configuration configuration =
-        Configuration::load(find_data_file(a->config), a->overrides);
+    const Configuration configuration = Configuration::load(find_data_file(a->config), a->overrides);
     std::printf("\n%s", testability_of(configuration, a->log).text().c_str());
   });
 }
 
 void add_to_mcap(CLI::App& log) {
   auto options = std::make_shared<McapExportOptions>();
-  CLI::App* command =
-      log.add_subcommand("to-mcap", "Rewrite a log as MCAP, for Foxglove and PlotJuggler");
+  CLI::App* command = log.add_subcommand("to-mcap", "Rewrite a log as MCAP, for Foxglove and PlotJuggler");
   command->footer(
       "Example:\n"
       "  bodyschema log to-mcap reach.lcmlog --out reach.mcap\n"
@@ -54,20 +49,17 @@ void add_to_mcap(CLI::App& log) {
   command->add_option("log", options->log, "LCM log")->required();
   command->add_option("-o,--out", options->out, "MCAP file to write")->required();
   command
-      ->add_option("--jpeg-quality", options->jpeg_quality,
-                   "Of pictures that were not compressed already (default 90)")
+      ->add_option("--jpeg-quality", options->jpeg_quality, "Of pictures that were not compressed already (default 90)")
       ->check(CLI::Range(1, 100));
   command->callback([options] {
     set_up_logging("warn");
     const McapExportSummary summary = export_mcap(*options);
     std::printf("%s: %.1f MB\n", options->out.c_str(), 1e-6 * static_cast<double>(summary.bytes));
     for (const auto& [topic, count] : summary.messages) {
-      std::printf("  %-36s %8llu messages\n", topic.c_str(),
-                  static_cast<unsigned long long>(count));
+      std::printf("  %-36s %8llu messages\n", topic.c_str(), static_cast<unsigned long long>(count));
     }
     if (summary.unreadable > 0) {
-      std::printf("left out because they cannot be read: %llu\n",
-                  static_cast<unsigned long long>(summary.unreadable));
+      std::printf("left out because they cannot be read: %llu\n", static_cast<unsigned long long>(summary.unreadable));
     }
     if (summary.unknown > 0) {
       std::printf("left out because their type is not known here: %llu\n",
@@ -79,8 +71,7 @@ void add_to_mcap(CLI::App& log) {
 }  // namespace
 
 void add_log(CLI::App& app) {
-  CLI::App* log =
-      app.add_subcommand("log", "Look into a recorded log, or rewrite it for other tools");
+  CLI::App* log = app.add_subcommand("log", "Look into a recorded log, or rewrite it for other tools");
   log->footer("Example:\n  bodyschema log info reach.lcmlog");
   log->require_subcommand(1);
   add_info(*log);

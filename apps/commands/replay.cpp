@@ -27,16 +27,15 @@ void add_replay(CLI::App& app) {
       "Exit status: 0 when the log was read to its end, converged or not; the last lines and\n"
       "summary.json (estimate.state) say how it ended, and bodyschema export refuses the latter.");
   command->add_option("log", a->log, "LCM log")->required();
-  command->add_option("-o,--out", a->out, "Folder for estimates.jsonl, summary.json and pictures")
-      ->required();
+  command->add_option("-o,--out", a->out, "Folder for estimates.jsonl, summary.json and pictures")->required();
   command->add_option("--truth", a->truth, "Ground truth (JSON): adds errors to the results");
   command->add_option("--overlays", a->overlays, "Overlay pictures spread over the log")
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));
   command->add_flag("--masks", a->masks, "Write the observed masks too");
-  CLI::Option* online = command->add_flag(
-      "--learn-background-online", a->learn_online,
-      "Learn the background from the first pictures, as bodyschemad does, not from the whole log");
+  CLI::Option* online =
+      command->add_flag("--learn-background-online", a->learn_online,
+                        "Learn the background from the first pictures, as bodyschemad does, not from the whole log");
   command->add_flag("--learn-background-first", a->learn_first)->group("")->excludes(online);
   a->common.add_to(*command);
   a->common.add_extended_model_to(*command);

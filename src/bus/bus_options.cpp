@@ -37,14 +37,15 @@ BusOptions BusOptions::from(const Configuration& bus) {
   JointHistoryOptions& joints = sync.joints;
   joints.max_gap = milliseconds(bus, "max_encoder_gap_ms", joints.max_gap, 1e5);
   joints.max_still_gap = milliseconds(bus, "max_still_encoder_gap_ms", joints.max_still_gap, 1e5);
-  joints.max_speed_rad_s =
-      radians(bus.number_or("max_joint_speed_deg_s", degrees(joints.max_speed_rad_s), 0.0, 1e6));
+  joints.max_speed_rad_s = radians(bus.number_or("max_joint_speed_deg_s", degrees(joints.max_speed_rad_s), 0.0, 1e6));
   joints.samples = static_cast<int>(bus.integer_or("encoder_samples", joints.samples, 2, 1'000'000));
   joints.velocity_from_differences =
       bus.choice_or("joint_velocity", "published", {"published", "differences"}) == "differences";
   options.limits.max_joints = static_cast<int>(bus.integer_or("max_joints", options.limits.max_joints, 1, 32'767));
-  options.limits.max_width_px = static_cast<int>(bus.integer_or("max_width_px", options.limits.max_width_px, 1, 32'768));
-  options.limits.max_height_px = static_cast<int>(bus.integer_or("max_height_px", options.limits.max_height_px, 1, 32'768));
+  options.limits.max_width_px =
+      static_cast<int>(bus.integer_or("max_width_px", options.limits.max_width_px, 1, 32'768));
+  options.limits.max_height_px =
+      static_cast<int>(bus.integer_or("max_height_px", options.limits.max_height_px, 1, 32'768));
   const double silence_s = bus.number_or("one_source_silence_s", 2.0, 0.1, 3600.0);
   if (bus.boolean_or("one_source", false)) options.one_source_silence_s = silence_s;
   options.queue_frames = static_cast<int>(bus.integer_or("queue_frames", options.queue_frames, 1, 10'000));

@@ -98,8 +98,8 @@ void GuardedReceiver::work() {
     if (poll(&ready, 1, kPoll_ms) <= 0) continue;
     sockaddr_in from{};
     socklen_t length = sizeof from;
-    const ssize_t bytes = recvfrom(socket_, packet.data(), packet.size(), MSG_DONTWAIT,
-                                   reinterpret_cast<sockaddr*>(&from), &length);
+    const ssize_t bytes =
+        recvfrom(socket_, packet.data(), packet.size(), MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &length);
     if (bytes <= 0) continue;
     try {
       auto message = assembler.take(Bytes(packet.data(), static_cast<std::size_t>(bytes)),

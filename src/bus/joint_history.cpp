@@ -12,7 +12,7 @@ constexpr double kShortestStep_s = 0.010;
 /// Readings this close are the same: a joint at rest.
 constexpr double kStill_rad = 2e-4;
 constexpr Microseconds kRestless = 100'000;
-}
+}  // namespace
 
 JointHistory::JointHistory(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad,
                            const JointHistoryOptions& options)

@@ -85,8 +85,8 @@ Step read_pixels(jpeg_decompress_struct& jpeg, Reporter& reporter, jpeg_progress
   return reporter.doubtful ? Step::kBroken : Step::kDone;
 }
 
-bool write_pixels(jpeg_compress_struct& jpeg, Reporter& reporter, const Image& image, int quality,
-                  unsigned char*& file, unsigned long& size) {
+bool write_pixels(jpeg_compress_struct& jpeg, Reporter& reporter, const Image& image, int quality, unsigned char*& file,
+                  unsigned long& size) {
   if (setjmp(reporter.escape) != 0) return false;
   jpeg_create_compress(&jpeg);
   jpeg_mem_dest(&jpeg, &file, &size);

@@ -13,10 +13,9 @@ namespace bodyschema {
 
 namespace {
 std::string network_advice(const std::string& url) {
-  return url.rfind("udpm", 0) == 0
-             ? "; is there a route for multicast? (ip link set lo multicast on; "
-               "ip route add 224.0.0.0/4 dev lo)"
-             : "";
+  return url.rfind("udpm", 0) == 0 ? "; is there a route for multicast? (ip link set lo multicast on; "
+                                     "ip route add 224.0.0.0/4 dev lo)"
+                                   : "";
 }
 }  // namespace
 
@@ -26,7 +25,8 @@ struct LcmLink::Subscriber {
   /// -fsanitize=undefined calls LCM's pointer to one on a null object.
   static void receive(const lcm::ReceiveBuffer* buffer, const std::string& channel, Subscriber* self) {
     try {
-      self->handler(channel, Bytes(static_cast<const std::uint8_t*>(buffer->data), buffer->data_size), buffer->recv_utime);
+      self->handler(channel, Bytes(static_cast<const std::uint8_t*>(buffer->data), buffer->data_size),
+                    buffer->recv_utime);
     } catch (const std::exception& e) {
       spdlog::error("{}: message could not be handled: {}", channel, e.what());
     } catch (...) {
@@ -63,9 +63,13 @@ void LcmLink::subscribe(const std::string& channel, int queue_messages, Handler 
   subscribers_.push_back(std::move(subscriber));
 }
 
-RefusedSources LcmLink::refused_sources() const { return guarded_ ? guarded_->refused() : RefusedSources{}; }
+RefusedSources LcmLink::refused_sources() const {
+  return guarded_ ? guarded_->refused() : RefusedSources{};
+}
 
-LostMessages LcmLink::lost() const { return guarded_ ? guarded_->lost() : LostMessages{}; }
+LostMessages LcmLink::lost() const {
+  return guarded_ ? guarded_->lost() : LostMessages{};
+}
 
 bool LcmLink::handle(int timeout_ms) {
   if (guarded_) return guarded_->handle(timeout_ms);

@@ -56,8 +56,7 @@ bool plausible(const Header& header, std::uint64_t available, Lengths& lengths) 
 }
 
 bool printable(const std::string& channel) {
-  return std::all_of(channel.begin(), channel.end(),
-                     [](unsigned char c) { return c > 0x20 && c < 0x7f; });
+  return std::all_of(channel.begin(), channel.end(), [](unsigned char c) { return c > 0x20 && c < 0x7f; });
 }
 
 /// Whether another event begins there, as far as the file goes.
@@ -93,10 +92,8 @@ bool LogReader::next(LogEvent& event) {
   while (true) {
     const std::uint64_t start = position_;
     switch (read_event(event)) {
-      case Outcome::kEvent:
-        return true;
-      case Outcome::kEnd:
-        return false;
+      case Outcome::kEvent: return true;
+      case Outcome::kEnd: return false;
       case Outcome::kDamaged:
         if (!find_event(start + 1)) position_ = size_;
         report_damage(start, position_);
@@ -124,8 +121,8 @@ LogReader::Outcome LogReader::read_event(LogEvent& event) {
     return Outcome::kDamaged;
   }
   event.number = static_cast<std::int64_t>(get<std::uint64_t>(header.data() + 4));
-  event.time_us = std::clamp(static_cast<Microseconds>(get<std::uint64_t>(header.data() + 12)), -kLatestStamp,
-                             kLatestStamp);
+  event.time_us =
+      std::clamp(static_cast<Microseconds>(get<std::uint64_t>(header.data() + 12)), -kLatestStamp, kLatestStamp);
   event.channel.resize(lengths.channel);
   if (std::fread(event.channel.data(), 1, lengths.channel, stream_.get()) != lengths.channel ||
       !printable(event.channel)) {
@@ -187,7 +184,9 @@ LogWriter::LogWriter(std::filesystem::path file) : file_(std::move(file)) {
   if (descriptor_ < 0) throw FileError(file_.string() + ": log cannot be created: " + std::strerror(errno));
 }
 
-LogWriter::~LogWriter() { ::close(descriptor_); }
+LogWriter::~LogWriter() {
+  ::close(descriptor_);
+}
 
 void LogWriter::publish(const std::string& channel, Microseconds time_us, Bytes message) {
   if (failed_) throw DeviceError(file_.string() + ": recording stopped after a failed write");

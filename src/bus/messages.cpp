@@ -13,8 +13,8 @@ namespace bodyschema {
 
 namespace {
 
-constexpr std::size_t kMinText = 5;         // length word and terminating zero
-constexpr int kMaxParameters = 4096;        // joints' offsets are few; extended models hold more
+constexpr std::size_t kMinText = 5;   // length word and terminating zero
+constexpr int kMaxParameters = 4096;  // joints' offsets are few; extended models hold more
 constexpr int kMaxStatusEntries = 4096;
 
 /// Sentences and names of renderers are longer than joint names.
@@ -53,9 +53,8 @@ std::string size_text(int width, int height) {
 
 std::string_view name_of(MessageFault fault) {
   static constexpr std::array<std::string_view, kMessageFaultCount> kNames{
-      "none",      "wrong_type", "truncated",  "trailing_bytes",     "bad_count",     "too_large",
-      "bad_text",  "bad_stamp",  "not_finite", "wrong_size",         "unsupported_format",
-      "broken_picture", "other_kind"};
+      "none",      "wrong_type", "truncated",  "trailing_bytes",     "bad_count",      "too_large", "bad_text",
+      "bad_stamp", "not_finite", "wrong_size", "unsupported_format", "broken_picture", "other_kind"};
   return kNames[static_cast<std::size_t>(fault)];
 }
 
@@ -63,8 +62,8 @@ DecodeResult decode(Bytes message, JointStateMessage& out, const DecodeLimits& l
   WireReader in(message, limits);
   in.fingerprint(bot_core::joint_state_t::getHash());
   out.utime = in.stamp("utime");
-  const auto n = static_cast<std::size_t>(in.count<std::int16_t>(
-      "num_joints", std::min(limits.max_joints, 32767), kMinText + 3 * sizeof(float)));
+  const auto n = static_cast<std::size_t>(
+      in.count<std::int16_t>("num_joints", std::min(limits.max_joints, 32767), kMinText + 3 * sizeof(float)));
   in.texts("joint_name", out.names, static_cast<int>(n));
   const auto read = [&](const char* field, std::vector<float>& values) {
     values.resize(n);
@@ -113,8 +112,7 @@ DecodeResult decode(Bytes message, joint_offsets_t& out, const DecodeLimits& giv
   out.num_particles = in.integer<std::int32_t>();
   out.effective_sample_size = in.float64();
   out.best_likelihood = in.float64();
-  const int cameras = out.num_cameras =
-      in.count<std::int32_t>("num_cameras", limits.max_images, kMinText + 7 * 8);
+  const int cameras = out.num_cameras = in.count<std::int32_t>("num_cameras", limits.max_images, kMinText + 7 * 8);
   in.texts("camera_name", out.camera_name, cameras);
   out.hand_pose_in_camera.resize(static_cast<std::size_t>(in.ok() ? cameras : 0));
   for (auto& pose : out.hand_pose_in_camera) read_pose(in, pose);
@@ -145,20 +143,17 @@ DecodeResult decode(Bytes message, offsets_status_t& out, const DecodeLimits& gi
   out.frame_rate_hz = in.float64();
   out.image_age_ms = in.float64();
   out.encoder_lag_ms = in.float64();
-  const int counters = out.num_counters =
-      in.count<std::int32_t>("num_counters", kMaxStatusEntries, kMinText + 8);
+  const int counters = out.num_counters = in.count<std::int32_t>("num_counters", kMaxStatusEntries, kMinText + 8);
   in.texts("counter_name", out.counter_name, counters);
   out.counter_value.resize(static_cast<std::size_t>(in.ok() ? counters : 0));
   for (auto& value : out.counter_value) value = in.integer<std::int64_t>();
-  const int bins = out.num_latency_bins =
-      in.count<std::int32_t>("num_latency_bins", kMaxStatusEntries, 16);
+  const int bins = out.num_latency_bins = in.count<std::int32_t>("num_latency_bins", kMaxStatusEntries, 16);
   in.doubles(out.latency_bin_upper_ms, bins);
   out.latency_count.resize(static_cast<std::size_t>(in.ok() ? bins : 0));
   for (auto& value : out.latency_count) value = in.integer<std::int64_t>();
   out.latency_median_ms = in.float64();
   out.latency_p99_ms = in.float64();
-  const int stages = out.num_stages =
-      in.count<std::int32_t>("num_stages", kMaxStatusEntries, kMinText + 16);
+  const int stages = out.num_stages = in.count<std::int32_t>("num_stages", kMaxStatusEntries, kMinText + 16);
   in.texts("stage_name", out.stage_name, stages);
   in.doubles(out.stage_median_ms, stages);
   in.doubles(out.stage_p99_ms, stages);
@@ -200,9 +195,8 @@ DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limit
   const std::int64_t whole = stride * view.height;
   const auto held = static_cast<std::int64_t>(view.data.size());
   if (stride < static_cast<std::int64_t>(row_bytes) || held < needed || held > whole) {
-    return {MessageFault::kWrongSize, std::to_string(held) + " bytes for " +
-                                          size_text(view.width, view.height) + " with rows of " +
-                                          std::to_string(view.row_stride) + " bytes"};
+    return {MessageFault::kWrongSize, std::to_string(held) + " bytes for " + size_text(view.width, view.height) +
+                                          " with rows of " + std::to_string(view.row_stride) + " bytes"};
   }
   out.width = view.width;
   out.height = view.height;

@@ -45,12 +45,12 @@ Image read_netpbm(const std::filesystem::path& file) {
   const int largest = header_number(in);
   if (width < 1 || height < 1 || width > kMaxSide_px || height > kMaxSide_px || largest != 255) {
     throw FileError(file.string() + ": header says " + std::to_string(width) + "x" + std::to_string(height) +
-                    " with values up to " + std::to_string(largest) + "; expected 1 to " +
-                    std::to_string(kMaxSide_px) + " px a side and 255");
+                    " with values up to " + std::to_string(largest) + "; expected 1 to " + std::to_string(kMaxSide_px) +
+                    " px a side and 255");
   }
   const int channels = kind == '6' ? 3 : 1;
-  const auto size = static_cast<std::uintmax_t>(width) * static_cast<std::uintmax_t>(height) *
-                    static_cast<std::uintmax_t>(channels);
+  const auto size =
+      static_cast<std::uintmax_t>(width) * static_cast<std::uintmax_t>(height) * static_cast<std::uintmax_t>(channels);
   std::error_code error;
   const auto held = std::filesystem::file_size(file, error);
   const auto begin = in.tellg();

@@ -75,14 +75,14 @@ std::vector<std::pair<std::string, std::uint64_t>> BusStatistics::counters() con
 ObservationStream::ObservationStream(const std::vector<std::string>& joint_names,
                                      const std::map<std::string, double>& fixed_rad,
                                      const std::vector<CameraModel>& cameras, const BusOptions& options)
-    : options_(options),
-      channels_(options.channels()),
+    : options_(options), channels_(options.channels()),
       synchroniser_(joint_names, fixed_rad, static_cast<int>(cameras.size()), options.synchroniser),
       assembler_(joint_names, fixed_rad) {
   for (const CameraModel& camera : cameras) {
     const bool left = camera.name == "left";
     if ((!left && camera.name != "right") || cameras.size() > 2 || (!cameras_.empty() && left)) {
-      throw ConfigurationError("cameras: '" + camera.name + "': a rig is one camera named left or right, or both, left first");
+      throw ConfigurationError("cameras: '" + camera.name +
+                               "': a rig is one camera named left or right, or both, left first");
     }
     cameras_.push_back({camera.name, left ? bot_core::images_t::LEFT : bot_core::images_t::RIGHT,
                         camera.intrinsics.width, camera.intrinsics.height, 0, false, 0});
@@ -162,9 +162,9 @@ void ObservationStream::receive_images(Bytes message, std::int64_t arrival_us) {
       StampedImage image;
       DecodeResult unpacked;
       if (view.width != camera.width || view.height != camera.height) {
-        unpacked = {MessageFault::kWrongSize,
-                    "picture of " + std::to_string(view.width) + "x" + std::to_string(view.height) +
-                        ", configured are " + std::to_string(camera.width) + "x" + std::to_string(camera.height)};
+        unpacked = {MessageFault::kWrongSize, "picture of " + std::to_string(view.width) + "x" +
+                                                  std::to_string(view.height) + ", configured are " +
+                                                  std::to_string(camera.width) + "x" + std::to_string(camera.height)};
       } else {
         unpacked = unpack(view, image.image, options_.limits);
         if (unpacked.ok()) unpacked = admit_kind(camera, image.image.channels);

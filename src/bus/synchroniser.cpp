@@ -11,9 +11,9 @@ constexpr int kStepEvidence = 3;
 }  // namespace
 
 std::string_view name_of(DropReason reason) {
-  static constexpr std::array<std::string_view, kDropReasonCount> kNames{
-      "unpaired",   "no_encoders", "missing_joint", "encoder_gap", "encoder_jump",
-      "clock_step", "overload",    "out_of_order",  "duplicate"};
+  static constexpr std::array<std::string_view, kDropReasonCount> kNames{"unpaired",    "no_encoders",  "missing_joint",
+                                                                         "encoder_gap", "encoder_jump", "clock_step",
+                                                                         "overload",    "out_of_order", "duplicate"};
   return kNames[static_cast<std::size_t>(reason)];
 }
 
@@ -26,7 +26,9 @@ Microseconds Synchroniser::Camera::shortest_interval() const {
   return *std::min_element(intervals.begin(), intervals.end());
 }
 
-Microseconds Synchroniser::Instant::utime() const { return images[0] ? images[0]->utime : images[1]->utime; }
+Microseconds Synchroniser::Instant::utime() const {
+  return images[0] ? images[0]->utime : images[1]->utime;
+}
 
 std::uint64_t Synchroniser::Instant::count() const {
   return static_cast<std::uint64_t>(images[0].has_value()) + static_cast<std::uint64_t>(images[1].has_value());
@@ -34,8 +36,7 @@ std::uint64_t Synchroniser::Instant::count() const {
 
 Synchroniser::Synchroniser(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad,
                            int cameras, const SynchroniserOptions& options)
-    : options_(options),
-      history_(std::move(joint_names), fixed_rad, options.joints),
+    : options_(options), history_(std::move(joint_names), fixed_rad, options.joints),
       cameras_(static_cast<std::size_t>(std::clamp(cameras, 1, 2))) {
   options_.camera_wait = std::max(options_.camera_wait, options_.pairing_window);
   options_.max_waiting = std::max(options_.max_waiting, 1);
@@ -57,15 +58,9 @@ void Synchroniser::add(const JointStateMessage& message) {
       ++statistics_.joint_messages;
       resolve(false);
       break;
-    case JointHistory::Arrival::kDuplicate:
-      ++statistics_.joint_messages_duplicate;
-      break;
-    case JointHistory::Arrival::kOlder:
-      ++statistics_.joint_messages_out_of_order;
-      break;
-    case JointHistory::Arrival::kNoKnownJoint:
-      ++statistics_.joint_messages_without_known_joint;
-      break;
+    case JointHistory::Arrival::kDuplicate: ++statistics_.joint_messages_duplicate; break;
+    case JointHistory::Arrival::kOlder: ++statistics_.joint_messages_out_of_order; break;
+    case JointHistory::Arrival::kNoKnownJoint: ++statistics_.joint_messages_without_known_joint; break;
   }
 }
 
@@ -208,8 +203,7 @@ void Synchroniser::resolve(bool finishing) {
       statistics_.blocking_joint = answer.joint;
     }
     switch (answer.verdict) {
-      case Verdict::kReady:
-        break;
+      case Verdict::kReady: break;
       case Verdict::kNotYet: {
         if (!finishing && newest_image_ - utime <= options_.encoder_wait) return;
         statistics_.blocking_joint = answer.joint;
@@ -218,15 +212,9 @@ void Synchroniser::resolve(bool finishing) {
         drop(instant, others_go_on ? DropReason::kMissingJoint : DropReason::kNoEncoders);
         continue;
       }
-      case Verdict::kTooOld:
-        drop(instant, DropReason::kNoEncoders);
-        continue;
-      case Verdict::kGap:
-        drop(instant, DropReason::kEncoderGap);
-        continue;
-      case Verdict::kJump:
-        drop(instant, DropReason::kEncoderJump);
-        continue;
+      case Verdict::kTooOld: drop(instant, DropReason::kNoEncoders); continue;
+      case Verdict::kGap: drop(instant, DropReason::kEncoderGap); continue;
+      case Verdict::kJump: drop(instant, DropReason::kEncoderJump); continue;
     }
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
       if (!instant.images[c]) continue;
@@ -277,7 +265,9 @@ void Synchroniser::start_anew() {
   older_joints_in_a_row_ = 0;
 }
 
-void Synchroniser::drop(const Instant& instant, DropReason reason) { count_dropped(reason, instant.count()); }
+void Synchroniser::drop(const Instant& instant, DropReason reason) {
+  count_dropped(reason, instant.count());
+}
 
 void Synchroniser::count_dropped(DropReason reason, std::uint64_t images) {
   statistics_.images_dropped[static_cast<std::size_t>(reason)] += images;

@@ -23,8 +23,9 @@ std::uint32_t u16(Bytes packet, std::size_t at) {
 
 /// Cuts the channel's name and its NUL off the front.
 std::optional<std::string> take_channel(Bytes& rest) {
-  const auto end = std::find(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(std::min(rest.size(), kMaxChannel + 1)),
-                             std::uint8_t{0});
+  const auto end =
+      std::find(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(std::min(rest.size(), kMaxChannel + 1)),
+                std::uint8_t{0});
   const auto length = static_cast<std::size_t>(end - rest.begin());
   if (length > kMaxChannel || length >= rest.size()) return std::nullopt;
   std::string channel(rest.begin(), end);
@@ -67,8 +68,8 @@ std::optional<UdpmAssembler::Message> UdpmAssembler::take_fragment(Bytes packet,
   if (offset > size || rest.size() > size - offset) return std::nullopt;
 
   auto at = pending_.find(sender);
-  if (at != pending_.end() && (at->second.sequence != sequence || at->second.size != size ||
-                               at->second.fragments != fragments)) {
+  if (at != pending_.end() &&
+      (at->second.sequence != sequence || at->second.size != size || at->second.fragments != fragments)) {
     // A sender's numbers rise (and wrap): what comes late belongs to a message given up before.
     if (static_cast<std::int32_t>(sequence - at->second.sequence) < 0) return std::nullopt;
     give_up(at);

@@ -48,8 +48,7 @@ void WireReader::text(const char* field, std::string& out) {
   if (!ok()) return;
   const Bytes content = raw(static_cast<std::size_t>(n));
   const auto printable = [](std::uint8_t c) { return c >= 0x20 && c != 0x7f; };
-  if (content.empty() || content.back() != 0 ||
-      !std::all_of(content.begin(), content.end() - 1, printable)) {
+  if (content.empty() || content.back() != 0 || !std::all_of(content.begin(), content.end() - 1, printable)) {
     return fail(MessageFault::kBadText, std::string(field) + " is not a printable, terminated string");
   }
   out.assign(reinterpret_cast<const char*>(content.data()), content.size() - 1);
@@ -75,8 +74,7 @@ Bytes WireReader::raw(std::size_t n) {
 
 DecodeResult WireReader::finish() {
   if (ok() && position_ != bytes_.size()) {
-    fail(MessageFault::kTrailingBytes,
-         std::to_string(bytes_.size() - position_) + " bytes follow its end");
+    fail(MessageFault::kTrailingBytes, std::to_string(bytes_.size() - position_) + " bytes follow its end");
   }
   return std::move(result_);
 }

@@ -20,8 +20,7 @@ class WireReader {
   void fingerprint(std::int64_t expected);
 
   template <class Integer>
-    requires std::integral<Integer>
-  Integer integer() {
+  requires std::integral<Integer> Integer integer() {
     using Unsigned = std::make_unsigned_t<Integer>;
     if (!need(sizeof(Integer))) return 0;
     Unsigned value = 0;

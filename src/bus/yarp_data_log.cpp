@@ -76,7 +76,8 @@ bool is_second_stamp(const std::string& first, const std::string& second) {
 
 /// YARP writes lists in parentheses, which carry nothing here.
 std::vector<std::string> split(std::string text) {
-  std::replace_if(text.begin(), text.end(), [](char c) { return c == '(' || c == ')' || c == '\r' || c == '\t'; }, ' ');
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '(' || c == ')' || c == '\r' || c == '\t'; }, ' ');
   std::vector<std::string> words;
   for (std::size_t at = 0; (at = text.find_first_not_of(' ', at)) != std::string::npos;) {
     const std::size_t end = std::min(text.find(' ', at), text.size());

@@ -24,8 +24,7 @@ constexpr int kMaxSide_px = 4096;  // BusOptions::limits as shipped: what is lar
 /// Encoder rows of one folder as joints in radians.
 class EncoderRows {
  public:
-  EncoderRows(const YarpImportOptions::Encoders& encoders, const YarpImportOptions& options,
-              const YarpDataLog& log)
+  EncoderRows(const YarpImportOptions::Encoders& encoders, const YarpImportOptions& options, const YarpDataLog& log)
       : columns_(log.columns()) {
     const double unit = options.encoders_in_degrees ? radians(1.0) : 1.0;
     const auto column_of = [&](const std::string& name) {
@@ -139,7 +138,8 @@ struct Pictures {
       throw FileError(where + ": '" + name + "' is not the name of a picture in this folder");
     }
     if (name.rfind("frame_", 0) == 0) {
-      throw FileError(where + ": '" + name + "' is a frame of a video, which cannot be read; record with --type image, "
+      throw FileError(where + ": '" + name +
+                      "' is a frame of a video, which cannot be read; record with --type image, "
                       "image_png or image_jpg");
     }
     const auto file = folder / name;
@@ -157,9 +157,9 @@ struct Pictures {
       height = image.height;
       first_where = where;
     } else if (image.width != width || image.height != height) {
-      throw FileError(where + ": " + name + " is " + std::to_string(image.width) + "x" +
-                      std::to_string(image.height) + " px, the pictures before it are " + std::to_string(width) + "x" +
-                      std::to_string(height) + " px (" + first_where + ")");
+      throw FileError(where + ": " + name + " is " + std::to_string(image.width) + "x" + std::to_string(image.height) +
+                      " px, the pictures before it are " + std::to_string(width) + "x" + std::to_string(height) +
+                      " px (" + first_where + ")");
     }
     bot_core::images_t m;
     m.utime = line.utime;
@@ -262,7 +262,8 @@ YarpImportOptions YarpImportOptions::from(const Configuration& yarp_import) {
     for (const std::string& column : factors.keys()) {
       const auto folder = folder_of_column.find(column);
       if (folder == folder_of_column.end()) {
-        combined.fail(joint, "names of columns; '" + column + "' is none, did you mean '" + nearest_name(column, columns) + "'?");
+        combined.fail(
+            joint, "names of columns; '" + column + "' is none, did you mean '" + nearest_name(column, columns) + "'?");
       }
       folders.insert(folder->second);
       entry.factor_of_column[column] = factors.number(column);
@@ -283,7 +284,8 @@ YarpImportOptions YarpImportOptions::from(const Configuration& yarp_import) {
 YarpImportSummary import_yarp(const std::filesystem::path& recording, const YarpImportOptions& options,
                               const Channels& channels, const std::filesystem::path& log,
                               const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
-  if (!std::filesystem::is_directory(recording)) throw FileError(recording.string() + ": no such recording (a folder is expected)");
+  if (!std::filesystem::is_directory(recording))
+    throw FileError(recording.string() + ": no such recording (a folder is expected)");
   YarpImportSummary summary;
   const auto leave_out = [&](const LeftOut& bad, std::uint64_t& count) {
     if (bad.count > 0 && summary.first_bad.empty()) summary.first_bad = bad.first;

@@ -12,7 +12,11 @@ std::int64_t now_us() {
 
 }  // namespace
 
-std::int64_t monotonic_us() { return now_us<std::chrono::steady_clock>(); }
-Microseconds wall_us() { return now_us<std::chrono::system_clock>(); }
+std::int64_t monotonic_us() {
+  return now_us<std::chrono::steady_clock>();
+}
+Microseconds wall_us() {
+  return now_us<std::chrono::system_clock>();
+}
 
 }  // namespace bodyschema

@@ -65,8 +65,7 @@ namespace {
 
 std::string where(const Entry& entry) {
   if (entry.file.empty()) return "configuration";
-  return entry.line > 0 ? entry.file.string() + ":" + std::to_string(entry.line)
-                        : entry.file.string();
+  return entry.line > 0 ? entry.file.string() + ":" + std::to_string(entry.line) : entry.file.string();
 }
 
 std::string shown(const Entry& entry) {
@@ -96,9 +95,8 @@ std::string substitute_environment(const std::string& text, const std::string& p
     } else if (dash != std::string::npos) {
       out += body.substr(dash + 2);
     } else {
-      throw ConfigurationError(place + ": environment variable " + name +
-                               " is not set and '" + text + "' gives no default (${" + name +
-                               ":-default})");
+      throw ConfigurationError(place + ": environment variable " + name + " is not set and '" + text +
+                               "' gives no default (${" + name + ":-default})");
     }
     i = end + 1;
   }
@@ -158,8 +156,7 @@ class Reader {
     try {
       root = YAML::Load(text);
     } catch (const YAML::Exception& e) {
-      throw ConfigurationError(file.string() + ":" + std::to_string(e.mark.line + 1) +
-                               ": not valid YAML: " + e.msg);
+      throw ConfigurationError(file.string() + ":" + std::to_string(e.mark.line + 1) + ": not valid YAML: " + e.msg);
     }
     Entry own;
     own.mapping = true;
@@ -219,8 +216,8 @@ class Reader {
       }
       const std::string key = pair.first.Scalar();
       if (entry.find(key) != nullptr) {
-        throw ConfigurationError(file.string() + ":" + std::to_string(pair.first.Mark().line + 1) +
-                                 ": key '" + key + "' is given twice");
+        throw ConfigurationError(file.string() + ":" + std::to_string(pair.first.Mark().line + 1) + ": key '" + key +
+                                 "' is given twice");
       }
       Entry child = convert(pair.second, file, depth + 1);
       child.line = pair.first.Mark().line + 1;
@@ -282,9 +279,8 @@ void reject_unknown(const Entry& mapping, const std::string& prefix) {
         if (sibling.known) valid.push_back(other);
       }
       const std::string nearest = nearest_name(name, valid);
-      throw ConfigurationError(
-          where(child) + ": unknown key '" + prefix + name + "'" +
-          (nearest.empty() ? "" : "; did you mean '" + prefix + nearest + "'?"));
+      throw ConfigurationError(where(child) + ": unknown key '" + prefix + name + "'" +
+                               (nearest.empty() ? "" : "; did you mean '" + prefix + nearest + "'?"));
     }
     if (child.mapping) reject_unknown(child, prefix + name + ".");
   }
@@ -454,14 +450,11 @@ std::vector<std::string> Configuration::keys() const {
 
 void Configuration::fail(const std::string& key, const std::string& expected) const {
   const Entry* entry = document_->find(prefix_, key);
-  const std::string dotted =
-      prefix_.empty() ? key : (key.empty() ? prefix_ : prefix_ + "." + key);
+  const std::string dotted = prefix_.empty() ? key : (key.empty() ? prefix_ : prefix_ + "." + key);
   if (entry == nullptr) {
-    throw ConfigurationError(where(document_->root) + ": key '" + dotted + "' is missing; expected " +
-                             expected);
+    throw ConfigurationError(where(document_->root) + ": key '" + dotted + "' is missing; expected " + expected);
   }
-  throw ConfigurationError(where(*entry) + ": key '" + dotted + "' is " + shown(*entry) +
-                           "; expected " + expected);
+  throw ConfigurationError(where(*entry) + ": key '" + dotted + "' is " + shown(*entry) + "; expected " + expected);
 }
 
 double Configuration::number(const std::string& key, double min, double max) const {
@@ -473,8 +466,7 @@ double Configuration::number(const std::string& key, double min, double max) con
   fail(key, range_text("a number", min, max));
 }
 
-std::int64_t Configuration::integer(const std::string& key, std::int64_t min,
-                                    std::int64_t max) const {
+std::int64_t Configuration::integer(const std::string& key, std::int64_t min, std::int64_t max) const {
   const Entry* entry = document_->find(prefix_, key);
   if (entry != nullptr && !entry->mapping && entry->leaf.IsScalar()) {
     const std::string& text = entry->leaf.Scalar();
@@ -502,8 +494,7 @@ std::string Configuration::text(const std::string& key) const {
   return substitute_environment(entry->leaf.Scalar(), where(*entry));
 }
 
-std::string Configuration::choice(const std::string& key,
-                                  const std::vector<std::string>& choices) const {
+std::string Configuration::choice(const std::string& key, const std::vector<std::string>& choices) const {
   const Entry* entry = document_->find(prefix_, key);
   if (entry != nullptr && !entry->mapping && entry->leaf.IsScalar()) {
     const std::string value = entry->leaf.Scalar();
@@ -558,14 +549,13 @@ std::vector<fs::path> Configuration::paths(const std::string& key) const {
   return result;
 }
 
-double Configuration::number_or(const std::string& key, double fallback, double min,
-                                double max) const {
+double Configuration::number_or(const std::string& key, double fallback, double min, double max) const {
   if (!has(key)) document_->remember(prefix_, key, number_node(fallback));
   return has(key) ? number(key, min, max) : fallback;
 }
 
-std::int64_t Configuration::integer_or(const std::string& key, std::int64_t fallback,
-                                       std::int64_t min, std::int64_t max) const {
+std::int64_t Configuration::integer_or(const std::string& key, std::int64_t fallback, std::int64_t min,
+                                       std::int64_t max) const {
   if (!has(key)) document_->remember(prefix_, key, YAML::Node(std::to_string(fallback)));
   return integer(key, min, max);
 }
@@ -586,8 +576,7 @@ std::string Configuration::choice_or(const std::string& key, const std::string& 
   return choice(key, choices);
 }
 
-std::vector<double> Configuration::numbers_or(const std::string& key,
-                                              const std::vector<double>& fallback) const {
+std::vector<double> Configuration::numbers_or(const std::string& key, const std::vector<double>& fallback) const {
   if (!has(key)) document_->remember(prefix_, key, list_node(fallback, number_node));
   return numbers(key);
 }
@@ -595,8 +584,7 @@ std::vector<double> Configuration::numbers_or(const std::string& key,
 std::vector<std::string> Configuration::texts_or(const std::string& key,
                                                  const std::vector<std::string>& fallback) const {
   if (!has(key)) {
-    document_->remember(prefix_, key,
-                        list_node(fallback, [](const std::string& s) { return YAML::Node(s); }));
+    document_->remember(prefix_, key, list_node(fallback, [](const std::string& s) { return YAML::Node(s); }));
   }
   return texts(key);
 }

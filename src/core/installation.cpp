@@ -10,8 +10,7 @@ namespace fs = std::filesystem;
 
 bool holds_our_data(const fs::path& directory) {
   std::error_code ignored;
-  return fs::is_directory(directory / "config", ignored) &&
-         fs::is_directory(directory / "meshes", ignored);
+  return fs::is_directory(directory / "config", ignored) && fs::is_directory(directory / "meshes", ignored);
 }
 
 }  // namespace
@@ -23,8 +22,7 @@ fs::path data_directory_of(const fs::path& executable) {
     return installed;
   }
   // In a build tree: build/<preset>/bin inside the sources, or a build folder beside or below them.
-  for (fs::path directory = bin; directory != directory.root_path();
-       directory = directory.parent_path()) {
+  for (fs::path directory = bin; directory != directory.root_path(); directory = directory.parent_path()) {
     if (holds_our_data(directory)) {
       return directory;
     }

@@ -42,8 +42,7 @@ class JournalPriority : public spdlog::custom_flag_formatter {
 void set_up_logging(const std::string& level) {
   const auto parsed = spdlog::level::from_str(level == "warn" ? "warning" : level);
   if (parsed == spdlog::level::off && level != "off") {
-    throw ConfigurationError("log level is '" + level +
-                             "'; expected trace, debug, info, warn, error or off");
+    throw ConfigurationError("log level is '" + level + "'; expected trace, debug, info, warn, error or off");
   }
   auto logger = spdlog::get("bodyschema");
   if (!logger) logger = spdlog::stderr_color_mt("bodyschema");

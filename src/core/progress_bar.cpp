@@ -100,15 +100,13 @@ void ProgressBar::draw() {
   const double elapsed_s = static_cast<double>(now - start_ns_) * 1e-9;
   if (elapsed_s < kQuiet_s) return;
   const double share = static_cast<double>(done_) / static_cast<double>(total_);
-  const std::string left =
-      done_ > 0 ? duration_text(elapsed_s * (1.0 - share) / share) : std::string("?");
+  const std::string left = done_ > 0 ? duration_text(elapsed_s * (1.0 - share) / share) : std::string("?");
   if (terminal_) {
     if (static_cast<double>(now - last_draw_ns_) * 1e-9 < kRedraw_s && done_ < total_) return;
     const int filled = static_cast<int>(share * kWidth);
     std::fprintf(stderr, "\r\033[K%s [%s%s] %3.0f %%, %s left", label_.c_str(),
                  std::string(static_cast<std::size_t>(filled), '#').c_str(),
-                 std::string(static_cast<std::size_t>(kWidth - filled), '.').c_str(), share * 100.0,
-                 left.c_str());
+                 std::string(static_cast<std::size_t>(kWidth - filled), '.').c_str(), share * 100.0, left.c_str());
     std::fflush(stderr);
   } else {
     const int decile = static_cast<int>(share * 10.0);

@@ -25,8 +25,7 @@ std::vector<Hold> find_holds(std::span<const ViewInput> views, const JointRoles&
   for (std::size_t v = 0; v < views.size();) {
     std::size_t end = v;
     while (end < views.size() && moved(views[end], views[v]) < kStill) ++end;
-    const bool hold =
-        seconds(views[end - 1].joints.utime - views[v].joints.utime) >= kShortestHold_s;
+    const bool hold = seconds(views[end - 1].joints.utime - views[v].joints.utime) >= kShortestHold_s;
     if (hold) holds.emplace_back(v, end);
     v = hold ? end : v + 1;
   }
@@ -45,19 +44,17 @@ std::vector<StillStretch> still_stretches(std::span<const ViewInput> views,
     for (std::size_t camera = 0; camera < 2; ++camera) {
       std::vector<std::size_t> members;
       for (auto v = first; v < last; ++v) {
-        const bool repeated =
-            !members.empty() && views[v].joints.utime == views[members.back()].joints.utime;
+        const bool repeated = !members.empty() && views[v].joints.utime == views[members.back()].joints.utime;
         if (views[v].camera == camera && compressed[v].weight > 0.0 && !repeated) members.push_back(v);
       }
       if (members.size() < kFewest) continue;
       const auto n = static_cast<Eigen::Index>(members.size());
       StillStretch stretch;
-      stretch.step_s = seconds(views[members.back()].joints.utime -
-                               views[members.front()].joints.utime) / static_cast<double>(n - 1);
+      stretch.step_s = seconds(views[members.back()].joints.utime - views[members.front()].joints.utime) /
+                       static_cast<double>(n - 1);
       stretch.samples.resize(std::min(kArmJoints, compressed[first].vector.size()), n);
       for (Eigen::Index i = 0; i < n; ++i) {
-        stretch.samples.col(i) =
-            compressed[members[static_cast<std::size_t>(i)]].vector.head(stretch.samples.rows());
+        stretch.samples.col(i) = compressed[members[static_cast<std::size_t>(i)]].vector.head(stretch.samples.rows());
       }
       stretches.push_back(std::move(stretch));
     }
@@ -103,8 +100,8 @@ Eigen::VectorXd expected_autocovariance(double decay, Eigen::Index n, Eigen::Ind
   }
   const Eigen::MatrixXd basis = trend_basis(n);
   const Eigen::MatrixXd seen = covariance * basis;
-  covariance += basis * (basis.transpose() * seen) * basis.transpose() - seen * basis.transpose() -
-                basis * seen.transpose();
+  covariance +=
+      basis * (basis.transpose() * seen) * basis.transpose() - seen * basis.transpose() - basis * seen.transpose();
   Eigen::VectorXd result(lags);
   for (Eigen::Index k = 0; k < lags; ++k) {
     result[k] = covariance.diagonal(k).sum() / static_cast<double>(n);
@@ -116,8 +113,7 @@ Eigen::VectorXd expected_autocovariance(double decay, Eigen::Index n, Eigen::Ind
 struct NoiseFit {
   double slow = 0.0, white = 0.0, misfit = std::numeric_limits<double>::infinity();
 };
-NoiseFit fit_noise(const Eigen::VectorXd& observed, const Eigen::VectorXd& slow,
-                   const Eigen::VectorXd& white) {
+NoiseFit fit_noise(const Eigen::VectorXd& observed, const Eigen::VectorXd& slow, const Eigen::VectorXd& white) {
   const double ss = slow.squaredNorm(), ww = white.squaredNorm(), sw = slow.dot(white);
   const double so = slow.dot(observed), wo = white.dot(observed);
   const double determinant = ss * ww - sw * sw;
@@ -170,8 +166,7 @@ double noise_correlation_s(const std::vector<StillStretch>& whole) {
     NoiseFit best;
     double best_s = 0.0;
     for (double time = 0.3 * step; time < kSlowest_s; time *= kRatio) {
-      const auto fit =
-          fit_noise(observed, expected_autocovariance(std::exp(-step / time), n, lags), white);
+      const auto fit = fit_noise(observed, expected_autocovariance(std::exp(-step / time), n, lags), white);
       if (fit.misfit < best.misfit) {
         best = fit;
         best_s = time;
@@ -195,16 +190,15 @@ BlockPlan plan_blocks(const MeasurementSource& source, const std::vector<Compres
   const auto holds = find_holds(views, source.roles());
   std::vector<bool> still(views.size(), false);
   for (const auto& [first, last] : holds) {
-    std::fill(still.begin() + static_cast<std::ptrdiff_t>(first),
-              still.begin() + static_cast<std::ptrdiff_t>(last), true);
+    std::fill(still.begin() + static_cast<std::ptrdiff_t>(first), still.begin() + static_cast<std::ptrdiff_t>(last),
+              true);
   }
-  plan.still_share = static_cast<double>(std::count(still.begin(), still.end(), true)) /
-                     static_cast<double>(views.size());
+  plan.still_share =
+      static_cast<double>(std::count(still.begin(), still.end(), true)) / static_cast<double>(views.size());
   plan.correlation_s = noise_correlation_s(still_stretches(views, compressed, holds));
   const double span = seconds(views.back().joints.utime - views.front().joints.utime);
   // At least ten blocks, else there is nothing to hold out.
-  plan.length_s =
-      std::min(std::max(shortest_s, 5.0 * plan.correlation_s), std::max(shortest_s, span / 10.0));
+  plan.length_s = std::min(std::max(shortest_s, 5.0 * plan.correlation_s), std::max(shortest_s, span / 10.0));
 
   const auto time = [&](std::size_t v) { return seconds(views[v].joints.utime); };
   std::size_t block = 0;
@@ -212,8 +206,7 @@ BlockPlan plan_blocks(const MeasurementSource& source, const std::vector<Compres
   std::vector<int> members = {0};
   for (std::size_t v = 0; v < views.size(); ++v) {
     const bool same_instant = v > 0 && views[v].joints.utime - views[v - 1].joints.utime < 1000;
-    const bool cut = v > 0 && (still[v] != still[v - 1] ||
-                               (!still[v] && time(v) - start >= plan.length_s));
+    const bool cut = v > 0 && (still[v] != still[v - 1] || (!still[v] && time(v) - start >= plan.length_s));
     if (cut && !same_instant) {
       ++block;
       start = time(v);

@@ -133,8 +133,7 @@ BlockFit BlockStatistics::fit(const Columns& columns, std::size_t group) const {
   return fit;
 }
 
-Eigen::VectorXd BlockStatistics::heldout_with_prior(const Columns& columns,
-                                                    const Eigen::VectorXd& precision) const {
+Eigen::VectorXd BlockStatistics::heldout_with_prior(const Columns& columns, const Eigen::VectorXd& precision) const {
   const auto n = static_cast<Eigen::Index>(columns.size());
   std::vector<Normal> parts(blocks_.size());
   Normal total;
@@ -148,8 +147,7 @@ Eigen::VectorXd BlockStatistics::heldout_with_prior(const Columns& columns,
   Eigen::VectorXd loss(static_cast<Eigen::Index>(blocks_.size()));
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     const Eigen::VectorXd x = (total.H - parts[b].H).ldlt().solve(total.g - parts[b].g);
-    loss[static_cast<Eigen::Index>(b)] =
-        parts[b].s - 2.0 * x.dot(parts[b].g) + x.dot(parts[b].H * x);
+    loss[static_cast<Eigen::Index>(b)] = parts[b].s - 2.0 * x.dot(parts[b].g) + x.dot(parts[b].H * x);
   }
   return loss;
 }
@@ -159,8 +157,8 @@ NestedFits::NestedFits(const BlockStatistics& statistics, const Columns& base, s
   if (!base_fit_.usable || base.empty()) return;
   const auto blocks = statistics.blocks();
   Normal part;
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(base.size()),
-                                            static_cast<Eigen::Index>(base.size()));
+  Eigen::MatrixXd H =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(base.size()), static_cast<Eigen::Index>(base.size()));
   Eigen::VectorXd g = Eigen::VectorXd::Zero(H.rows());
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     gather(blocks[b], b, base, part);
@@ -184,9 +182,8 @@ NestedFits::NestedFits(const BlockStatistics& statistics, const Columns& base, s
   }
 }
 
-NestedFits::Part NestedFits::factorise(const Eigen::MatrixXd& information,
-                                       const Eigen::VectorXd& vector, std::size_t first,
-                                       std::size_t last) const {
+NestedFits::Part NestedFits::factorise(const Eigen::MatrixXd& information, const Eigen::VectorXd& vector,
+                                       std::size_t first, std::size_t last) const {
   Part part;
   part.scale = information.diagonal().cwiseSqrt().cwiseInverse();
   part.factor.compute(part.scale.asDiagonal() * information * part.scale.asDiagonal());
@@ -240,12 +237,10 @@ BlockFit NestedFits::with(const Columns& more) const {
     scale = rest_C.diagonal().cwiseSqrt().cwiseInverse();
     S = scale.asDiagonal() * (rest_C - rest_B.transpose() * Y) * scale.asDiagonal();
     schur.compute(S);
-    if (schur.info() != Eigen::Success ||
-        schur.matrixLLT().diagonal().cwiseAbs2().minCoeff() < kDependent) {
+    if (schur.info() != Eigen::Success || schur.matrixLLT().diagonal().cwiseAbs2().minCoeff() < kDependent) {
       return false;
     }
-    x.tail(k) = scale.asDiagonal() *
-                schur.solve(scale.asDiagonal() * (rest_d - rest_B.transpose() * part.estimate));
+    x.tail(k) = scale.asDiagonal() * schur.solve(scale.asDiagonal() * (rest_d - rest_B.transpose() * part.estimate));
     x.head(n) = part.estimate - Y * x.tail(k);
     return true;
   };
@@ -260,8 +255,7 @@ BlockFit NestedFits::with(const Columns& more) const {
   const Eigen::MatrixXd inverse =
       scale.asDiagonal() * schur.solve(Eigen::MatrixXd::Identity(k, k)) * scale.asDiagonal();
   fit.model_variance.resize(n + k);
-  fit.model_variance.head(n) =
-      base_fit_.model_variance + (Y * inverse).cwiseProduct(Y).rowwise().sum();
+  fit.model_variance.head(n) = base_fit_.model_variance + (Y * inverse).cwiseProduct(Y).rowwise().sum();
   fit.model_variance.tail(k) = inverse.diagonal();
 
   fit.replicas = fit.estimate.replicate(1, count);
@@ -285,10 +279,8 @@ BlockFit NestedFits::with(const Columns& more) const {
   for (Eigen::Index b = 0; b < count; ++b) {
     const auto at = static_cast<std::size_t>(b);
     const auto head = fit.replicas.col(b).head(n), tail = fit.replicas.col(b).tail(k);
-    fit.heldout_loss[b] = blocks[at].square -
-                          2.0 * (head.dot(vector_[at]) + tail.dot(d.col(b))) +
-                          head.dot(information_[at] * head) +
-                          2.0 * head.dot(B.middleCols(b * k, k) * tail) +
+    fit.heldout_loss[b] = blocks[at].square - 2.0 * (head.dot(vector_[at]) + tail.dot(d.col(b))) +
+                          head.dot(information_[at] * head) + 2.0 * head.dot(B.middleCols(b * k, k) * tail) +
                           tail.dot(C.middleCols(b * k, k) * tail);
   }
   fit.usable = jackknife(replicas, fit.covariance);
@@ -309,9 +301,7 @@ double equivalent_z(double wald, Eigen::Index dof) {
   // Wilson and Hilferty's cube root makes chi-square normal; past z = 4 it falls behind, so the tail
   // is continued in proportion to sqrt(wald), which is exact for one degree of freedom.
   const double k = static_cast<double>(dof);
-  const auto z = [k](double w) {
-    return (std::cbrt(w / k) - (1.0 - 2.0 / (9.0 * k))) / std::sqrt(2.0 / (9.0 * k));
-  };
+  const auto z = [k](double w) { return (std::cbrt(w / k) - (1.0 - 2.0 / (9.0 * k))) / std::sqrt(2.0 / (9.0 * k)); };
   constexpr double kJoin = 4.0;
   const double root = 1.0 - 2.0 / (9.0 * k) + kJoin * std::sqrt(2.0 / (9.0 * k));
   const double join = k * root * root * root;

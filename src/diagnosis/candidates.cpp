@@ -46,8 +46,7 @@ double root_mean_square(const std::vector<double>& x) {
 /// Generic features of one joint, added to the set as candidates named "unexplained".
 class GenericFeatures {
  public:
-  GenericFeatures(CandidateSet& set, const CoordinateLayout& layout, const std::string& name,
-                  Eigen::Index joint)
+  GenericFeatures(CandidateSet& set, const CoordinateLayout& layout, const std::string& name, Eigen::Index joint)
       : set_(set), layout_(layout), name_(name), joint_(joint) {}
 
   void add(const std::string& variable, const std::vector<std::vector<double>>& values) {
@@ -152,8 +151,7 @@ bool passes_once(const MeasurementSource& source) {
 }
 
 bool is_excluded(const std::vector<NotTestable>& excluded, const CauseName& cause) {
-  return std::any_of(excluded.begin(), excluded.end(),
-                     [&](const auto& e) { return e.cause == cause; });
+  return std::any_of(excluded.begin(), excluded.end(), [&](const auto& e) { return e.cause == cause; });
 }
 
 std::vector<const SparseColumn*> CandidateSet::pointers() const {
@@ -163,9 +161,8 @@ std::vector<const SparseColumn*> CandidateSet::pointers() const {
   return list;
 }
 
-CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at,
-                             const BlockPlan& plan, const CoordinateLayout& layout,
-                             const std::vector<CauseName>& nuisances,
+CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at, const BlockPlan& plan,
+                             const CoordinateLayout& layout, const std::vector<CauseName>& nuisances,
                              const std::vector<NotTestable>& excluded) {
   const auto& roles = source.roles();
   const std::size_t views = source.views().size();
@@ -227,8 +224,7 @@ CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at,
   for (const auto joint : roles.arm) {
     const auto& name = roles.names[static_cast<std::size_t>(joint)];
     GenericFeatures features(set, layout, name, joint);
-    std::vector<double> t(views), q(views), q2(views), q3(views), v(views), v_abs(views), a(views),
-        torque(views, 0.0);
+    std::vector<double> t(views), q(views), q2(views), q3(views), v(views), v_abs(views), a(views), torque(views, 0.0);
     bool has_torque = false;
     for (std::size_t i = 0; i < views; ++i) {
       t[i] = (seconds(source.views()[i].joints.utime) - begin) / std::max(1e-9, end - begin);
@@ -309,17 +305,16 @@ void drop_aliased_columns(const BlockStatistics& statistics, CandidateSet& set) 
 }
 
 std::vector<NotTestable> untestable(const MeasurementSource& source, const Linearisation& at) {
-  constexpr double kLeastRange = 5.0 * kDeg;       ///< for causes that follow a joint's angle
-  constexpr double kLeastSpeed = 3.0 * kDeg;       ///< rad/s rms, for causes of timing
-  constexpr double kLeastTorque = 0.05;            ///< Nm, change of torque for compliance
+  constexpr double kLeastRange = 5.0 * kDeg;  ///< for causes that follow a joint's angle
+  constexpr double kLeastSpeed = 3.0 * kDeg;  ///< rad/s rms, for causes of timing
+  constexpr double kLeastTorque = 0.05;       ///< Nm, change of torque for compliance
   constexpr double kSparseEncoders_s = 0.025;
   constexpr double kJump = 8.0 * kDeg;  ///< between readings 100 ms apart even a fast arm moves less
   const auto& roles = source.roles();
   const auto views = source.views();
   const auto stream = source.stream();
   std::vector<NotTestable> list;
-  const auto exclude_joint = [&](const std::string& effect, const std::string& joint,
-                                 const std::string& reason) {
+  const auto exclude_joint = [&](const std::string& effect, const std::string& joint, const std::string& reason) {
     for (const auto& target : effect_targets(effect, roles)) {
       const CauseName cause{effect, target.joint, target.source};
       if ((target.joint == joint || target.source == joint) && !is_excluded(list, cause)) {
@@ -345,7 +340,8 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
     }
   }
   if (roles.head.empty()) {
-    exclude_all("base_shift", "the cameras do not move against the base: a shifted base looks like errors of their place");
+    exclude_all("base_shift",
+                "the cameras do not move against the base: a shifted base looks like errors of their place");
   } else if (const double range = largest_range(source.views(), roles.neck); range < kHeadStill) {
     exclude_all("base_shift", "the neck moved " + number(range / kDeg, 1) +
                                   " deg: a shifted base looks like errors of neck and eyes");
@@ -359,7 +355,8 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
     // Of an arm that is read from one posture to the next it does not matter how often.
     exclude_all("backlash", readings.step_rad > kJump
                                 ? "the arm's readings jump from posture to posture, by " +
-                                      number(readings.step_rad / kDeg, 0) + " deg (median); how the joints moved "
+                                      number(readings.step_rad / kDeg, 0) +
+                                      " deg (median); how the joints moved "
                                       "between them, and in which direction last, was not seen"
                                 : "the arm's encoders come every " + number(1e3 * readings.period_s, 0) +
                                       " ms; the direction of motion needs 100 Hz or more");
@@ -383,21 +380,20 @@ std::vector<NotTestable> untestable(const MeasurementSource& source, const Linea
     const double range = high - low;
     if (range < kLeastRange) {
       const auto reason = name + " moved " + number(range / kDeg, 1) + " deg";
-      for (const char* effect : {"encoder_gain", "eccentricity", "axis_tilt", "joint_coupling",
-                                 "backlash"}) {
+      for (const char* effect : {"encoder_gain", "eccentricity", "axis_tilt", "joint_coupling", "backlash"}) {
         exclude_joint(effect, name, reason);
       }
     }
     if (masses && torque_high - torque_low < kLeastTorque) {
-      exclude_joint("compliance", name, "gravity's torque on " + name + " changed by " +
-                                            number(torque_high - torque_low, 3) + " Nm");
+      exclude_joint("compliance", name,
+                    "gravity's torque on " + name + " changed by " + number(torque_high - torque_low, 3) + " Nm");
     }
     // Backlash shows where a joint passes the same angles in both directions.
     const int reversals = turning_points(stream, joint);
     if (reversals < 2) {
-      exclude_joint("backlash", name, name + " turned round " +
-                                          (reversals == 0 ? "never" : std::string("once")) +
-                                          "; both directions through the same postures are needed");
+      exclude_joint("backlash", name,
+                    name + " turned round " + (reversals == 0 ? "never" : std::string("once")) +
+                        "; both directions through the same postures are needed");
     }
   }
   if (std::sqrt(speed_square) < kLeastSpeed) {
@@ -426,9 +422,7 @@ std::string splitting_motion(const std::vector<CauseName>& same) {
   for (const auto& cause : same) names.insert(cause.name);
   const auto has = [&](const char* name) { return names.count(name) > 0; };
   std::string advice;
-  const auto say = [&](const std::string& sentence) {
-    advice += (advice.empty() ? "" : " ") + sentence;
-  };
+  const auto say = [&](const std::string& sentence) { advice += (advice.empty() ? "" : " ") + sentence; };
   const auto named = std::find_if(same.begin(), same.end(), [](const auto& cause) { return !cause.joint.empty(); });
   const std::string joint = named == same.end() ? "" : named->joint;
   if (names == std::set<std::string>{"axis_shift", "link_length"}) {

@@ -13,16 +13,15 @@ namespace bodyschema::diagnosis {
 /// Everything that is tested on a log: the columns of the regression and which belong to what.
 struct CandidateSet {
   std::vector<SparseColumn> columns;
-  Columns offsets;                    ///< one per arm joint, always fitted
+  Columns offsets;  ///< one per arm joint, always fitted
   std::vector<Candidate> candidates;
   [[nodiscard]] std::vector<const SparseColumn*> pointers() const;
 };
 
 /// The catalogue but for `excluded` causes, and the generic features per arm joint. Columns of
 /// effects are secants from zero to their typical sizes.
-CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at,
-                             const BlockPlan& plan, const CoordinateLayout& layout,
-                             const std::vector<CauseName>& nuisances,
+CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at, const BlockPlan& plan,
+                             const CoordinateLayout& layout, const std::vector<CauseName>& nuisances,
                              const std::vector<NotTestable>& excluded);
 
 /// When the hand came into view and when it was last seen, s: a log may begin with an empty room.

@@ -33,9 +33,9 @@ const std::map<std::string, std::array<double, kArm>>& of_arm() {
 
 const std::map<std::string, double>& of_robot() {
   static const std::map<std::string, double> sizes = {
-      {"payload", 0.25},        {"latency", 5.0},      {"camera_skew", 5.6}, {"vergence", 0.09},
-      {"baseline", 0.4},        {"focal_length", 0.55}, {"principal_point", 0.4}, {"distortion", 0.026},
-      {"silhouette_bias", 0.23}, {"mesh_scale", 0.6},  {"finger_posture", 0.1}};
+      {"payload", 0.25},         {"latency", 5.0},       {"camera_skew", 5.6},     {"vergence", 0.09},
+      {"baseline", 0.4},         {"focal_length", 0.55}, {"principal_point", 0.4}, {"distortion", 0.026},
+      {"silhouette_bias", 0.23}, {"mesh_scale", 0.6},    {"finger_posture", 0.1}};
   return sizes;
 }
 

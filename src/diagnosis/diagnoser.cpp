@@ -23,8 +23,7 @@ using namespace diagnosis;
 class Diagnoser {
  public:
   Diagnoser(MeasurementSource& source, const DiagnosisOptions& options)
-      : source_(source), options_(options), layout_(source.roles()),
-        fitter_(source, layout_, options.block_s) {}
+      : source_(source), options_(options), layout_(source.roles()), fitter_(source, layout_, options.block_s) {}
 
   DiagnosisReport run() {
     refuse_unusable();
@@ -56,7 +55,7 @@ class Diagnoser {
 
  private:
   static constexpr double kWorthwhile = 0.8;
-  static constexpr double kFar_px = 1.0;     ///< Huber's cost counts every pixel beyond it less
+  static constexpr double kFar_px = 1.0;  ///< Huber's cost counts every pixel beyond it less
   static constexpr double kBetter = 0.8;
 
   void fit_baseline() {
@@ -223,8 +222,8 @@ class Diagnoser {
     found.selection = select_causes(statistics, set.offsets, set.candidates, rules);
     progress(0.65);
 
-    auto extension = extend(baseline_with(nuisances, model), found.selection,
-                            {source_, layout_, plan, at, bare, set, statistics});
+    auto extension =
+        extend(baseline_with(nuisances, model), found.selection, {source_, layout_, plan, at, bare, set, statistics});
     found.extended = std::move(extension.model);
     begin_where_better(found.extended);
     found.after = fitter_.fit(found.extended, extension.generic, {options_.refit_iterations, between(0.65, 0.9)});
@@ -306,16 +305,17 @@ class Diagnoser {
 
   void refuse_unusable() const {
     const auto views = source_.views();
-    const char* advice = "; record 60 to 120 s of arm motion before both eyes, slow and fast, the "
-                         "same postures in both directions, with 15 s of rest";
+    const char* advice =
+        "; record 60 to 120 s of arm motion before both eyes, slow and fast, the "
+        "same postures in both directions, with 15 s of rest";
     if (views.empty() || source_.stream().empty()) {
       throw DataError(std::string("the log holds no usable pictures with encoders") + advice);
     }
     const double span = seconds(views.back().joints.utime - views.front().joints.utime);
     if (span < options_.shortest_log_s) {
       std::ostringstream text;
-      text << "the log is too short to be diagnosed: " << span << " s, expected at least "
-           << options_.shortest_log_s << " s" << advice;
+      text << "the log is too short to be diagnosed: " << span << " s, expected at least " << options_.shortest_log_s
+           << " s" << advice;
       throw DataError(text.str());
     }
     for (std::size_t v = 1; v < views.size(); ++v) {
@@ -366,8 +366,8 @@ class Diagnoser {
   ErrorModel baseline_{JointRoles{}};
   ErrorModel offsets_{JointRoles{}};        ///< offsets and nothing else
   ErrorModel offsets_alone_{JointRoles{}};  ///< the baseline with its nuisances at zero
-  bool other_shape_ = false;  ///< outlines lie far off however well the parts are placed
-  ModelFit before_;  ///< about the baseline
+  bool other_shape_ = false;                ///< outlines lie far off however well the parts are placed
+  ModelFit before_;                         ///< about the baseline
   std::vector<NotTestable> excluded_;
 };
 
@@ -381,8 +381,7 @@ std::string CauseName::text() const {
 }
 
 std::vector<CauseName> usual_nuisances(const JointRoles& roles) {
-  std::vector<CauseName> list = {{"mesh_scale", "", ""}, {"silhouette_bias", "", ""},
-                                 {"focal_length", "", ""}};
+  std::vector<CauseName> list = {{"mesh_scale", "", ""}, {"silhouette_bias", "", ""}, {"focal_length", "", ""}};
   if (!roles.fingers.empty()) list.push_back({"finger_posture", "", ""});
   if (roles.has_pans()) list.push_back({"vergence", "", ""});
   if (roles.neck.size() >= 4) {

@@ -75,8 +75,8 @@ Curve binned(std::vector<Point> points, bool centred = true) {
     std::sort(values.begin(), values.end());
     const double median = quantile(values, 0.5);
     // Standard error of a median from the middle half of the values.
-    const double sd = 0.93 * (quantile(values, 0.75) - quantile(values, 0.25)) /
-                      std::sqrt(static_cast<double>(values.size()));
+    const double sd =
+        0.93 * (quantile(values, 0.75) - quantile(values, 0.25)) / std::sqrt(static_cast<double>(values.size()));
     curve.x.push_back(x);
     curve.y.push_back(median);
     curve.low.push_back(median - 1.96 * sd);
@@ -102,8 +102,7 @@ ChartSeries series_of(const std::string& name, const Curve& curve, Colour colour
   return {name, curve.x, curve.y, curve.low, curve.high, colour};
 }
 
-Chart curves(const std::string& title, const std::string& x, const std::string& y,
-             std::vector<ChartSeries> series) {
+Chart curves(const std::string& title, const std::string& x, const std::string& y, std::vector<ChartSeries> series) {
   Chart chart;
   chart.title = title;
   chart.x_label = x;
@@ -137,8 +136,7 @@ Value apparent(std::size_t joint, bool after) {
 
 class Page {
  public:
-  Page(const DiagnosisReport& report, const std::string& title)
-      : d_(report), page_("Diagnosis: " + title) {}
+  Page(const DiagnosisReport& report, const std::string& title) : d_(report), page_("Diagnosis: " + title) {}
 
   Report write(const std::vector<std::pair<Image, std::string>>& pictures) {
     page_.verdict(d_.sentence);
@@ -171,7 +169,8 @@ class Page {
                                    ? "unexplained: follows the " + cause.variable + " of " + cause.cause.joint
                                    : cause.cause.text();
       if (cause.parameters.empty()) {
-        rows.push_back({name, "", "", "", fmt::format("{:.1f}", cause.z), fmt::format("{:.1f} %", 100 * cause.heldout_gain)});
+        rows.push_back(
+            {name, "", "", "", fmt::format("{:.1f}", cause.z), fmt::format("{:.1f} %", 100 * cause.heldout_gain)});
       }
       for (std::size_t i = 0; i < cause.parameters.size(); ++i) {
         const auto& p = cause.parameters[i];
@@ -203,13 +202,13 @@ class Page {
       return std::vector<std::string>{name, fmt::format("{:.0f} %", 100.0 * before),
                                       fmt::format("{:.0f} %", 100.0 * after)};
     };
-    page_.table({"on parts of the log that the fit has not seen", "without the causes", "extended model"},
-                {row("outline residual, rms", d_.before.rms_px, d_.after.rms_px, "px"),
-                 row("motion of the hand it asks for", d_.before.hand_mm, d_.after.hand_mm, "mm"),
-                 row("turn of the hand it asks for", d_.before.hand_deg, d_.after.hand_deg, "deg"),
-                 share("outline found, all pictures", d_.before.outline_found, d_.after.outline_found),
-                 share("outline found where the hand is seen", d_.before.outline_where_seen,
-                       d_.after.outline_where_seen)});
+    page_.table(
+        {"on parts of the log that the fit has not seen", "without the causes", "extended model"},
+        {row("outline residual, rms", d_.before.rms_px, d_.after.rms_px, "px"),
+         row("motion of the hand it asks for", d_.before.hand_mm, d_.after.hand_mm, "mm"),
+         row("turn of the hand it asks for", d_.before.hand_deg, d_.after.hand_deg, "deg"),
+         share("outline found, all pictures", d_.before.outline_found, d_.after.outline_found),
+         share("outline found where the hand is seen", d_.before.outline_where_seen, d_.after.outline_where_seen)});
   }
 
   void offsets() {
@@ -239,13 +238,13 @@ class Page {
     }
     if (bars.empty()) return;
     page_.heading("All candidates");
-    page_.paragraph(
-        fmt::format("How much of the residual of held-out blocks each cause of the catalogue takes away when it alone is "
-                    "added to the model: before, to the model of offsets and usual nuisances; after, to the extended "
-                    "one. A cause must take away {:.1f} %, stand out of the noise by z = {:.1f} (given with its name; "
-                    "{:.1f} for a slip, a drift or a curve in time that takes away more than {:.0f} %), and beat the "
-                    "others. Free curves (unexplained) must take away 1.5 % and beat every named cause clearly.",
-                    100.0 * d_.gain_threshold, d_.z_threshold, d_.z_threshold_large, 100.0 * d_.gain_large));
+    page_.paragraph(fmt::format(
+        "How much of the residual of held-out blocks each cause of the catalogue takes away when it alone is "
+        "added to the model: before, to the model of offsets and usual nuisances; after, to the extended "
+        "one. A cause must take away {:.1f} %, stand out of the noise by z = {:.1f} (given with its name; "
+        "{:.1f} for a slip, a drift or a curve in time that takes away more than {:.0f} %), and beat the "
+        "others. Free curves (unexplained) must take away 1.5 % and beat every named cause clearly.",
+        100.0 * d_.gain_threshold, d_.z_threshold, d_.z_threshold_large, 100.0 * d_.gain_large));
     std::stable_sort(bars.begin(), bars.end(),
                      [](const auto& a, const auto& b) { return a.gain_before > b.gain_before; });
     const auto draw = [&](std::size_t from, std::size_t to, const std::string& title) {
@@ -309,13 +308,15 @@ class Page {
         strongest = j;
       }
     }
-    page_.chart(curves(d_.arm_joints[strongest] + (variable.name == "time" ? " over " : " against its ") + variable.name,
-                       variable.name + ", " + variable.axis, "correction asked for, deg",
-                       before_and_after(curve(strongest, variable, false), curve(strongest, variable, true))));
+    page_.chart(
+        curves(d_.arm_joints[strongest] + (variable.name == "time" ? " over " : " against its ") + variable.name,
+               variable.name + ", " + variable.axis, "correction asked for, deg",
+               before_and_after(curve(strongest, variable, false), curve(strongest, variable, true))));
   }
 
   [[nodiscard]] Curve curve(std::size_t joint, const Variable& variable, bool after) const {
-    return curve_of(d_, [&](const ResidualSample& s) { return variable.of(s, joint); }, apparent(joint, after));
+    return curve_of(
+        d_, [&](const ResidualSample& s) { return variable.of(s, joint); }, apparent(joint, after));
   }
 
   static std::vector<ChartSeries> before_and_after(const Curve& before, const Curve& after) {
@@ -353,8 +354,7 @@ class Page {
       }
     }
     if (most < 0.0) return;
-    page_.chart(curves(d_.arm_joints[widest] + ", rising against falling", "angle, deg",
-                       "correction asked for, deg",
+    page_.chart(curves(d_.arm_joints[widest] + ", rising against falling", "angle, deg", "correction asked for, deg",
                        {series_of("rising, before", one_way(widest, 1.0, false), kRed),
                         series_of("falling, before", one_way(widest, -1.0, false), kOchre),
                         series_of("rising, extended", one_way(widest, 1.0, true), kBlue),
@@ -365,7 +365,8 @@ class Page {
     std::size_t follower = 0, leader = 0;
     double most = -1.0;
     const auto pair = [&](std::size_t i, std::size_t j, bool after) {
-      return curve_of(d_, [j](const ResidualSample& s) { return s.angle_deg[j]; }, apparent(i, after));
+      return curve_of(
+          d_, [j](const ResidualSample& s) { return s.angle_deg[j]; }, apparent(i, after));
     };
     for (std::size_t i = 0; i < d_.arm_joints.size(); ++i) {
       for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
@@ -401,8 +402,8 @@ class Page {
                        "mean along the outward normal, px", both(radius, mean_before, mean_after)));
     page_.chart(curves("outline against depth", "hand from the eye, m", "mean along the outward normal, px",
                        both(depth, mean_before, mean_after)));
-    page_.chart(curves("residual against depth", "hand from the eye, m", "rms, px",
-                       both(depth, rms_before, rms_after)));
+    page_.chart(
+        curves("residual against depth", "hand from the eye, m", "rms, px", both(depth, rms_before, rms_after)));
   }
 
   void all_structure() {
@@ -415,7 +416,8 @@ class Page {
       std::vector<std::string> row = {d_.arm_joints[j]};
       for (const auto& variable : variables()) {
         if (!known(variable)) continue;
-        row.push_back(fmt::format("{:.2f} > {:.2f}", curve(j, variable, false).size(), curve(j, variable, true).size()));
+        row.push_back(
+            fmt::format("{:.2f} > {:.2f}", curve(j, variable, false).size(), curve(j, variable, true).size()));
       }
       rows.push_back(std::move(row));
     }
@@ -460,12 +462,14 @@ class Page {
     std::vector<std::string> items = {fmt::format("{:.1f} s, {} pictures used, {} blocks of {:.1f} s", d_.duration_s,
                                                   d_.views, d_.blocks, d_.block_s)};
     if (d_.noise_correlation_s > 0.0) {
-      items.push_back(fmt::format("noise stays alike for {:.2f} s (measured while the arm rested)", d_.noise_correlation_s));
+      items.push_back(
+          fmt::format("noise stays alike for {:.2f} s (measured while the arm rested)", d_.noise_correlation_s));
     }
     items.insert(items.end(), d_.warnings.begin(), d_.warnings.end());
     page_.list(items);
-    page_.paragraph("extended_model.yaml beside this page holds the extended model. bodyschemad, bodyschema replay and "
-                    "bodyschema export take it with --extended-model.");
+    page_.paragraph(
+        "extended_model.yaml beside this page holds the extended model. bodyschemad, bodyschema replay and "
+        "bodyschema export take it with --extended-model.");
   }
 
   const DiagnosisReport& d_;

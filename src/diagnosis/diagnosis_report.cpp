@@ -14,13 +14,20 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// JSON has no infinities: what is not finite is null.
-Json number(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
+Json number(double x) {
+  return std::isfinite(x) ? Json(x) : Json(nullptr);
+}
 
-Json optional_text(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+Json optional_text(const std::string& text) {
+  return text.empty() ? Json(nullptr) : Json(text);
+}
 
 Json json_of(const HeldoutError& e) {
-  return {{"rms_px", number(e.rms_px)}, {"hand_mm", number(e.hand_mm)}, {"hand_deg", number(e.hand_deg)},
-          {"outline_found", number(e.outline_found)}, {"outline_where_seen", number(e.outline_where_seen)}};
+  return {{"rms_px", number(e.rms_px)},
+          {"hand_mm", number(e.hand_mm)},
+          {"hand_deg", number(e.hand_deg)},
+          {"outline_found", number(e.outline_found)},
+          {"outline_where_seen", number(e.outline_where_seen)}};
 }
 
 Json json_of(const CauseName& c) {
@@ -30,7 +37,9 @@ Json json_of(const CauseName& c) {
 }
 
 Json json_of(const EstimatedParameter& p) {
-  Json j = {{"parameter", p.parameter}, {"unit", p.unit}, {"estimate", number(p.estimate)},
+  Json j = {{"parameter", p.parameter},
+            {"unit", p.unit},
+            {"estimate", number(p.estimate)},
             {"ci95", {number(p.ci95[0]), number(p.ci95[1])}}};
   if (p.from) j["from_utime"] = *p.from;
   if (p.duration_s) j["duration_s"] = number(*p.duration_s);
@@ -103,8 +112,12 @@ std::string DiagnosisReport::to_json() const {
   for (const auto& [joint, ci] : offsets_ci95_deg) {
     j["offsets_ci95_deg"][joint] = {number(ci[0]), number(ci[1])};
   }
-  j["log"] = {{"begin_utime", begin_utime}, {"duration_s", number(duration_s)}, {"views", views}, {"blocks", blocks},
-              {"block_s", number(block_s)}, {"noise_correlation_s", number(noise_correlation_s)}};
+  j["log"] = {{"begin_utime", begin_utime},
+              {"duration_s", number(duration_s)},
+              {"views", views},
+              {"blocks", blocks},
+              {"block_s", number(block_s)},
+              {"noise_correlation_s", number(noise_correlation_s)}};
   j["warnings"] = warnings;
   return j.dump(2) + "\n";
 }

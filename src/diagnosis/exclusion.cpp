@@ -15,8 +15,8 @@ constexpr const char* kLooksAlike = "in this log it looks exactly like the joint
 /// The final model's regression with the columns of the whole catalogue beside it.
 class BesideTheModel {
  public:
-  BesideTheModel(MeasurementSource& source, const CoordinateLayout& layout, const BlockPlan& plan,
-                 const Found& found, const std::vector<NotTestable>& not_testable)
+  BesideTheModel(MeasurementSource& source, const CoordinateLayout& layout, const BlockPlan& plan, const Found& found,
+                 const std::vector<NotTestable>& not_testable)
       : set_(make_candidates(source, found.after.at, plan, layout, {}, not_testable)) {
     // Generic features come last and get no limits.
     std::erase_if(set_.candidates, [](const auto& candidate) { return candidate.generic(); });
@@ -82,8 +82,9 @@ std::vector<ExclusionLimit> limits_of(const Candidate& candidate, const BlockFit
     if (!candidate.slip && std::find(kept.begin(), kept.end(), index++) == kept.end()) continue;
     const auto column = first + static_cast<Eigen::Index>(limits.size());
     const double size = std::abs(fit.estimate[column]);
-    limits.push_back({name_of(candidate), p.name, p.unit,
-                      (size + rule.half(fit, column, size, rule.placed(candidate.name, p))) * p.typical / p.si_per_unit});
+    limits.push_back(
+        {name_of(candidate), p.name, p.unit,
+         (size + rule.half(fit, column, size, rule.placed(candidate.name, p))) * p.typical / p.si_per_unit});
   }
   return limits;
 }

@@ -17,8 +17,8 @@ bool contains(const std::vector<std::size_t>& list, std::size_t item) {
 /// The time beside the winning cell's beginning at which the step fits best; the other columns
 /// keep their values.
 /// @param slip  position of the step's column in `columns`
-double find_slip_time(const Evidence& evidence, const BlockFit& fit, const Columns& columns,
-                      Eigen::Index slip, const Candidate& candidate) {
+double find_slip_time(const Evidence& evidence, const BlockFit& fit, const Columns& columns, Eigen::Index slip,
+                      const Candidate& candidate) {
   constexpr double kBeside_s = 0.6;
   const auto& plan = evidence.plan;
   const auto views = evidence.source.views();
@@ -76,10 +76,9 @@ Extension extend(ErrorModel model, const Selection& selection, const Evidence& e
   for (std::size_t c = 0; c < set.candidates.size(); ++c) {
     const auto& candidate = set.candidates[c];
     if (!candidate.nuisance) continue;
-    const bool swapped_out = std::any_of(
-        selection.causes.begin(), selection.causes.end(), [&](const SelectedCause& cause) {
-          return cause.candidate != c && contains(cause.same, c);
-        });
+    const bool swapped_out =
+        std::any_of(selection.causes.begin(), selection.causes.end(),
+                    [&](const SelectedCause& cause) { return cause.candidate != c && contains(cause.same, c); });
     if (!contains(selection.model, c) || swapped_out) {
       result.model.remove(candidate.name, candidate.target);
     } else {
@@ -129,8 +128,8 @@ Extension extend(ErrorModel model, const Selection& selection, const Evidence& e
   return result;
 }
 
-bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit& after,
-                  double z_enter, ErrorModel& model) {
+bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit& after, double z_enter,
+                  ErrorModel& model) {
   if (!after.fit.usable) return false;
   double weakest = z_enter;
   auto worst = selection.causes.end();
@@ -152,8 +151,7 @@ bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit&
     Eigen::MatrixXd V(n, n);
     for (Eigen::Index i = 0; i < n; ++i) {
       for (Eigen::Index j = 0; j < n; ++j) {
-        V(i, j) = after.fit.covariance(columns[static_cast<std::size_t>(i)],
-                                       columns[static_cast<std::size_t>(j)]);
+        V(i, j) = after.fit.covariance(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)]);
       }
     }
     V += 1e-12 * V.trace() * Eigen::MatrixXd::Identity(n, n);

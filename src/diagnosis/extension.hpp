@@ -14,8 +14,8 @@ struct Evidence {
   MeasurementSource& source;
   const CoordinateLayout& layout;
   const BlockPlan& plan;
-  const Linearisation& at;                    ///< the candidates' columns were taken here
-  const std::vector<CompressedView>& bare;    ///< its views as if nothing but offsets were fitted
+  const Linearisation& at;                  ///< the candidates' columns were taken here
+  const std::vector<CompressedView>& bare;  ///< its views as if nothing but offsets were fitted
   const CandidateSet& set;
   const BlockStatistics& statistics;
 };
@@ -31,8 +31,8 @@ Extension extend(ErrorModel model, const Selection& selection, const Evidence& e
 
 /// Takes the named cause with the smallest z out of selection and model if that no longer suffices
 /// once it is fitted; whether it did.
-bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit& after,
-                  double z_enter, ErrorModel& model);
+bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit& after, double z_enter,
+                  ErrorModel& model);
 
 /// The views as if all fitted parameters but the offsets were zero, by linearity.
 std::vector<CompressedView> only_offsets(const MeasurementSource& source, const CoordinateLayout& layout,

@@ -67,9 +67,8 @@ class Findings {
   Findings(MeasurementSource& source, const SelectionOptions& rules, const CoordinateLayout& layout,
            const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before,
            double systematic_share, const std::map<std::string, double>& systematic_error)
-      : source_(source), rules_(rules), layout_(layout), plan_(plan), found_(found),
-        baseline_(baseline), before_(before),
-        rule_(found.after.fit, plan.block_count(), systematic_share, systematic_error),
+      : source_(source), rules_(rules), layout_(layout), plan_(plan), found_(found), baseline_(baseline),
+        before_(before), rule_(found.after.fit, plan.block_count(), systematic_share, systematic_error),
         jacobians_(source.views().size()) {}
 
   DiagnosisReport report(const std::vector<NotTestable>& excluded) {
@@ -107,8 +106,7 @@ class Findings {
     report.gain_threshold = found_.selection.gain_floor;
     report.z_threshold_large = rules_.z_large;
     report.gain_large = rules_.gain_large;
-    report.duration_s = seconds(source_.views().back().joints.utime -
-                                source_.views().front().joints.utime);
+    report.duration_s = seconds(source_.views().back().joints.utime - source_.views().front().joints.utime);
     report.block_s = plan_.length_s;
     report.noise_correlation_s = plan_.correlation_s;
     report.views = source_.views().size();
@@ -149,7 +147,9 @@ class Findings {
         if (cause_of(found_.extended[ref.effect]) != cause.cause) continue;
         const auto& p = found_.extended[ref.effect].parameters()[ref.parameter];
         const auto ci = interval(static_cast<Eigen::Index>(c), found_.extended[ref.effect], p, std::abs(p.value));
-        cause.parameters.push_back({p.name, p.unit, p.in_unit(),
+        cause.parameters.push_back({p.name,
+                                    p.unit,
+                                    p.in_unit(),
                                     {ci[0] / p.si_per_unit, ci[1] / p.si_per_unit},
                                     begin_of(found_.extended[ref.effect]),
                                     duration_of(found_.extended[ref.effect])});
@@ -166,19 +166,17 @@ class Findings {
       const auto& first = found_.selection.first_scores[c];
       const auto& last = found_.selection.last_scores[c];
       const auto label = found_.set.candidates[c].description();
-      auto bar = std::find_if(report.bars.begin(), report.bars.end(),
-                              [&](const auto& b) { return b.label == label; });
+      auto bar = std::find_if(report.bars.begin(), report.bars.end(), [&](const auto& b) { return b.label == label; });
       if (bar == report.bars.end()) {
         const auto& candidate = found_.set.candidates[c];
-        report.bars.push_back({label, candidate.generic(), candidate.nuisance, first.testable, 0.0, 0.0,
-                               0.0, 0.0});
+        report.bars.push_back({label, candidate.generic(), candidate.nuisance, first.testable, 0.0, 0.0, 0.0, 0.0});
         bar = report.bars.end() - 1;
       }
       // Slips at other times and other shapes of a generic variable share a bar: the best counts.
       bar->z_before = std::max(bar->z_before, first.z);
       // A nuisance is part of the first model: its gain is a share of the loss without it.
-      const double gain = found_.set.candidates[c].nuisance && first.gain > 0.0 ? first.gain / (1.0 + first.gain)
-                                                                               : first.gain;
+      const double gain =
+          found_.set.candidates[c].nuisance && first.gain > 0.0 ? first.gain / (1.0 + first.gain) : first.gain;
       bar->gain_before = std::max(bar->gain_before, gain);
       bar->z_after = std::max(bar->z_after, last.z);
       bar->gain_after = std::max(bar->gain_after, last.gain);
@@ -204,9 +202,11 @@ class Findings {
 
   void add_warnings(DiagnosisReport& report) const {
     if (plan_.correlation_s <= 0.0) {
-      report.warnings.push_back("no rest of 3 s or more in which one camera saw the arm 16 times (repeats of the "
-                                "picture before do not count): the noise's correlation time is not measured, blocks "
-                                "are " + std::to_string(std::lround(plan_.length_s)) + " s");
+      report.warnings.push_back(
+          "no rest of 3 s or more in which one camera saw the arm 16 times (repeats of the "
+          "picture before do not count): the noise's correlation time is not measured, blocks "
+          "are " +
+          std::to_string(std::lround(plan_.length_s)) + " s");
     }
     std::string list;
     for (const auto& cause : found_.selection.set_aside) {
@@ -219,8 +219,9 @@ class Findings {
       report.warnings.push_back("too small to be told from what else is slightly wrong: " + list);
     }
     if (passes_once(source_)) {
-      report.warnings.push_back("every joint moved one way only: what follows an angle looks like what follows "
-                                "time; pass the same postures several times, in both directions");
+      report.warnings.push_back(
+          "every joint moved one way only: what follows an angle looks like what follows "
+          "time; pass the same postures several times, in both directions");
     }
     if (report.duration_s < 30.0) {
       report.warnings.push_back("the log is shorter than 30 s: small causes stay hidden");
@@ -229,12 +230,10 @@ class Findings {
 
   [[nodiscard]] Eigen::MatrixXd joint_corrections(const Linearisation& at) const {
     const auto& arm = source_.roles().arm;
-    Eigen::MatrixXd result(static_cast<Eigen::Index>(at.corrections.size()),
-                           static_cast<Eigen::Index>(arm.size()));
+    Eigen::MatrixXd result(static_cast<Eigen::Index>(at.corrections.size()), static_cast<Eigen::Index>(arm.size()));
     for (Eigen::Index v = 0; v < result.rows(); ++v) {
       for (Eigen::Index j = 0; j < result.cols(); ++j) {
-        result(v, j) =
-            at.corrections[static_cast<std::size_t>(v)].dq[arm[static_cast<std::size_t>(j)]];
+        result(v, j) = at.corrections[static_cast<std::size_t>(v)].dq[arm[static_cast<std::size_t>(j)]];
       }
     }
     return result;
@@ -272,8 +271,8 @@ class Findings {
     for (const auto joint : source_.roles().arm) {
       sample.angle_deg.push_back(degrees(fit.at.instants[v].q[joint]));
       sample.velocity_deg_s.push_back(degrees(fit.at.instants[v].qdot[joint]));
-      sample.torque_nm.push_back(fit.at.instants[v].gravity_torque.size() > 0
-                                     ? fit.at.instants[v].gravity_torque[joint] : 0.0);
+      sample.torque_nm.push_back(fit.at.instants[v].gravity_torque.size() > 0 ? fit.at.instants[v].gravity_torque[joint]
+                                                                              : 0.0);
     }
   }
 
@@ -359,9 +358,8 @@ CauseName name_of(const Candidate& candidate) {
   return {candidate.name, candidate.target.joint, candidate.target.source};
 }
 
-DiagnosisReport findings(MeasurementSource& source, const SelectionOptions& rules,
-                         const CoordinateLayout& layout, const BlockPlan& plan, const Found& found,
-                         const ErrorModel& baseline, const ModelFit& before,
+DiagnosisReport findings(MeasurementSource& source, const SelectionOptions& rules, const CoordinateLayout& layout,
+                         const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before,
                          const std::vector<NotTestable>& excluded, double systematic_share,
                          const std::map<std::string, double>& systematic_error) {
   return Findings(source, rules, layout, plan, found, baseline, before, systematic_share, systematic_error)

@@ -21,9 +21,8 @@ CauseName name_of(const Candidate& candidate);
 
 /// The figures of the report: causes with their intervals, limits, bars, offsets, and the errors on
 /// held-out blocks before and after. The verdict is not worded yet.
-DiagnosisReport findings(MeasurementSource& source, const SelectionOptions& rules,
-                         const CoordinateLayout& layout, const BlockPlan& plan, const Found& found,
-                         const ErrorModel& baseline, const ModelFit& before,
+DiagnosisReport findings(MeasurementSource& source, const SelectionOptions& rules, const CoordinateLayout& layout,
+                         const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before,
                          const std::vector<NotTestable>& excluded, double systematic_share,
                          const std::map<std::string, double>& systematic_error);
 

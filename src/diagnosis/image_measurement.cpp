@@ -32,8 +32,8 @@ class Coverage {
     const double fu = std::floor(u), fv = std::floor(v);
     const int u0 = static_cast<int>(fu), v0 = static_cast<int>(fv);
     if (u0 < 0 || v0 < 0 || u0 + 1 >= width_ || v0 + 1 >= height_) return -1.0;
-    if (!valid_.empty() && !(valid_.at(u0, v0) && valid_.at(u0 + 1, v0) && valid_.at(u0, v0 + 1) &&
-                             valid_.at(u0 + 1, v0 + 1))) {
+    if (!valid_.empty() &&
+        !(valid_.at(u0, v0) && valid_.at(u0 + 1, v0) && valid_.at(u0, v0 + 1) && valid_.at(u0 + 1, v0 + 1))) {
       return -1.0;
     }
     const double a = u - fu, b = v - fv;
@@ -97,14 +97,13 @@ SilhouetteModel silhouettes_of(const RobotModel& model, FaceCulling culling) {
 
 /// What one thread needs.
 struct ImageMeasurement::Worker {
-  Worker(const std::shared_ptr<const RobotModel>& model, const JointRoles& roles,
-         const RobotSetup& setup, const StereoRig& rig)
+  Worker(const std::shared_ptr<const RobotModel>& model, const JointRoles& roles, const RobotSetup& setup,
+         const StereoRig& rig)
       : compressor(model, roles, links_of(setup), cameras_of(rig)),
-        extractor(silhouettes_of(*model, setup.culling), rig.intrinsics()),
-        X_CB(setup.model.rendered_links.size()) {}
+        extractor(silhouettes_of(*model, setup.culling), rig.intrinsics()), X_CB(setup.model.rendered_links.size()) {}
 
-  void compress(const ViewInput& view, const Seen& seen, const Corrections& c,
-                const CameraModel& camera, double search_px, CompressedView& out) {
+  void compress(const ViewInput& view, const Seen& seen, const Corrections& c, const CameraModel& camera,
+                double search_px, CompressedView& out) {
     const auto poses = compressor.set_view(view.joints.q, c, view.camera);
     const auto& k = camera.intrinsics;
     PinholeIntrinsics corrected = k;
@@ -132,8 +131,8 @@ struct ImageMeasurement::Worker {
       const Eigen::Vector2d normal = point.normal.cast<double>();
       const Eigen::Vector2d x = p_C.head<2>() / p_C.z();
       const Eigen::Vector2d bent(corrected.fx * x.x(), corrected.fy * x.y());
-      const Eigen::Vector2d pixel = point.pixel.cast<double>() +
-                                    c.camera.k1 * x.squaredNorm() * bent + c.dilation_px * normal;
+      const Eigen::Vector2d pixel =
+          point.pixel.cast<double>() + c.camera.k1 * x.squaredNorm() * bent + c.dilation_px * normal;
       const auto distance = coverage.edge(pixel, normal, std::max(search_px, kFar_px));
       const double far = distance ? std::min(kFar_px, std::abs(*distance)) : kFar_px;
       misfit += far <= kHuber_px ? far * far : kHuber_px * (2.0 * far - kHuber_px);
@@ -228,8 +227,7 @@ void ImageMeasurement::instant(std::size_t view, const Eigen::VectorXd& offsets,
   out.qddot = views_[view].qddot;
 }
 
-void ImageMeasurement::compress(std::span<const Corrections> corrections,
-                                std::vector<CompressedView>& out) {
+void ImageMeasurement::compress(std::span<const Corrections> corrections, std::vector<CompressedView>& out) {
   out.resize(views_.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&](Worker& worker) {
@@ -238,8 +236,7 @@ void ImageMeasurement::compress(std::span<const Corrections> corrections,
         worker.leave_out(out[v]);
         continue;
       }
-      worker.compress(views_[v], seen_[v], corrections[v], rig_.cameras[views_[v].camera],
-                      search_px_, out[v]);
+      worker.compress(views_[v], seen_[v], corrections[v], rig_.cameras[views_[v].camera], search_px_, out[v]);
     }
   };
   std::vector<std::thread> threads;

@@ -20,7 +20,8 @@ std::map<std::string, double> resting_joints(const RobotModel& robot, const Robo
 }  // namespace
 
 JointStream::JointStream(const RobotModel& robot, const RobotSetup& setup, const BusOptions& bus)
-    : limits_(bus.limits), clock_step_(bus.synchroniser.clock_step), assembler_(names_of(robot), resting_joints(robot, setup)) {
+    : limits_(bus.limits), clock_step_(bus.synchroniser.clock_step),
+      assembler_(names_of(robot), resting_joints(robot, setup)) {
   for (const auto& name : names_of(robot)) index_.emplace(name, index_.size());
 }
 

@@ -104,7 +104,7 @@ class LogDiagnosis {
     // outline under shading and noise. Joint offsets were 0.03 deg off in eight logs of two simulators,
     // the wrist's pitch -0.04 in every one.
     diagnosis.systematic_error = {{"silhouette_bias", 0.04}, {"finger_posture", 0.03}, {"mesh_scale", 0.06},
-                                  {"focal_length", 0.11}, {"joint_offset", 0.03}, {"slip", 0.03}};
+                                  {"focal_length", 0.11},    {"joint_offset", 0.03},   {"slip", 0.03}};
     // Not every posture is off alike: the last seconds of a log in another one look like a small slip.
     diagnosis.tolerances["slip"] = 3.0 * diagnosis.systematic_error.at("slip");
     diagnosis.selection.crowd_rest_t = kCrowdThroughPictures;
@@ -112,15 +112,15 @@ class LogDiagnosis {
     auto report = diagnosed(diagnosis);
     add_remarks(report);
     if (other_masks) {
-      report.warnings.insert(report.warnings.begin(),
-                             "the head turned before a room, and a learned background is of no use then: masks were looked "
-                             "for around the predicted robot, as by vision.method: statistics");
+      report.warnings.insert(
+          report.warnings.begin(),
+          "the head turned before a room, and a learned background is of no use then: masks were looked "
+          "for around the predicted robot, as by vision.method: statistics");
     }
     LogPictures::place_hand(pipeline_, measurement_.views(), report);
     if (!options_.out.empty()) {
       report.write(options_.out);
-      diagnosis_page(report, options_.log.filename().string(),
-                     pictures_.draw(pipeline_, measurement_.stream(), report))
+      diagnosis_page(report, options_.log.filename().string(), pictures_.draw(pipeline_, measurement_.stream(), report))
           .write(options_.out / "report.html");
     }
     return report;
@@ -156,9 +156,10 @@ class LogDiagnosis {
       report.warnings.insert(report.warnings.begin(), turn + "; nothing found here holds until then");
     }
     if (const auto steps = facts_.bus.synchroniser.clock_steps; steps > 0) {
-      report.warnings.push_back(fmt::format("the clock of the time stamps stepped {}: what depends on speed, or on when "
-                                            "it happened, may be wrong; record again with one steady clock",
-                                            steps == 1 ? "once" : fmt::format("{} times", steps)));
+      report.warnings.push_back(
+          fmt::format("the clock of the time stamps stepped {}: what depends on speed, or on when "
+                      "it happened, may be wrong; record again with one steady clock",
+                      steps == 1 ? "once" : fmt::format("{} times", steps)));
     }
     if (auto lost = lost_pictures(facts_.bus, kTolerableLoss); !lost.empty()) {
       report.warnings.push_back(std::move(lost));
@@ -218,10 +219,12 @@ class LogDiagnosis {
     }
     if (4 * pictures_with_arm_ < pictures_seen_) {
       throw DataError(log + ": the arm is seen in " + std::to_string(pictures_with_arm_) + " of " +
-                      std::to_string(pictures_seen_) + " pictures; record it with the hand in view of both eyes" + kAdvice);
+                      std::to_string(pictures_seen_) + " pictures; record it with the hand in view of both eyes" +
+                      kAdvice);
     }
     if (2 * frames_swapped_ > frames_looked_at_) {
-      throw DataError(log + ": the left and right pictures are swapped: each shows what the other eye sees; exchange "
+      throw DataError(log +
+                      ": the left and right pictures are swapped: each shows what the other eye sees; exchange "
                       "them where they are published or imported, and record again");
     }
   }
@@ -231,8 +234,8 @@ class LogDiagnosis {
     Raster raster(options_.picture_rate_hz);
     for_each("learning the background", nullptr, [&](Observation& o) {
       if (raster.takes(o.utime)) {
-        pictures_to_see_ += static_cast<std::size_t>(std::count_if(
-            o.cameras.begin(), o.cameras.end(), [](const auto& camera) { return camera.has_value(); }));
+        pictures_to_see_ += static_cast<std::size_t>(
+            std::count_if(o.cameras.begin(), o.cameras.end(), [](const auto& camera) { return camera.has_value(); }));
       }
       if (last >= 0 && o.utime - last < kLearnEvery) return true;
       last = o.utime;
@@ -278,7 +281,7 @@ class LogDiagnosis {
   }
 
   static constexpr Microseconds kLearnEvery = 90'000;
-  static constexpr double kNoise_px = 0.5;       ///< rms after the extension; a good model leaves 0.3
+  static constexpr double kNoise_px = 0.5;  ///< rms after the extension; a good model leaves 0.3
   /// Measured: intervals by blocks alone held 61 % of 23 known parameters in simulated pictures, whose
   /// estimates missed by 1.6 % (median).
   static constexpr double kSystematicShare = 0.02;
@@ -286,7 +289,7 @@ class LogDiagnosis {
   static constexpr double kCrowdThroughPictures = 1.0;
   /// Models of the recording's own parts find 86 to 99 % of their outlines, the official hand on it 67 %.
   static constexpr double kTrustedOutline = 0.75;
-  static constexpr double kShapeError_px = 0.8;  ///< ... and where this is left, parts have another shape
+  static constexpr double kShapeError_px = 0.8;   ///< ... and where this is left, parts have another shape
   static constexpr double kTolerableLoss = 0.05;  ///< of all pictures
   static constexpr double kStill_rad = 0.5 * kPi / 180.0;
   static constexpr double kStill_rad_s = 0.5 * kPi / 180.0;
@@ -301,7 +304,7 @@ class LogDiagnosis {
   struct {
     BusStatistics bus;
     std::vector<std::string> missing_joints;
-  } facts_;  ///< of the last pass over the log
+  } facts_;                          ///< of the last pass over the log
   std::size_t pictures_to_see_ = 0;  ///< of the whole log, counted where a background is learned
   std::size_t pictures_seen_ = 0, pictures_with_arm_ = 0;
   std::size_t frames_looked_at_ = 0, frames_swapped_ = 0;  ///< at the beginning

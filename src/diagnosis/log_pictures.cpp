@@ -38,8 +38,8 @@ class ModelSilhouettes {
  public:
   ModelSilhouettes(const Pipeline& pipeline, const ErrorModel& model, std::span<const JointSample> stream)
       : online_(pipeline.shared_robot(), pipeline.setup(), model), offsets_(model.offsets()), stream_(stream),
-        corrections_(offsets_.size()),
-        body_(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(), {}), rig_(model.corrected(pipeline.rig())) {
+        corrections_(offsets_.size()), body_(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(), {}),
+        rig_(model.corrected(pipeline.rig())) {
     SilhouetteModel silhouettes;
     silhouettes.culling = pipeline.setup().culling;
     for (const auto& part : pipeline.robot().meshes()) silhouettes.parts.push_back(part.mesh);

@@ -24,16 +24,14 @@ constexpr Microseconds kPicturePeriod = 100'000;
 class Motion final : public MeasurementSource {
  public:
   Motion(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup, const StereoRig& rig)
-      : roles_(JointRoles::of(model, setup, rig)),
-        builder_(model, setup.hand_link, setup.gravity_W),
+      : roles_(JointRoles::of(model, setup, rig)), builder_(model, setup.hand_link, setup.gravity_W),
         no_offsets_(Eigen::VectorXd::Zero(model->joint_count())) {}
 
   void add(const Observation& observation) {
     if (!views_.empty() && observation.utime < due_) return;
     // Keep to the raster, as the diagnosis does.
-    due_ = views_.empty() || observation.utime > due_ + kPicturePeriod
-               ? observation.utime + kPicturePeriod
-               : due_ + kPicturePeriod;
+    due_ = views_.empty() || observation.utime > due_ + kPicturePeriod ? observation.utime + kPicturePeriod
+                                                                       : due_ + kPicturePeriod;
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
       if (observation.cameras[c]) views_.push_back({observation.cameras[c]->joints, c, {}});
     }
@@ -50,16 +48,13 @@ class Motion final : public MeasurementSource {
     builder_.build(views_[view].joints, views_[view].camera, offsets, out);
     out.qddot = views_[view].qddot;
   }
-  void compress(std::span<const Corrections>, std::vector<CompressedView>& out) override {
-    out.clear();
-  }
+  void compress(std::span<const Corrections>, std::vector<CompressedView>& out) override { out.clear(); }
   Eigen::MatrixXd hand_jacobian(std::size_t, const Corrections&) override { return {}; }
 
   [[nodiscard]] diagnosis::Linearisation instants() {
     diagnosis::Linearisation at;
     at.instants.resize(views_.size());
-    for (std::size_t v = 0; v < views_.size(); ++v)
-      instant(v, no_offsets_, at.instants[v]);
+    for (std::size_t v = 0; v < views_.size(); ++v) instant(v, no_offsets_, at.instants[v]);
     return at;
   }
 
@@ -74,16 +69,13 @@ class Motion final : public MeasurementSource {
 
 std::string joints_text(const std::set<std::string>& joints, const std::vector<std::string>& arm) {
   if (joints.empty()) return "";
-  const bool whole =
-      std::all_of(arm.begin(), arm.end(), [&](const auto& name) { return joints.contains(name); });
-  return whole && joints.size() == arm.size() ? " of every arm joint"
-                                              : fmt::format(" of {}", fmt::join(joints, ", "));
+  const bool whole = std::all_of(arm.begin(), arm.end(), [&](const auto& name) { return joints.contains(name); });
+  return whole && joints.size() == arm.size() ? " of every arm joint" : fmt::format(" of {}", fmt::join(joints, ", "));
 }
 
 }  // namespace
 
-LogTestability testability_of(const Configuration& configuration,
-                              const std::filesystem::path& log) {
+LogTestability testability_of(const Configuration& configuration, const std::filesystem::path& log) {
   auto setup = RobotSetup::from(configuration.section("robot"));
   const auto rig = StereoRig::from(configuration.section("cameras"));
   const auto bus = BusOptions::from(configuration.section("bus"));
@@ -94,8 +86,7 @@ LogTestability testability_of(const Configuration& configuration,
   LogReader reader(log);
   ProgressBar bar("motion", reader.size());
   const auto drain = [&] {
-    while (const auto arrived = stream.next())
-      motion.add(arrived->observation);
+    while (const auto arrived = stream.next()) motion.add(arrived->observation);
   };
   LogEvent event;
   while (reader.next(event)) {
@@ -109,8 +100,8 @@ LogTestability testability_of(const Configuration& configuration,
 
   const auto views = motion.views();
   if (views.empty()) {
-    throw DataError(fmt::format("{}: no pictures with encoders on {} and {}", log.string(),
-                                stream.channels().cameras, stream.channels().joint_state));
+    throw DataError(fmt::format("{}: no pictures with encoders on {} and {}", log.string(), stream.channels().cameras,
+                                stream.channels().joint_state));
   }
   LogTestability result;
   result.duration_s = seconds(views.back().joints.utime - views.front().joints.utime);
@@ -134,27 +125,22 @@ LogTestability testability_of(const Configuration& configuration,
 
 std::string LogTestability::text() const {
   if (duration_s < shortest_s) {
-    return fmt::format(
-        "a diagnosis needs at least {:.0f} s of pictures with encoders; this log has {:.1f} s\n",
-        shortest_s, duration_s);
+    return fmt::format("a diagnosis needs at least {:.0f} s of pictures with encoders; this log has {:.1f} s\n",
+                       shortest_s, duration_s);
   }
   std::string out =
-      fmt::format("a diagnosis would use {:.1f} s and {} pictures of this log and could test\n",
-                  duration_s, pictures);
+      fmt::format("a diagnosis would use {:.1f} s and {} pictures of this log and could test\n", duration_s, pictures);
   std::map<std::string, std::set<std::string>> by_cause;
   for (const auto& cause : testable) {
     auto& on = by_cause[cause.name];
     // A pair or a camera does not help to decide what to move.
     if (!cause.joint.empty() && cause.source.empty()) on.insert(cause.joint);
   }
-  for (const auto& [name, on] : by_cause)
-    out += "  " + name + joints_text(on, arm_joints) + '\n';
+  for (const auto& [name, on] : by_cause) out += "  " + name + joints_text(on, arm_joints) + '\n';
   std::map<std::string, std::set<std::string>> by_reason;
-  for (const auto& item : not_testable)
-    by_reason[item.reason].insert(item.cause.name);
+  for (const auto& item : not_testable) by_reason[item.reason].insert(item.cause.name);
   if (!by_reason.empty()) out += "but not\n";
-  for (const auto& [reason, names] : by_reason)
-    out += fmt::format("  {}: {}\n", fmt::join(names, ", "), reason);
+  for (const auto& [reason, names] : by_reason) out += fmt::format("  {}: {}\n", fmt::join(names, ", "), reason);
   return out;
 }
 

@@ -15,9 +15,9 @@ using Kind = CoordinateLayout::Kind;
 constexpr double kStep = 1e-5;
 
 bool moves_links(Kind kind) {
-  return kind == Kind::kJoint || kind == Kind::kAlong || kind == Kind::kTilt1 ||
-         kind == Kind::kTilt2 || kind == Kind::kShift1 || kind == Kind::kShift2 ||
-         kind == Kind::kBaseX || kind == Kind::kBaseY || kind == Kind::kBaseZ || kind == Kind::kCameraX;
+  return kind == Kind::kJoint || kind == Kind::kAlong || kind == Kind::kTilt1 || kind == Kind::kTilt2 ||
+         kind == Kind::kShift1 || kind == Kind::kShift2 || kind == Kind::kBaseX || kind == Kind::kBaseY ||
+         kind == Kind::kBaseZ || kind == Kind::kCameraX;
 }
 
 template <class C>
@@ -67,7 +67,9 @@ CoordinateLayout::CoordinateLayout(const JointRoles& roles) {
   }
 }
 
-double& CoordinateLayout::slot(const Entry& entry, Corrections& c) { return slot_of(entry, c); }
+double& CoordinateLayout::slot(const Entry& entry, Corrections& c) {
+  return slot_of(entry, c);
+}
 
 double CoordinateLayout::slot(const Entry& entry, const Corrections& c) {
   return slot_of(entry, const_cast<Corrections&>(c));
@@ -89,17 +91,13 @@ Eigen::Index CoordinateLayout::joint(Eigen::Index joint) const {
 }
 
 ViewCompressor::ViewCompressor(std::shared_ptr<const RobotModel> model, const JointRoles& roles,
-                               std::vector<std::string> links,
-                               std::vector<std::string> camera_links)
+                               std::vector<std::string> links, std::vector<std::string> camera_links)
     : layout_(roles), kinematics_(model, std::move(links), std::move(camera_links)),
-      X_CB_(kinematics_.link_count(), Pose::Identity()), moved_(X_CB_),
-      probe_(model->joint_count()),
-      motion_(static_cast<std::size_t>(layout_.size()) * X_CB_.size(),
-              Eigen::Matrix<double, 3, 4>::Zero()) {}
+      X_CB_(kinematics_.link_count(), Pose::Identity()), moved_(X_CB_), probe_(model->joint_count()),
+      motion_(static_cast<std::size_t>(layout_.size()) * X_CB_.size(), Eigen::Matrix<double, 3, 4>::Zero()) {}
 
 std::span<const Pose> ViewCompressor::set_view(const Eigen::Ref<const Eigen::VectorXd>& encoder,
-                                               const Corrections& corrections,
-                                               std::size_t camera) {
+                                               const Corrections& corrections, std::size_t camera) {
   kinematics_.compute(encoder, corrections, camera, X_CB_);
   probe_ = corrections;
   for (std::size_t i = 0; i < layout_.entries().size(); ++i) {
@@ -111,16 +109,16 @@ std::span<const Pose> ViewCompressor::set_view(const Eigen::Ref<const Eigen::Vec
     kinematics_.compute(encoder, probe_, camera, moved_);
     value = at;
     for (std::size_t l = 0; l < X_CB_.size(); ++l) {
-      motion_[i * X_CB_.size() + l] =
-          ((moved_[l] * X_CB_[l].inverse(Eigen::Isometry)).matrix().topRows<3>() -
-           Eigen::Matrix4d::Identity().topRows<3>()) / kStep;
+      motion_[i * X_CB_.size() + l] = ((moved_[l] * X_CB_[l].inverse(Eigen::Isometry)).matrix().topRows<3>() -
+                                       Eigen::Matrix4d::Identity().topRows<3>()) /
+                                      kStep;
     }
   }
   return X_CB_;
 }
 
-void ViewCompressor::compress(std::span<const OutlinePoint> points,
-                              const PinholeIntrinsics& intrinsics, CompressedView& out) {
+void ViewCompressor::compress(std::span<const OutlinePoint> points, const PinholeIntrinsics& intrinsics,
+                              CompressedView& out) {
   const auto n = static_cast<Eigen::Index>(points.size());
   rows_.resize(layout_.size(), n);  // one column per point
   residuals_.resize(n);

@@ -9,10 +9,10 @@ namespace bodyschema::diagnosis {
 namespace {
 
 constexpr double kUsual_px = 8.0, kWidest_px = 40.0;
-constexpr std::size_t kCoarse = 4;   ///< one instant in so many, far from the optimum
-constexpr double kNarrow = 0.75;     ///< of the search, a step
-constexpr double kReach = 4.0;       ///< the search begins at so many times the typical distance
-constexpr double kLost_px2 = 19.0;   ///< cost of a point that left the pictures
+constexpr std::size_t kCoarse = 4;  ///< one instant in so many, far from the optimum
+constexpr double kNarrow = 0.75;    ///< of the search, a step
+constexpr double kReach = 4.0;      ///< the search begins at so many times the typical distance
+constexpr double kLost_px2 = 19.0;  ///< cost of a point that left the pictures
 
 std::vector<ParameterRef> fitted_parameters(const ErrorModel& model) {
   std::vector<ParameterRef> list;
@@ -135,8 +135,7 @@ ModelFit ModelFitter::about(const ErrorModel& model, const std::vector<const Spa
   return regress(model, extra);
 }
 
-ModelFit ModelFitter::fit(ErrorModel& model, const std::vector<const SparseColumn*>& extra,
-                          const Settings& settings) {
+ModelFit ModelFitter::fit(ErrorModel& model, const std::vector<const SparseColumn*>& extra, const Settings& settings) {
   constexpr double kSmall = 2e-3;  // of a parameter's typical size
   if (settings.from_afar) approach(model, extra);
   source_.set_search(finest_px_, settings.every);
@@ -162,14 +161,14 @@ ModelFit ModelFitter::fit(ErrorModel& model, const std::vector<const SparseColum
   return accepted;
 }
 
-double ModelFitter::approach(ErrorModel& model, const std::vector<const SparseColumn*>& extra,
-                             double from_px) {
+double ModelFitter::approach(ErrorModel& model, const std::vector<const SparseColumn*>& extra, double from_px) {
   if (!source_.set_search(kUsual_px, kCoarse)) return 0.0;
   auto at = linearise(source_, model);
   const double outline = outline_points(at);
   double best_cost = misfit(at, outline);
   auto best = model;
-  double search_px = std::clamp(kReach * typical_distance_px(best_cost), std::max({kUsual_px, finest_px_, from_px}), kWidest_px);
+  double search_px =
+      std::clamp(kReach * typical_distance_px(best_cost), std::max({kUsual_px, finest_px_, from_px}), kWidest_px);
   // From afar the way to the outlines may lead over worse places: every step is taken, the best kept.
   auto trial = model;
   while (true) {

@@ -48,8 +48,7 @@ class ModelFitter {
   };
   /// Fits the model's parameters, which end at the optimum. Parameters that the log cannot see stay
   /// where they are.
-  ModelFit fit(ErrorModel& model, const std::vector<const SparseColumn*>& extra,
-               const Settings& settings);
+  ModelFit fit(ErrorModel& model, const std::vector<const SparseColumn*>& extra, const Settings& settings);
 
   /// From afar: looks for the outlines as far off as they seem to be, then ever closer, on some of
   /// the pictures. Returns the distance at which they are left, px; does nothing and returns 0 where
@@ -72,8 +71,7 @@ class ModelFitter {
 
  private:
   ModelFit regress(const ErrorModel& model, const std::vector<const SparseColumn*>& extra);
-  ModelFit regress(const ErrorModel& model, Linearisation at,
-                   const std::vector<const SparseColumn*>& extra);
+  ModelFit regress(const ErrorModel& model, Linearisation at, const std::vector<const SparseColumn*>& extra);
 
   MeasurementSource& source_;
   const CoordinateLayout& layout_;

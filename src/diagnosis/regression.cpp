@@ -113,8 +113,7 @@ std::vector<SparseColumn> effect_columns(MeasurementSource& source, const Linear
   return columns;
 }
 
-SparseColumn joint_column(const CoordinateLayout& layout, Eigen::Index joint,
-                          const std::vector<double>& value) {
+SparseColumn joint_column(const CoordinateLayout& layout, Eigen::Index joint, const std::vector<double>& value) {
   SparseColumn column;
   column.views.resize(value.size());
   const auto coordinate = static_cast<std::uint32_t>(layout.joint(joint));
@@ -164,8 +163,7 @@ BlockStatistics accumulate(const std::vector<CompressedView>& views, const Block
       for (Eigen::Index c = 0; c < n; ++c) {
         for (const auto& e : columns[static_cast<std::size_t>(c)]->views[v]) {
           const auto row = AM.row(static_cast<Eigen::Index>(e.coordinate));
-          block.information.col(c).head(c + 1) +=
-              static_cast<double>(e.value) * row.head(c + 1).transpose();
+          block.information.col(c).head(c + 1) += static_cast<double>(e.value) * row.head(c + 1).transpose();
           if (c < few) tail.information.row(c) += static_cast<double>(e.value) * row;
         }
       }

@@ -42,12 +42,10 @@ std::vector<SparseColumn> effect_columns(MeasurementSource& source, const Linear
                                          const CoordinateLayout& layout);
 
 /// A column that moves one joint by `value(view)` radians.
-SparseColumn joint_column(const CoordinateLayout& layout, Eigen::Index joint,
-                          const std::vector<double>& value);
+SparseColumn joint_column(const CoordinateLayout& layout, Eigen::Index joint, const std::vector<double>& value);
 
 /// @param switchable  that many columns, the first ones, may begin within a block
 BlockStatistics accumulate(const std::vector<CompressedView>& views, const BlockPlan& plan,
-                           const std::vector<const SparseColumn*>& columns,
-                           std::size_t switchable = 0);
+                           const std::vector<const SparseColumn*>& columns, std::size_t switchable = 0);
 
 }  // namespace bodyschema::diagnosis

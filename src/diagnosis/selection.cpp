@@ -33,8 +33,8 @@ bool same_cause(const Candidate& a, const Candidate& b) {
 
 class Selector {
  public:
-  Selector(const BlockStatistics& statistics, const Columns& always,
-           const std::vector<Candidate>& candidates, const SelectionOptions& options)
+  Selector(const BlockStatistics& statistics, const Columns& always, const std::vector<Candidate>& candidates,
+           const SelectionOptions& options)
       : statistics_(statistics), always_(always), candidates_(candidates), options_(options),
         gain_floor_(options.one_pass ? options.gain_far : options.gain_floor),
         generic_gain_floor_(std::max(gain_floor_, options.generic_gain_floor)) {
@@ -120,8 +120,7 @@ class Selector {
     const auto n = static_cast<Eigen::Index>(candidates_[candidate].columns.size());
     const Eigen::VectorXd theta = f.estimate.segment(at, n);
     Eigen::MatrixXd V = f.covariance.block(at, at, n, n);
-    const double dispersion =
-        (V.diagonal().array() / f.model_variance.segment(at, n).array()).mean();
+    const double dispersion = (V.diagonal().array() / f.model_variance.segment(at, n).array()).mean();
     if (dispersion < floor_) V *= floor_ / dispersion;
     V += 1e-12 * V.trace() * Eigen::MatrixXd::Identity(n, n);
     // Few blocks know the covariance of many columns badly (Hotelling's correction; none for one).
@@ -198,7 +197,8 @@ class Selector {
     const auto groups = [&](std::size_t blocks) { return (blocks + options_.far_group - 1) / options_.far_group; };
     const auto z = z_of_few(wald_z(extended, extended_model, candidate), groups(statistics_.block_count()),
                             groups(options_.usual_blocks));
-    return z > options_.z_far && (plain.heldout() - extended.heldout()) / baseline_ > gain_floor_ * measure_of(candidates_[candidate]);
+    return z > options_.z_far &&
+           (plain.heldout() - extended.heldout()) / baseline_ > gain_floor_ * measure_of(candidates_[candidate]);
   }
 
   [[nodiscard]] std::vector<CandidateScore> score_all() const {
@@ -278,8 +278,7 @@ class Selector {
 
   /// A cause that is already in the model, at another time or in another shape.
   [[nodiscard]] bool blocked(std::size_t candidate) const {
-    return contains(dropped_, candidate) ||
-           std::any_of(causes_.begin(), causes_.end(), [&](std::size_t c) {
+    return contains(dropped_, candidate) || std::any_of(causes_.begin(), causes_.end(), [&](std::size_t c) {
              return same_cause(candidates_[c], candidates_[candidate]) && !candidates_[c].slip &&
                     !candidates_[c].generic();
            });
@@ -370,9 +369,11 @@ class Selector {
     find_rest(result);
     std::vector<SelectedCause> list;
     for (const auto c : reported()) list.push_back({c, test(c).score, {}, false});
-    std::stable_sort(list.begin(), list.end(), [](const auto& a, const auto& b) { return a.score.gain > b.score.gain; });
+    std::stable_sort(list.begin(), list.end(),
+                     [](const auto& a, const auto& b) { return a.score.gain > b.score.gain; });
     const double left = share_left(), rest = std::max(0.0, result.rest_gain);
-    const bool many = list.size() >= options_.crowd || (list.size() > 1 && too_small_for_a_crowd(list.front().candidate));
+    const bool many =
+        list.size() >= options_.crowd || (list.size() > 1 && too_small_for_a_crowd(list.front().candidate));
     if (!many && result.rest_t <= options_.crowd_rest_t) return;
     // The crowd is what stands below the last cause that is large in what the larger ones leave, and larger
     // than all the smaller ones together. Of one or two causes none needs to be large beside next to nothing.
@@ -381,7 +382,8 @@ class Selector {
       const auto& smallest = list[list.size() - 1 - result.set_aside.size()];
       const double gain = smallest.score.gain, without_it = left + crowd - rest + gain;
       const bool alone = !many && crowd <= options_.gain_floor * left;
-      const bool large = alone || (gain > options_.crowd_floor * without_it && !too_small_for_a_crowd(smallest.candidate));
+      const bool large =
+          alone || (gain > options_.crowd_floor * without_it && !too_small_for_a_crowd(smallest.candidate));
       if (large && gain > options_.crowd_ratio * crowd) break;
       crowd += gain;
       result.set_aside.push_back(smallest);
@@ -422,8 +424,7 @@ class Selector {
         auto reduced_model = extended_model;
         for (const auto c : killed) std::erase(reduced_model, c);
         const auto reduced = fit(reduced_model);
-        if (!reduced.usable ||
-            paired_t(reduced.heldout_loss, current_.heldout_loss) > options_.t_same) {
+        if (!reduced.usable || paired_t(reduced.heldout_loss, current_.heldout_loss) > options_.t_same) {
           continue;
         }
         if (!best || killed.size() > best_killed.size() ||
@@ -450,8 +451,7 @@ class Selector {
     const NestedFits rest(statistics_, columns_of(without(model_, cause)));
     std::vector<std::pair<double, std::size_t>> same;
     for (std::size_t a = 0; a < candidates_.size(); ++a) {
-      if (contains(model_, a) || candidates_[a].generic() ||
-          same_cause(candidates_[a], candidates_[cause])) {
+      if (contains(model_, a) || candidates_[a].generic() || same_cause(candidates_[a], candidates_[cause])) {
         continue;
       }
       const auto both_model = with(model_, a);
@@ -459,7 +459,8 @@ class Selector {
       const auto instead = rest.with(candidates_[a].columns);
       if (!instead.usable) continue;
       // Exactly aliased ones cannot be fitted together at all.
-      if (both.usable && both.independent > options_.alike && wald_z(both, both_model, cause) > options_.z_same) continue;
+      if (both.usable && both.independent > options_.alike && wald_z(both, both_model, cause) > options_.z_same)
+        continue;
       if (instead.heldout() - current_.heldout() > options_.least_worse * baseline_ &&
           paired_t(instead.heldout_loss, current_.heldout_loss) > options_.t_same) {
         continue;
@@ -468,9 +469,8 @@ class Selector {
     }
     std::sort(same.begin(), same.end());
     for (const auto& [loss, a] : same) {
-      const bool listed = std::any_of(result.same.begin(), result.same.end(), [&](std::size_t b) {
-        return same_cause(candidates_[a], candidates_[b]);
-      });
+      const bool listed = std::any_of(result.same.begin(), result.same.end(),
+                                      [&](std::size_t b) { return same_cause(candidates_[a], candidates_[b]); });
       if (!listed) result.same.push_back(a);
     }
     if (!same.empty() && same.front().first < current_.heldout()) {
@@ -482,8 +482,7 @@ class Selector {
 
   /// How a candidate fares in the place of a cause.
   /// @param rest  the model without the cause
-  [[nodiscard]] CandidateScore score_instead(std::size_t candidate, std::size_t cause,
-                                             const NestedFits& rest) const {
+  [[nodiscard]] CandidateScore score_instead(std::size_t candidate, std::size_t cause, const NestedFits& rest) const {
     const auto fit = rest.with(candidates_[candidate].columns);
     return {wald_z(fit, with(without(model_, cause), candidate), candidate),
             (rest.base().heldout() - fit.heldout()) / baseline_,
@@ -527,8 +526,7 @@ class Selector {
       columns.insert(columns.end(), candidate.columns.begin(), candidate.columns.end());
     }
     Eigen::VectorXd precision = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(columns.size()));
-    precision.tail(static_cast<Eigen::Index>(columns.size() - own))
-        .setConstant(floor_ / (kSmall * kSmall));
+    precision.tail(static_cast<Eigen::Index>(columns.size() - own)).setConstant(floor_ / (kSmall * kSmall));
     const auto loss = statistics_.heldout_with_prior(columns, precision);
     result.rest_gain = (current_.heldout() - loss.sum()) / baseline_;
     result.rest_t = paired_t(current_.heldout_loss, loss);
@@ -540,14 +538,14 @@ class Selector {
   const SelectionOptions& options_;
   double gain_floor_;  ///< least gain of a cause
   double generic_gain_floor_;
-  Ids model_;    ///< candidates in the fit: nuisances, then causes
-  Ids causes_;   ///< those that were added
-  Ids dropped_;  ///< and those that were dropped again: not tried twice
-  std::optional<Ids> standing_;  ///< those that stand out, where there is a crowd
+  Ids model_;                         ///< candidates in the fit: nuisances, then causes
+  Ids causes_;                        ///< those that were added
+  Ids dropped_;                       ///< and those that were dropped again: not tried twice
+  std::optional<Ids> standing_;       ///< those that stand out, where there is a crowd
   std::optional<NestedFits> nested_;  ///< about model_
   BlockFit current_;
   double baseline_ = 1.0;
-  double floor_ = 0.0;       ///< least dispersion of a candidate
+  double floor_ = 0.0;  ///< least dispersion of a candidate
 };
 
 }  // namespace
@@ -560,8 +558,7 @@ std::string Candidate::description() const {
 }
 
 Selection select_causes(const BlockStatistics& statistics, const Columns& always,
-                        const std::vector<Candidate>& candidates,
-                        const SelectionOptions& options) {
+                        const std::vector<Candidate>& candidates, const SelectionOptions& options) {
   return Selector(statistics, always, candidates, options).run();
 }
 

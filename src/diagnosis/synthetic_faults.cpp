@@ -12,8 +12,8 @@ constexpr double kMostOffset = 7.0 * kDeg;
 
 }  // namespace
 
-FaultyRobot::FaultyRobot(const TrialRobot& robot, const JointRoles& roles,
-                         const TrialOptions& options, const SyntheticPath& path, TrialRandom& random)
+FaultyRobot::FaultyRobot(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options,
+                         const SyntheticPath& path, TrialRandom& random)
     : robot_(robot), roles_(roles), options_(options), path_(path), random_(random),
       instants_(robot.model, robot.setup.hand_link, robot.setup.gravity_W), torques_(robot.model) {
   offset_.setZero(robot.model->joint_count());
@@ -30,10 +30,10 @@ Eigen::VectorXd FaultyRobot::true_joints(double t_s) {
   return q;
 }
 
-void FaultyRobot::transmit(const TrialFault& fault, std::size_t index, double t_s,
-                           const Eigen::VectorXd& motor, Eigen::VectorXd& q) {
-  const auto row = static_cast<std::size_t>(
-      std::clamp(t_s * kTableRate_hz, 0.0, static_cast<double>(table_.size() - 1)));
+void FaultyRobot::transmit(const TrialFault& fault, std::size_t index, double t_s, const Eigen::VectorXd& motor,
+                           Eigen::VectorXd& q) {
+  const auto row =
+      static_cast<std::size_t>(std::clamp(t_s * kTableRate_hz, 0.0, static_cast<double>(table_.size() - 1)));
   const auto& name = fault.cause.name;
   const auto j = fault.cause.joint.empty() ? Eigen::Index{0} : roles_.index(fault.cause.joint);
   if (name == "compliance") {
@@ -163,9 +163,10 @@ void FaultyRobot::build(const TrialFault& fault, std::size_t camera, Corrections
     body.camera.focal_scale += 0.01 * v;
   } else if (name == "principal_point") {
     const auto& where = fault.cause.source;
-    const double share = where == "common" ? 1.0
-                         : where == "difference" ? (camera == 0 ? 0.5 : -0.5)
-                         : (where == "left") == (camera == 0) ? 1.0 : 0.0;
+    const double share = where == "common"                    ? 1.0
+                         : where == "difference"              ? (camera == 0 ? 0.5 : -0.5)
+                         : (where == "left") == (camera == 0) ? 1.0
+                                                              : 0.0;
     body.camera.cx_px += share * v;
     body.camera.cy_px += share * fault.second;
   } else if (name == "distortion") {

@@ -14,8 +14,8 @@ namespace bodyschema::diagnosis {
 class FaultyRobot {
  public:
   /// All references outlive this.
-  FaultyRobot(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options,
-              const SyntheticPath& path, TrialRandom& random);
+  FaultyRobot(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options, const SyntheticPath& path,
+              TrialRandom& random);
 
   /// True joint angles at a time.
   [[nodiscard]] Eigen::VectorXd true_joints(double t_s);
@@ -42,8 +42,8 @@ class FaultyRobot {
   Instant scratch_;
   Eigen::VectorXd offset_;
   double phase_ = 0.0;
-  std::vector<std::vector<double>> table_;        ///< play, lags and walks over time, per fault
-  std::vector<std::pair<double, double>> kink_;   ///< centre and width, per fault
+  std::vector<std::vector<double>> table_;       ///< play, lags and walks over time, per fault
+  std::vector<std::pair<double, double>> kink_;  ///< centre and width, per fault
 };
 
 }  // namespace bodyschema::diagnosis

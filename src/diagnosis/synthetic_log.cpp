@@ -25,8 +25,7 @@ struct SurfacePoint {
 class SyntheticLog final : public SyntheticMeasurement {
  public:
   SyntheticLog(const TrialRobot& robot, const TrialOptions& options, std::uint64_t seed)
-      : robot_(robot), options_(options), random_(seed),
-        roles_(JointRoles::of(robot.model, robot.setup, robot.rig)),
+      : robot_(robot), options_(options), random_(seed), roles_(JointRoles::of(robot.model, robot.setup, robot.rig)),
         instants_(robot.model, robot.setup.hand_link, robot.setup.gravity_W),
         kinematics_(robot.model, shown_links(robot), camera_links(robot)),
         compressor_(robot.model, roles_, shown_links(robot), camera_links(robot)),
@@ -67,8 +66,7 @@ class SyntheticLog final : public SyntheticMeasurement {
         const Pose& X_CB = poses[surface.link];
         const Eigen::Vector3d p_C = X_CB * ((1.0 + c.mesh_scale) * surface.p_B);
         if (p_C.z() < 0.05) continue;
-        const Eigen::Vector2d pixel = project(camera.intrinsics, c.camera, p_C) +
-                                      c.dilation_px * seen.normal;
+        const Eigen::Vector2d pixel = project(camera.intrinsics, c.camera, p_C) + c.dilation_px * seen.normal;
         points.push_back({surface.link, p_C, seen.normal, seen.normal.dot(seen.pixel - pixel), 1.0});
       }
       if (points.size() < 10) {
@@ -98,8 +96,7 @@ class SyntheticLog final : public SyntheticMeasurement {
     k.cy += c.cy_px;
     return k;
   }
-  static Eigen::Vector2d project(const PinholeIntrinsics& k, const CameraCorrection& c,
-                                 const Eigen::Vector3d& p) {
+  static Eigen::Vector2d project(const PinholeIntrinsics& k, const CameraCorrection& c, const Eigen::Vector3d& p) {
     const Eigen::Vector2d x = p.head<2>() / p.z();
     const Eigen::Vector2d d = x * (1.0 + c.k1 * x.squaredNorm());
     return {k.fx * (1.0 + c.focal_scale) * d.x() + k.cx + c.cx_px,
@@ -108,8 +105,7 @@ class SyntheticLog final : public SyntheticMeasurement {
 
   void sample_surface() {
     const auto all = shown_links(robot_);
-    hand_ = static_cast<std::size_t>(
-        std::find(all.begin(), all.end(), robot_.setup.hand_link) - all.begin());
+    hand_ = static_cast<std::size_t>(std::find(all.begin(), all.end(), robot_.setup.hand_link) - all.begin());
     for (std::size_t l = 0; l < robot_.model->meshes().size(); ++l) {
       const auto& mesh = robot_.model->meshes()[l].mesh;
       std::vector<double> area;
@@ -174,30 +170,26 @@ class SyntheticLog final : public SyntheticMeasurement {
         kinematics_.compute(q_true, bodies[c], c, X_CB_);
         truth.push_back(Eigen::VectorXd(static_cast<Eigen::Index>(roles_.arm.size())));
         for (std::size_t j = 0; j < roles_.arm.size(); ++j) {
-          truth.back()[static_cast<Eigen::Index>(j)] =
-              (q_true - views_.back().joints.q)[roles_.arm[j]];
+          truth.back()[static_cast<Eigen::Index>(j)] = (q_true - views_.back().joints.q)[roles_.arm[j]];
         }
-        shared.at[c] = shared.decay * shared.at[c] +
-                       std::sqrt(1.0 - shared.decay * shared.decay) * shared_px_ * normal3();
+        shared.at[c] =
+            shared.decay * shared.at[c] + std::sqrt(1.0 - shared.decay * shared.decay) * shared_px_ * normal3();
         seen_.push_back(outline(bodies[c], c, shared.at[c], burst ? 3.0 : 1.0));
       }
     }
-    truth_.resize(static_cast<Eigen::Index>(truth.size()),
-                  static_cast<Eigen::Index>(roles_.arm.size()));
+    truth_.resize(static_cast<Eigen::Index>(truth.size()), static_cast<Eigen::Index>(roles_.arm.size()));
     for (std::size_t v = 0; v < truth.size(); ++v) {
       truth_.row(static_cast<Eigen::Index>(v)) = truth[v].transpose();
     }
   }
 
   /// Surface points that lie on the outline in a camera, with the links where X_CB_ says.
-  std::vector<Seen> outline(const Corrections& body, std::size_t c, const Eigen::Vector3d& shared,
-                            double loudness) {
+  std::vector<Seen> outline(const Corrections& body, std::size_t c, const Eigen::Vector3d& shared, double loudness) {
     constexpr double kGrazing = 0.12;  // sine of the angle between surface and ray
     std::vector<Seen> seen;
     const auto& k = robot_.rig.cameras[c].intrinsics;
     const std::size_t start = random_.below(surface_.size());
-    for (std::size_t i = 0;
-         i < surface_.size() && static_cast<int>(seen.size()) < options_.points; ++i) {
+    for (std::size_t i = 0; i < surface_.size() && static_cast<int>(seen.size()) < options_.points; ++i) {
       // A stride prime to the count visits every point once, in a scattered order.
       const std::size_t at = (start + i * kStride) % surface_.size();
       const auto& point = surface_[at];
@@ -207,16 +199,14 @@ class SyntheticLog final : public SyntheticMeasurement {
       const Eigen::Vector3d n = X.linear() * point.normal_B;
       if (std::abs(n.dot(p.normalized())) > kGrazing) continue;
       // The image normal: pixels per motion along the surface normal.
-      Eigen::Vector2d normal_px((n.x() - p.x() / p.z() * n.z()) * k.fx,
-                                (n.y() - p.y() / p.z() * n.z()) * k.fy);
+      Eigen::Vector2d normal_px((n.x() - p.x() / p.z() * n.z()) * k.fx, (n.y() - p.y() / p.z() * n.z()) * k.fy);
       normal_px.normalize();
       const Eigen::Vector2d pixel = project(k, body.camera, p);
       if (pixel.x() < 3 || pixel.y() < 3 || pixel.x() > k.width - 4 || pixel.y() > k.height - 4) {
         continue;
       }
-      const double noise = pattern_[at] +
-                           loudness * (white_px_ * random_.normal() + shared.z() +
-                                       normal_px.dot(shared.head<2>()));
+      const double noise =
+          pattern_[at] + loudness * (white_px_ * random_.normal() + shared.z() + normal_px.dot(shared.head<2>()));
       seen.push_back({at, pixel + normal_px * (body.dilation_px + noise), normal_px});
     }
     return seen;
@@ -257,9 +247,8 @@ class SyntheticLog final : public SyntheticMeasurement {
 
 }  // namespace
 
-std::unique_ptr<SyntheticMeasurement> make_synthetic_log(const TrialRobot& robot,
-                                                      const TrialOptions& options,
-                                                      std::uint64_t seed) {
+std::unique_ptr<SyntheticMeasurement> make_synthetic_log(const TrialRobot& robot, const TrialOptions& options,
+                                                         std::uint64_t seed) {
   return std::make_unique<SyntheticLog>(robot, options, seed);
 }
 

@@ -12,14 +12,12 @@ constexpr double kDeg = kPi / 180.0;
 
 class PathPlanner {
  public:
-  PathPlanner(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options,
-              TrialRandom& random)
+  PathPlanner(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options, TrialRandom& random)
       : robot_(robot), roles_(roles), options_(options), random_(random),
         kinematics_(robot.model, shown_links(robot), camera_links(robot)),
         X_CB_(shown_links(robot).size(), Pose::Identity()) {
     const auto all = shown_links(robot);
-    hand_ = static_cast<std::size_t>(
-        std::find(all.begin(), all.end(), robot.setup.hand_link) - all.begin());
+    hand_ = static_cast<std::size_t>(std::find(all.begin(), all.end(), robot.setup.hand_link) - all.begin());
   }
   SyntheticPath plan() {
     const auto postures = visible_postures(working_posture());
@@ -32,6 +30,7 @@ class PathPlanner {
     }
     return path;
   }
+
  private:
   [[nodiscard]] bool hand_in_view(const Eigen::VectorXd& q) {
     const Corrections none(q.size());
@@ -42,8 +41,7 @@ class PathPlanner {
       if (p.z() < 0.2 || p.z() > 0.52) return false;
       const auto pixel = k.project(p);
       const double margin = 0.1 * k.width;
-      if (pixel.x() < margin || pixel.y() < margin || pixel.x() > k.width - margin ||
-          pixel.y() > k.height - margin) {
+      if (pixel.x() < margin || pixel.y() < margin || pixel.x() > k.width - margin || pixel.y() > k.height - margin) {
         return false;
       }
     }
@@ -101,8 +99,7 @@ class PathPlanner {
       if (hand_in_view(q)) postures.push_back(std::move(q));
     }
     if (postures.size() < 8) {
-      throw DataError("trials: the arm of '" + robot_.model->name() +
-                      "' hardly reaches before its eyes");
+      throw DataError("trials: the arm of '" + robot_.model->name() + "' hardly reaches before its eyes");
     }
     return postures;
   }
@@ -172,8 +169,8 @@ std::vector<std::string> camera_links(const TrialRobot& robot) {
   return list;
 }
 
-SyntheticPath plan_path(const TrialRobot& robot, const JointRoles& roles,
-                        const TrialOptions& options, TrialRandom& random) {
+SyntheticPath plan_path(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options,
+                        TrialRandom& random) {
   return PathPlanner(robot, roles, options, random).plan();
 }
 

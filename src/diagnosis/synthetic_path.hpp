@@ -42,8 +42,8 @@ class SyntheticPath {
     end_s_ += duration_s;
   }
   [[nodiscard]] std::pair<const Piece*, double> find(double t_s) const {
-    auto at = std::upper_bound(pieces_.begin(), pieces_.end(), t_s,
-                               [](double t, const Piece& p) { return t < p.begin_s; });
+    auto at =
+        std::upper_bound(pieces_.begin(), pieces_.end(), t_s, [](double t, const Piece& p) { return t < p.begin_s; });
     const auto& piece = at == pieces_.begin() ? pieces_.front() : *(at - 1);
     return {&piece, std::clamp((t_s - piece.begin_s) / piece.duration_s, 0.0, 1.0)};
   }
@@ -53,8 +53,8 @@ class SyntheticPath {
 
 /// Random postures with the hand before both eyes, there and back at several speeds, a rest, the
 /// first postures again in the middle and at the end.
-SyntheticPath plan_path(const TrialRobot& robot, const JointRoles& roles,
-                        const TrialOptions& options, TrialRandom& random);
+SyntheticPath plan_path(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options,
+                        TrialRandom& random);
 
 /// The links that synthetic logs show: the rendered ones and the hand's frame.
 std::vector<std::string> shown_links(const TrialRobot& robot);

@@ -56,9 +56,8 @@ std::vector<TrialFault> draw_background(Draw& draw, const std::vector<TrialFault
   std::vector<TrialFault> faults;
   while (faults.size() < kCauses) {
     auto fault = draw.fault(places, 0.1, 0.5);
-    const bool drawn = std::any_of(faults.begin(), faults.end(), [&](const auto& f) {
-      return f.cause.name == fault.cause.name;
-    });
+    const bool drawn =
+        std::any_of(faults.begin(), faults.end(), [&](const auto& f) { return f.cause.name == fault.cause.name; });
     if (!drawn) faults.push_back(std::move(fault));
   }
   return faults;
@@ -85,8 +84,7 @@ TrialFault draw_outside(Draw& draw, const std::vector<TrialFault>& places, bool 
 
 }  // namespace
 
-TrialOptions draw_trial(const TrialRobot& robot, TrialRow row, std::uint64_t seed,
-                        std::size_t number) {
+TrialOptions draw_trial(const TrialRobot& robot, TrialRow row, std::uint64_t seed, std::size_t number) {
   Draw draw(seed);
   const auto inside = trial_faults(robot, false), outside = trial_faults(robot, true);
   TrialOptions options;

@@ -10,15 +10,12 @@ namespace {
 /// Gain and eccentricity of one joint count as one.
 bool equivalent(const CauseName& a, const CauseName& b) {
   if (a == b) return true;
-  const auto is_scale = [](const CauseName& c) {
-    return c.name == "encoder_gain" || c.name == "eccentricity";
-  };
+  const auto is_scale = [](const CauseName& c) { return c.name == "encoder_gain" || c.name == "eccentricity"; };
   return is_scale(a) && is_scale(b) && a.joint == b.joint;
 }
 
 bool holds(const DiagnosedCause& cause, const TrialFault& truth) {
-  return std::any_of(cause.same.begin(), cause.same.end(),
-                     [&](const auto& c) { return equivalent(c, truth.cause); });
+  return std::any_of(cause.same.begin(), cause.same.end(), [&](const auto& c) { return equivalent(c, truth.cause); });
 }
 
 /// Something counted against how often it could have been.
@@ -59,8 +56,8 @@ class Scores {
     switch (o.row) {
       case TrialRow::kNull: alarm_.add(o.refused || !causes.empty()); break;
       case TrialRow::kBackground:
-        named_.add(o.refused || std::any_of(causes.begin(), causes.end(),
-                               [](const auto& c) { return c.heldout_gain > 0.05; }));
+        named_.add(o.refused ||
+                   std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.heldout_gain > 0.05; }));
         break;
       case TrialRow::kSingle: add_single(o); break;
       case TrialRow::kLimit: limit_wrong_.add(o.refused || wrong_name(o.report, o.truth.front())); break;
@@ -123,9 +120,8 @@ class Scores {
 
   void add_two(const TrialOutcome& o) {
     both_.add(in_class(o.report, o.truth[0]) && in_class(o.report, o.truth[1]));
-    spurious_.add(std::any_of(o.report.causes.begin(), o.report.causes.end(), [&](const auto& c) {
-      return !holds(c, o.truth[0]) && !holds(c, o.truth[1]);
-    }));
+    spurious_.add(std::any_of(o.report.causes.begin(), o.report.causes.end(),
+                              [&](const auto& c) { return !holds(c, o.truth[0]) && !holds(c, o.truth[1]); }));
     for (const auto& truth : o.truth) add_parameters(o, truth);
   }
 
@@ -141,8 +137,7 @@ class Scores {
       return in_time ? n == "slip" || n == "drift" : n == "encoder_gain" || n == "eccentricity";
     }));
     hard_soft_.add(says_unexplained(o) ||
-                   std::any_of(causes.begin(), causes.end(),
-                               [](const auto& c) { return c.same.size() > 1; }));
+                   std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; }));
   }
 
   void add_parameters(const TrialOutcome& o, const TrialFault& truth) {
@@ -161,8 +156,8 @@ class Scores {
   }
 
   TrialRates rates_;
-  Share alarm_, named_, in_, exact_, wrong_, class_size_, limit_wrong_, both_, spurious_,
-      unexplained_, hard_joint_, hard_soft_, sign_, covered_;
+  Share alarm_, named_, in_, exact_, wrong_, class_size_, limit_wrong_, both_, spurious_, unexplained_, hard_joint_,
+      hard_soft_, sign_, covered_;
   std::vector<double> errors_, excess_, improvement_;
 };
 

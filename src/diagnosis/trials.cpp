@@ -49,8 +49,8 @@ std::optional<double> removed_share(const DiagnosisReport& report, const Diagnos
   return (before - std::pow(report.after.rms_px, 2)) / removable;
 }
 
-TrialOutcome run_trial(const TrialRobot& robot, const TrialLogMaker& make_log, TrialRow row,
-                       std::uint64_t seed, std::size_t number) {
+TrialOutcome run_trial(const TrialRobot& robot, const TrialLogMaker& make_log, TrialRow row, std::uint64_t seed,
+                       std::size_t number) {
   const auto start = std::chrono::steady_clock::now();
   const auto options = draw_trial(robot, row, seed, number);
   TrialOutcome outcome;
@@ -76,8 +76,7 @@ TrialOutcome run_trial(const TrialRobot& robot, const TrialLogMaker& make_log, T
     outcome.removed_share = removed_share(report, log->diagnose({{options.faults[0].cause}}));
   }
   outcome.report.samples = {};  // not kept for a thousand trials
-  outcome.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return outcome;
 }
 
@@ -99,8 +98,7 @@ TrialLogMaker silhouette_logs(const TrialRobot& robot) {
 }
 
 std::vector<TrialOutcome> run_diagnosis_trials(
-    const TrialRobot& robot, const TrialCounts& counts, std::uint64_t seed, int threads,
-    const TrialLogMaker& make_log,
+    const TrialRobot& robot, const TrialCounts& counts, std::uint64_t seed, int threads, const TrialLogMaker& make_log,
     const std::function<void(const TrialOutcome&, std::size_t, std::size_t)>& each) {
   struct Job {
     TrialRow row;

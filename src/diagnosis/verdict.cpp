@@ -9,19 +9,21 @@
 namespace bodyschema::diagnosis {
 namespace {
 
-bool is_known(const EstimatedParameter& p) { return std::isfinite(p.ci95[0]) && std::isfinite(p.ci95[1]); }
+bool is_known(const EstimatedParameter& p) {
+  return std::isfinite(p.ci95[0]) && std::isfinite(p.ci95[1]);
+}
 
 std::string text_of(const EstimatedParameter& p, Microseconds begin) {
   if (!is_known(p)) return fmt::format(" {} of a size that this log does not tell", p.parameter);
   const auto when = p.when(begin);
-  return fmt::format(" {} {:.3g}{} [{:.3g}, {:.3g}]{}", p.parameter, p.estimate,
-                     p.unit == "1" ? "" : " " + p.unit, p.ci95[0], p.ci95[1], when.empty() ? "" : " " + when);
+  return fmt::format(" {} {:.3g}{} [{:.3g}, {:.3g}]{}", p.parameter, p.estimate, p.unit == "1" ? "" : " " + p.unit,
+                     p.ci95[0], p.ci95[1], when.empty() ? "" : " " + when);
 }
 
 std::string text_of(const DiagnosedCause& cause, Microseconds begin) {
   if (cause.cause.name == "unexplained") {
-    return fmt::format("something that follows the {} of {} and that no known cause explains",
-                       cause.variable, cause.cause.joint);
+    return fmt::format("something that follows the {} of {} and that no known cause explains", cause.variable,
+                       cause.cause.joint);
   }
   std::string text = cause.cause.text();
   for (const auto& p : cause.parameters) text += text_of(p, begin);
@@ -46,7 +48,8 @@ void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options) {
     report.verdict = "unexplained";
     report.sentence = fmt::format(
         "No cause of the catalogue explains this log: the outlines are missed by {:.1f} px (rms) at best, where "
-        "good meshes and masks leave 0.3 px. The parts probably have another shape, or much is wrong at once.", left);
+        "good meshes and masks leave 0.3 px. The parts probably have another shape, or much is wrong at once.",
+        left);
     if (!list.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + list + ".";
     return;
   }
@@ -54,7 +57,8 @@ void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options) {
     report.verdict = "unexplained";
     report.sentence = fmt::format(
         "No cause can be told from this log: only {:.0f} % of the predicted outlines are found in the pictures. The "
-        "parts have another shape, or the masks miss some of them.", 100.0 * found);
+        "parts have another shape, or the masks miss some of them.",
+        100.0 * found);
     if (!list.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + list + ".";
     return;
   }
@@ -67,7 +71,8 @@ void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options) {
     report.verdict = unexplained || !sized ? "unexplained" : several ? "class" : "named";
     report.sentence = "The log asks for: " + list + ".";
     if (left > options.noise_rms_px) {
-      report.sentence += fmt::format(" With it {:.2f} px are left, more than noise: something else is wrong too.", left);
+      report.sentence +=
+          fmt::format(" With it {:.2f} px are left, more than noise: something else is wrong too.", left);
     }
     return;
   }
@@ -77,7 +82,8 @@ void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options) {
   } else if (left > options.noise_rms_px) {
     report.verdict = "unexplained";
     report.sentence = fmt::format(
-        "No cause of the catalogue explains what is left: {:.2f} px (rms), more than noise, whatever the joint offsets.",
+        "No cause of the catalogue explains what is left: {:.2f} px (rms), more than noise, whatever the joint "
+        "offsets.",
         left);
   } else {
     report.sentence = "The model explains the log to its noise: nothing but joint offsets was found.";

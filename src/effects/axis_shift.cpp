@@ -36,7 +36,8 @@ std::unique_ptr<Effect> make_axis_shift(const EffectTarget& target, const JointR
 Targets axis_shift_targets(const JointRoles& roles) {
   // The first two of an arm look like a shifted base.
   auto targets = arm_targets(roles);
-  targets.erase(targets.begin(), targets.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(2, targets.size())));
+  targets.erase(targets.begin(),
+                targets.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(2, targets.size())));
   return targets;
 }
 

@@ -9,12 +9,9 @@ namespace {
 class AxisTilt final : public Clonable<AxisTilt> {
  public:
   AxisTilt(const EffectTarget& target, Eigen::Index joint)
-      : Clonable(
-            "axis_tilt", target,
-            {EffectParameter{
-                 .name = "tilt_1", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg},
-             EffectParameter{
-                 .name = "tilt_2", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
+      : Clonable("axis_tilt", target,
+                 {EffectParameter{.name = "tilt_1", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg},
+                  EffectParameter{.name = "tilt_2", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
         joint_(joint) {}
   void apply(const Instant&, Corrections& add_to) const override {
     auto& adjustment = add_to.adjustments[static_cast<std::size_t>(joint_)];
@@ -32,6 +29,8 @@ std::unique_ptr<Effect> make_axis_tilt(const EffectTarget& target, const JointRo
   return std::make_unique<AxisTilt>(target, roles.index(target.joint));
 }
 
-Targets axis_tilt_targets(const JointRoles& roles) { return arm_targets(roles); }
+Targets axis_tilt_targets(const JointRoles& roles) {
+  return arm_targets(roles);
+}
 
 }  // namespace bodyschema::effects

@@ -11,8 +11,7 @@ class Backlash final : public Clonable<Backlash> {
  public:
   Backlash(const EffectTarget& target, Eigen::Index joint)
       : Clonable("backlash", target,
-                 {EffectParameter{
-                     .name = "width", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
+                 {EffectParameter{.name = "width", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
         joint_(joint) {}
 
   [[nodiscard]] bool has_memory() const override { return true; }
@@ -60,6 +59,8 @@ std::unique_ptr<Effect> make_backlash(const EffectTarget& target, const JointRol
   return std::make_unique<Backlash>(target, roles.index(target.joint));
 }
 
-Targets backlash_targets(const JointRoles& roles) { return arm_targets(roles); }
+Targets backlash_targets(const JointRoles& roles) {
+  return arm_targets(roles);
+}
 
 }  // namespace bodyschema::effects

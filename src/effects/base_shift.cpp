@@ -7,8 +7,7 @@ namespace {
 /// axes. Errors in the lengths between base and eyes look like this while torso and head stand still.
 class BaseShift final : public Clonable<BaseShift> {
  public:
-  explicit BaseShift(const EffectTarget& target)
-      : Clonable("base_shift", target, {axis("x"), axis("y"), axis("z")}) {}
+  explicit BaseShift(const EffectTarget& target) : Clonable("base_shift", target, {axis("x"), axis("y"), axis("z")}) {}
   void apply(const Instant&, Corrections& add_to) const override {
     add_to.base_shift_m += Eigen::Vector3d(value(0), value(1), value(2));
   }
@@ -25,6 +24,8 @@ std::unique_ptr<Effect> make_base_shift(const EffectTarget& target, const JointR
   return std::make_unique<BaseShift>(target);
 }
 
-Targets base_shift_targets(const JointRoles& roles) { return whole_robot(roles); }
+Targets base_shift_targets(const JointRoles& roles) {
+  return whole_robot(roles);
+}
 
 }  // namespace bodyschema::effects

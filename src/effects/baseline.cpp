@@ -8,8 +8,7 @@ class Baseline final : public Clonable<Baseline> {
  public:
   explicit Baseline(const EffectTarget& target)
       : Clonable("baseline", target,
-                 {EffectParameter{
-                     .name = "distance", .unit = "mm", .si_per_unit = 1e-3, .typical = 1e-3}}) {}
+                 {EffectParameter{.name = "distance", .unit = "mm", .si_per_unit = 1e-3, .typical = 1e-3}}) {}
   void apply(const Instant& at, Corrections& add_to) const override {
     if (at.camera == 1) add_to.camera.shift_x_m += value(0);
   }
@@ -21,6 +20,8 @@ std::unique_ptr<Effect> make_baseline(const EffectTarget& target, const JointRol
   return std::make_unique<Baseline>(target);
 }
 
-Targets baseline_targets(const JointRoles& roles) { return whole_robot(roles); }
+Targets baseline_targets(const JointRoles& roles) {
+  return whole_robot(roles);
+}
 
 }  // namespace bodyschema::effects

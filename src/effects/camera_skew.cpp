@@ -8,10 +8,8 @@ namespace {
 class CameraSkew final : public Clonable<CameraSkew> {
  public:
   explicit CameraSkew(const EffectTarget& target)
-      : Clonable(
-            "camera_skew", target,
-            {EffectParameter{.name = "skew", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {
-  }
+      : Clonable("camera_skew", target,
+                 {EffectParameter{.name = "skew", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {}
   void apply(const Instant& at, Corrections& add_to) const override {
     if (at.camera != 1) return;
     add_to.dq.noalias() += value(0) * at.qdot;
@@ -25,6 +23,8 @@ std::unique_ptr<Effect> make_camera_skew(const EffectTarget& target, const Joint
   return std::make_unique<CameraSkew>(target);
 }
 
-Targets camera_skew_targets(const JointRoles& roles) { return whole_robot(roles); }
+Targets camera_skew_targets(const JointRoles& roles) {
+  return whole_robot(roles);
+}
 
 }  // namespace bodyschema::effects

@@ -15,8 +15,10 @@ struct Entry {
   effects::Targets (*targets)(const JointRoles&);
 };
 
-#define BODYSCHEMA_EFFECT(name) \
-  Entry { #name, &effects::make_##name, &effects::name##_targets }
+#define BODYSCHEMA_EFFECT(name)                            \
+  Entry {                                                  \
+#name, &effects::make_##name, &effects::name##_targets \
+  }
 constexpr Entry kCatalogue[] = {
     BODYSCHEMA_EFFECT(joint_offset),   BODYSCHEMA_EFFECT(compliance),
     BODYSCHEMA_EFFECT(payload),        BODYSCHEMA_EFFECT(backlash),
@@ -37,8 +39,7 @@ const Entry& entry(const std::string& name) {
   for (const auto& e : kCatalogue) {
     if (name == e.name) return e;
   }
-  throw ConfigurationError("unknown effect '" + name + "'; did you mean '" +
-                           nearest_name(name, effect_names()) + "'?");
+  throw ConfigurationError("unknown effect '" + name + "'; did you mean '" + nearest_name(name, effect_names()) + "'?");
 }
 
 using Part = std::string EffectTarget::*;
@@ -75,16 +76,14 @@ const std::vector<std::string>& effect_names() {
   return names;
 }
 
-std::unique_ptr<Effect> make_effect(const std::string& name, const EffectTarget& target,
-                                    const JointRoles& roles) {
+std::unique_ptr<Effect> make_effect(const std::string& name, const EffectTarget& target, const JointRoles& roles) {
   const auto& e = entry(name);
   const auto targets = e.targets(roles);
   if (targets.empty()) throw ConfigurationError(name + ": this robot lacks the joints for it");
   const bool needs_joint = !targets.front().joint.empty();
   if (needs_joint == target.joint.empty()) {
-    throw ConfigurationError(name + (needs_joint
-                                         ? ": expected a joint"
-                                         : ": takes no joint, found '" + target.joint + "'"));
+    throw ConfigurationError(name +
+                             (needs_joint ? ": expected a joint" : ": takes no joint, found '" + target.joint + "'"));
   }
   if (needs_joint) static_cast<void>(roles.index(target.joint));  // says which one may be meant
   check_is_listed(name, "joint", &EffectTarget::joint, target, targets);

@@ -18,8 +18,7 @@ Eigen::Vector3d perpendicular(const Eigen::Vector3d& axis) {
 
 }  // namespace
 
-CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model,
-                                         std::vector<std::string> links,
+CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model, std::vector<std::string> links,
                                          std::vector<std::string> camera_links)
     : model_(std::move(model)), link_count_(links.size()), camera_count_(camera_links.size()) {
   auto all = std::move(links);
@@ -34,9 +33,8 @@ CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model
       joints_[j].moves_something |= listed.moves(static_cast<Eigen::Index>(j), l);
     }
     if (!joints_[j].moves_something) continue;
-    const auto at =
-        std::find(all.begin() + static_cast<std::ptrdiff_t>(link_count_ + camera_count_), all.end(),
-                  joints[j].parent_link);
+    const auto at = std::find(all.begin() + static_cast<std::ptrdiff_t>(link_count_ + camera_count_), all.end(),
+                              joints[j].parent_link);
     joints_[j].parent = static_cast<std::size_t>(at - all.begin());
     if (at == all.end()) all.push_back(joints[j].parent_link);
   }
@@ -66,9 +64,8 @@ CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model
   }
 }
 
-void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q,
-                                  const Corrections& corrections, std::size_t camera,
-                                  std::span<Pose> X_CB) {
+void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
+                                  std::size_t camera, std::span<Pose> X_CB) {
   q_ = q + corrections.dq;
   fk_->compute(q_, X_W_);
   X_WC_ = X_W_[link_count_ + camera];
@@ -84,14 +81,12 @@ void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q,
     Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
     if (const double angle = tilt.norm(); angle > 0.0) {
       const Eigen::Matrix3d R_tilt = Eigen::AngleAxisd(angle, tilt / angle).toRotationMatrix();
-      const Eigen::Matrix3d R_joint =
-          Eigen::AngleAxisd(q_[joint], axis.direction_W).toRotationMatrix();
+      const Eigen::Matrix3d R_joint = Eigen::AngleAxisd(q_[joint], axis.direction_W).toRotationMatrix();
       R = R_tilt * R_joint * R_tilt.transpose() * R_joint.transpose();
     }
     Pose C = Pose::Identity();
     C.linear() = R;
-    C.translation() = axis.point_W - R * axis.point_W +
-                      joints_[j].outwards * adjustment.along_m * axis.direction_W +
+    C.translation() = axis.point_W - R * axis.point_W + joints_[j].outwards * adjustment.along_m * axis.direction_W +
                       adjustment.shift_1_m * tilt_axis(joint, 0) + adjustment.shift_2_m * tilt_axis(joint, 1);
     for (std::size_t l = 0; l < link_count_; ++l) {
       if (moves(joint, l)) X_CB[l] = C * X_CB[l];

@@ -9,12 +9,9 @@ namespace {
 class Eccentricity final : public Clonable<Eccentricity> {
  public:
   Eccentricity(const EffectTarget& target, Eigen::Index joint)
-      : Clonable(
-            "eccentricity", target,
-            {EffectParameter{
-                 .name = "sine", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg},
-             EffectParameter{
-                 .name = "cosine", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
+      : Clonable("eccentricity", target,
+                 {EffectParameter{.name = "sine", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg},
+                  EffectParameter{.name = "cosine", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
         joint_(joint) {}
   void apply(const Instant& at, Corrections& add_to) const override {
     const double q = at.q[joint_];
@@ -31,6 +28,8 @@ std::unique_ptr<Effect> make_eccentricity(const EffectTarget& target, const Join
   return std::make_unique<Eccentricity>(target, roles.index(target.joint));
 }
 
-Targets eccentricity_targets(const JointRoles& roles) { return arm_targets(roles); }
+Targets eccentricity_targets(const JointRoles& roles) {
+  return arm_targets(roles);
+}
 
 }  // namespace bodyschema::effects

@@ -8,13 +8,10 @@ namespace {
 class EncoderGain final : public Clonable<EncoderGain> {
  public:
   EncoderGain(const EffectTarget& target, Eigen::Index joint)
-      : Clonable(
-            "encoder_gain", target,
-            {EffectParameter{.name = "gain", .unit = "%", .si_per_unit = 0.01, .typical = 0.01}}),
+      : Clonable("encoder_gain", target,
+                 {EffectParameter{.name = "gain", .unit = "%", .si_per_unit = 0.01, .typical = 0.01}}),
         joint_(joint) {}
-  void apply(const Instant& at, Corrections& add_to) const override {
-    add_to.dq[joint_] += value(0) * at.q[joint_];
-  }
+  void apply(const Instant& at, Corrections& add_to) const override { add_to.dq[joint_] += value(0) * at.q[joint_]; }
 
  private:
   Eigen::Index joint_;
@@ -26,6 +23,8 @@ std::unique_ptr<Effect> make_encoder_gain(const EffectTarget& target, const Join
   return std::make_unique<EncoderGain>(target, roles.index(target.joint));
 }
 
-Targets encoder_gain_targets(const JointRoles& roles) { return arm_targets(roles); }
+Targets encoder_gain_targets(const JointRoles& roles) {
+  return arm_targets(roles);
+}
 
 }  // namespace bodyschema::effects

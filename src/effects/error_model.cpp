@@ -48,15 +48,13 @@ void read_parameters(const YAML::Node& entry, const std::string& origin, Effect&
     const auto at = std::find(keys.begin(), keys.end(), key);
     if (at == keys.end()) {
       fail(origin, item.first.Mark(),
-           effect.description() + ": unknown parameter '" + key + "'; did you mean '" +
-               nearest_name(key, keys) + "'?");
+           effect.description() + ": unknown parameter '" + key + "'; did you mean '" + nearest_name(key, keys) + "'?");
     }
     auto& p = effect.parameters()[static_cast<std::size_t>(at - keys.begin())];
     double value = 0.0;
     if (!YAML::convert<double>::decode(item.second, value) || !std::isfinite(value)) {
       fail(origin, item.second.Mark(),
-           effect.description() + ": '" + key + "' is '" +
-               (item.second.IsScalar() ? item.second.Scalar() : "...") +
+           effect.description() + ": '" + key + "' is '" + (item.second.IsScalar() ? item.second.Scalar() : "...") +
                "', expected a finite number");
     }
     p.value = value * p.si_per_unit;
@@ -90,8 +88,7 @@ ErrorModel ErrorModel::load(const std::filesystem::path& file, const JointRoles&
   return parse(text.str(), roles, file.string());
 }
 
-ErrorModel ErrorModel::parse(const std::string& yaml, const JointRoles& roles,
-                             const std::string& origin) {
+ErrorModel ErrorModel::parse(const std::string& yaml, const JointRoles& roles, const std::string& origin) {
   YAML::Node root;
   try {
     root = YAML::Load(yaml);
@@ -100,8 +97,7 @@ ErrorModel ErrorModel::parse(const std::string& yaml, const JointRoles& roles,
   }
   if (!root.IsMap()) throw ConfigurationError(origin + ": expected a mapping with key 'version'");
   int version = 0;
-  if (!root["version"] || !YAML::convert<int>::decode(root["version"], version) ||
-      version != kVersion) {
+  if (!root["version"] || !YAML::convert<int>::decode(root["version"], version) || version != kVersion) {
     throw ConfigurationError(origin + ": version is '" + scalar(root, "version") + "', expected " +
                              std::to_string(kVersion));
   }
@@ -109,8 +105,7 @@ ErrorModel ErrorModel::parse(const std::string& yaml, const JointRoles& roles,
     const auto key = item.first.Scalar();
     if (key != "version" && key != "effects") {
       fail(origin, item.first.Mark(),
-           "unknown key '" + key + "'; did you mean '" + nearest_name(key, {"version", "effects"}) +
-               "'?");
+           "unknown key '" + key + "'; did you mean '" + nearest_name(key, {"version", "effects"}) + "'?");
     }
   }
   ErrorModel model(roles);
@@ -123,8 +118,7 @@ ErrorModel ErrorModel::parse(const std::string& yaml, const JointRoles& roles,
       const auto key = item.first.Scalar();
       const std::vector<std::string> known = {"name", "joint", "source", "parameters"};
       if (std::find(known.begin(), known.end(), key) == known.end()) {
-        fail(origin, item.first.Mark(),
-             "unknown key '" + key + "'; did you mean '" + nearest_name(key, known) + "'?");
+        fail(origin, item.first.Mark(), "unknown key '" + key + "'; did you mean '" + nearest_name(key, known) + "'?");
       }
     }
     const EffectTarget target{scalar(entry, "joint"), scalar(entry, "source")};
@@ -149,8 +143,8 @@ std::string ErrorModel::to_yaml() const {
   out << YAML::Comment(
              "What this robot is, beyond its URDF and configuration. Written by bodyschema "
              "diagnose.")
-      << YAML::BeginMap << YAML::Key << "version" << YAML::Value << kVersion << YAML::Key
-      << "effects" << YAML::Value << YAML::BeginSeq;
+      << YAML::BeginMap << YAML::Key << "version" << YAML::Value << kVersion << YAML::Key << "effects" << YAML::Value
+      << YAML::BeginSeq;
   for (const auto& effect : effects_) {
     out << YAML::BeginMap << YAML::Key << "name" << YAML::Value << effect->name();
     if (!effect->target().joint.empty()) {
@@ -189,11 +183,12 @@ Effect& ErrorModel::add(const std::string& name, const EffectTarget& target) {
   return *effects_.back();
 }
 
-void ErrorModel::add(std::unique_ptr<Effect> effect) { effects_.push_back(std::move(effect)); }
+void ErrorModel::add(std::unique_ptr<Effect> effect) {
+  effects_.push_back(std::move(effect));
+}
 
 void ErrorModel::remove(const std::string& name, const EffectTarget& target) {
-  std::erase_if(effects_,
-                [&](const auto& e) { return e->name() == name && e->target() == target; });
+  std::erase_if(effects_, [&](const auto& e) { return e->name() == name && e->target() == target; });
 }
 
 Eigen::VectorXd ErrorModel::offsets() const {

@@ -28,7 +28,9 @@ class Clonable : public Effect {
 /// One target per arm joint.
 Targets arm_targets(const JointRoles& roles);
 /// The whole robot.
-inline Targets whole_robot(const JointRoles&) { return {EffectTarget{}}; }
+inline Targets whole_robot(const JointRoles&) {
+  return {EffectTarget{}};
+}
 
 #define BODYSCHEMA_EFFECT(name)                                                             \
   std::unique_ptr<Effect> make_##name(const EffectTarget& target, const JointRoles& roles); \

@@ -9,8 +9,7 @@ class FingerPosture final : public Clonable<FingerPosture> {
  public:
   FingerPosture(const EffectTarget& target, std::vector<Eigen::Index> fingers)
       : Clonable("finger_posture", target,
-                 {EffectParameter{
-                     .name = "curl", .unit = "deg", .si_per_unit = kDeg, .typical = 5.0 * kDeg}}),
+                 {EffectParameter{.name = "curl", .unit = "deg", .si_per_unit = kDeg, .typical = 5.0 * kDeg}}),
         fingers_(std::move(fingers)) {}
   void apply(const Instant&, Corrections& add_to) const override {
     for (const auto joint : fingers_) add_to.dq[joint] += value(0);

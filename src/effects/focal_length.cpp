@@ -7,13 +7,9 @@ namespace {
 class FocalLength final : public Clonable<FocalLength> {
  public:
   explicit FocalLength(const EffectTarget& target)
-      : Clonable(
-            "focal_length", target,
-            {EffectParameter{.name = "scale", .unit = "%", .si_per_unit = 0.01, .typical = 0.01}}) {
-  }
-  void apply(const Instant&, Corrections& add_to) const override {
-    add_to.camera.focal_scale += value(0);
-  }
+      : Clonable("focal_length", target,
+                 {EffectParameter{.name = "scale", .unit = "%", .si_per_unit = 0.01, .typical = 0.01}}) {}
+  void apply(const Instant&, Corrections& add_to) const override { add_to.camera.focal_scale += value(0); }
 };
 
 }  // namespace
@@ -22,6 +18,8 @@ std::unique_ptr<Effect> make_focal_length(const EffectTarget& target, const Join
   return std::make_unique<FocalLength>(target);
 }
 
-Targets focal_length_targets(const JointRoles& roles) { return whole_robot(roles); }
+Targets focal_length_targets(const JointRoles& roles) {
+  return whole_robot(roles);
+}
 
 }  // namespace bodyschema::effects

@@ -8,8 +8,7 @@ class HeadOffset final : public Clonable<HeadOffset> {
  public:
   HeadOffset(const EffectTarget& target, Eigen::Index joint)
       : Clonable("head_offset", target,
-                 {EffectParameter{
-                     .name = "angle", .unit = "deg", .si_per_unit = kDeg, .typical = 1.0 * kDeg}}),
+                 {EffectParameter{.name = "angle", .unit = "deg", .si_per_unit = kDeg, .typical = 1.0 * kDeg}}),
         joint_(joint) {}
   void apply(const Instant&, Corrections& add_to) const override { add_to.dq[joint_] += value(0); }
 

@@ -2,8 +2,8 @@
 
 namespace bodyschema {
 
-InstantBuilder::InstantBuilder(std::shared_ptr<const RobotModel> model,
-                               const std::string& hand_link, const Eigen::Vector3d& gravity_W)
+InstantBuilder::InstantBuilder(std::shared_ptr<const RobotModel> model, const std::string& hand_link,
+                               const Eigen::Vector3d& gravity_W)
     : model_(std::move(model)), gravity_W_(gravity_W), torques_(model_) {
   if (!hand_link.empty()) {
     hand_ = std::make_unique<ForwardKinematics>(model_, std::vector<std::string>{hand_link});

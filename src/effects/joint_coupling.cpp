@@ -10,14 +10,10 @@ namespace {
 class JointCoupling final : public Clonable<JointCoupling> {
  public:
   JointCoupling(const EffectTarget& target, Eigen::Index joint, Eigen::Index source)
-      : Clonable(
-            "joint_coupling", target,
-            {EffectParameter{.name = "ratio", .unit = "%", .si_per_unit = 0.01, .typical = 0.02}}),
-        joint_(joint),
-        source_(source) {}
-  void apply(const Instant& at, Corrections& add_to) const override {
-    add_to.dq[joint_] += value(0) * at.q[source_];
-  }
+      : Clonable("joint_coupling", target,
+                 {EffectParameter{.name = "ratio", .unit = "%", .si_per_unit = 0.01, .typical = 0.02}}),
+        joint_(joint), source_(source) {}
+  void apply(const Instant& at, Corrections& add_to) const override { add_to.dq[joint_] += value(0) * at.q[source_]; }
 
  private:
   Eigen::Index joint_, source_;
@@ -30,11 +26,9 @@ constexpr int kReach = 2;
 
 std::unique_ptr<Effect> make_joint_coupling(const EffectTarget& target, const JointRoles& roles) {
   if (target.joint == target.source) {
-    throw ConfigurationError("joint_coupling of '" + target.joint +
-                             "': expected another joint as source");
+    throw ConfigurationError("joint_coupling of '" + target.joint + "': expected another joint as source");
   }
-  return std::make_unique<JointCoupling>(target, roles.index(target.joint),
-                                         roles.index(target.source));
+  return std::make_unique<JointCoupling>(target, roles.index(target.joint), roles.index(target.source));
 }
 
 Targets joint_coupling_targets(const JointRoles& roles) {

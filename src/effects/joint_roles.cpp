@@ -14,8 +14,8 @@ namespace {
 class FingerJoints {
  public:
   FingerJoints(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup)
-      : links_(with_hand(setup)), kinematics_(model, links_), q_(setup.default_joints(*model)),
-        X_WB_(links_.size()), turned_(links_.size()) {
+      : links_(with_hand(setup)), kinematics_(model, links_), q_(setup.default_joints(*model)), X_WB_(links_.size()),
+        turned_(links_.size()) {
     kinematics_.compute(q_, X_WB_);
     for (Eigen::Index j = 0; j < model->joint_count(); ++j) {
       if (!kinematics_.moves(j, links_.size() - 1)) add(j);
@@ -67,8 +67,8 @@ class FingerJoints {
   [[nodiscard]] const Joint& last_of(const Joint& joint) const {
     const Joint* last = &joint;
     for (const auto& other : joints_) {
-      if (other.index > last->index && std::includes(last->links.begin(), last->links.end(),
-                                                     other.links.begin(), other.links.end())) {
+      if (other.index > last->index &&
+          std::includes(last->links.begin(), last->links.end(), other.links.begin(), other.links.end())) {
         last = &other;
       }
     }
@@ -84,8 +84,7 @@ class FingerJoints {
 
 }  // namespace
 
-JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSetup& setup,
-                          const StereoRig& rig) {
+JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSetup& setup, const StereoRig& rig) {
   JointRoles roles;
   for (const auto& joint : model->joints()) roles.names.push_back(joint.name);
   for (const auto& name : setup.estimated_joints) roles.arm.push_back(roles.index(name));
@@ -112,8 +111,7 @@ JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSe
 Eigen::Index JointRoles::index(const std::string& name) const {
   const auto at = std::find(names.begin(), names.end(), name);
   if (at == names.end()) {
-    throw ConfigurationError("unknown joint '" + name + "'; did you mean '" +
-                             nearest_name(name, names) + "'?");
+    throw ConfigurationError("unknown joint '" + name + "'; did you mean '" + nearest_name(name, names) + "'?");
   }
   return at - names.begin();
 }

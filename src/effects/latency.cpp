@@ -10,8 +10,7 @@ class Latency final : public Clonable<Latency> {
  public:
   explicit Latency(const EffectTarget& target)
       : Clonable("latency", target,
-                 {EffectParameter{
-                     .name = "delay", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {}
+                 {EffectParameter{.name = "delay", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {}
   void apply(const Instant& at, Corrections& add_to) const override {
     add_to.dq.noalias() -= value(0) * at.qdot;
     add_to.dq.noalias() += 0.5 * value(0) * value(0) * at.qddot;
@@ -24,6 +23,8 @@ std::unique_ptr<Effect> make_latency(const EffectTarget& target, const JointRole
   return std::make_unique<Latency>(target);
 }
 
-Targets latency_targets(const JointRoles& roles) { return whole_robot(roles); }
+Targets latency_targets(const JointRoles& roles) {
+  return whole_robot(roles);
+}
 
 }  // namespace bodyschema::effects

@@ -10,8 +10,7 @@ class LinkLength final : public Clonable<LinkLength> {
  public:
   LinkLength(const EffectTarget& target, Eigen::Index joint)
       : Clonable("link_length", target,
-                 {EffectParameter{
-                     .name = "change", .unit = "mm", .si_per_unit = 1e-3, .typical = 2e-3}}),
+                 {EffectParameter{.name = "change", .unit = "mm", .si_per_unit = 1e-3, .typical = 2e-3}}),
         joint_(joint) {}
   void apply(const Instant&, Corrections& add_to) const override {
     add_to.adjustments[static_cast<std::size_t>(joint_)].along_m += value(0);

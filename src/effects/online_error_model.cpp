@@ -6,10 +6,9 @@
 
 namespace bodyschema {
 
-OnlineErrorModel::OnlineErrorModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
-                                   ErrorModel model)
-    : model_(std::move(model)), offsets_(model_.offsets()),
-      instants_(robot, setup.hand_link, setup.gravity_W), whole_(robot->joint_count()) {
+OnlineErrorModel::OnlineErrorModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, ErrorModel model)
+    : model_(std::move(model)), offsets_(model_.offsets()), instants_(robot, setup.hand_link, setup.gravity_W),
+      whole_(robot->joint_count()) {
   for (std::size_t e = 0; e < model_.size(); ++e) {
     const auto& name = model_[e].name();
     has_memory_ = has_memory_ || model_[e].has_memory();
@@ -44,8 +43,7 @@ void OnlineErrorModel::show_until(Microseconds utime) {
   for (; seen_ < count_ && samples_[seen_].utime <= utime; ++seen_) model_.observe(samples_[seen_]);
 }
 
-void OnlineErrorModel::corrections(const JointSample& exposure, std::size_t camera,
-                                   Corrections& out) {
+void OnlineErrorModel::corrections(const JointSample& exposure, std::size_t camera, Corrections& out) {
   show_until(exposure.utime);
   instants_.build(exposure, camera, offsets_, at_);
   if (moves_) {

@@ -9,15 +9,14 @@ namespace {
 class Payload final : public Clonable<Payload> {
  public:
   Payload(const EffectTarget& target, std::vector<Eigen::Index> arm)
-      : Clonable(
-            "payload", target,
-            {EffectParameter{.name = "mass", .unit = "kg", .si_per_unit = 1.0, .typical = 0.25},
-             EffectParameter{.name = "compliance",
-                             .unit = "deg/Nm",
-                             .si_per_unit = kDeg,
-                             .value = 0.3 * kDeg,
-                             .fitted = false,
-                             .typical = 0.3 * kDeg}}),
+      : Clonable("payload", target,
+                 {EffectParameter{.name = "mass", .unit = "kg", .si_per_unit = 1.0, .typical = 0.25},
+                  EffectParameter{.name = "compliance",
+                                  .unit = "deg/Nm",
+                                  .si_per_unit = kDeg,
+                                  .value = 0.3 * kDeg,
+                                  .fitted = false,
+                                  .typical = 0.3 * kDeg}}),
         arm_(std::move(arm)) {}
   void apply(const Instant& at, Corrections& add_to) const override {
     if (at.payload_torque.size() == 0) return;
@@ -36,6 +35,8 @@ std::unique_ptr<Effect> make_payload(const EffectTarget& target, const JointRole
   return std::make_unique<Payload>(target, roles.arm);
 }
 
-Targets payload_targets(const JointRoles& roles) { return whole_robot(roles); }
+Targets payload_targets(const JointRoles& roles) {
+  return whole_robot(roles);
+}
 
 }  // namespace bodyschema::effects

@@ -9,10 +9,8 @@ class Vergence final : public Clonable<Vergence> {
  public:
   Vergence(const EffectTarget& target, Eigen::Index left, Eigen::Index right)
       : Clonable("vergence", target,
-                 {EffectParameter{
-                     .name = "angle", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
-        left_(left),
-        right_(right) {}
+                 {EffectParameter{.name = "angle", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
+        left_(left), right_(right) {}
   void apply(const Instant&, Corrections& add_to) const override {
     add_to.dq[left_] += 0.5 * value(0);
     add_to.dq[right_] -= 0.5 * value(0);

@@ -20,15 +20,12 @@ std::vector<std::string> camera_links(const StereoRig& rig) {
 
 }  // namespace
 
-BodyPoseModel::BodyPoseModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
-                             const StereoRig& rig, std::vector<Parameter> parameters)
-    : rig_(rig), parameters_(std::move(parameters)),
-      finger_joints_(JointRoles::of(robot, setup, rig).fingers),
-      part_count_(setup.model.rendered_links.size()),
-      fingertip_count_(setup.fingertip_links.size()),
-      kinematics_(robot, evaluated_links(setup), camera_links(rig)),
-      nothing_(robot->joint_count()), X_CB_(1 + fingertip_count_ + part_count_),
-      q_(robot->joint_count()) {}
+BodyPoseModel::BodyPoseModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                             std::vector<Parameter> parameters)
+    : rig_(rig), parameters_(std::move(parameters)), finger_joints_(JointRoles::of(robot, setup, rig).fingers),
+      part_count_(setup.model.rendered_links.size()), fingertip_count_(setup.fingertip_links.size()),
+      kinematics_(robot, evaluated_links(setup), camera_links(rig)), nothing_(robot->joint_count()),
+      X_CB_(1 + fingertip_count_ + part_count_), q_(robot->joint_count()) {}
 
 void BodyPoseModel::evaluate(const Exposure& at, const Eigen::VectorXd& x, std::size_t camera) {
   const Corrections& known = at.corrections != nullptr ? *at.corrections : nothing_;

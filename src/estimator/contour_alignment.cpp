@@ -16,8 +16,7 @@ class CoverageSampler {
  public:
   CoverageSampler(const CameraObservation& seen, int width, int height)
       : seen_(seen), width_(width), height_(height),
-        from_mask_(seen.coverage.size() !=
-                   static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {}
+        from_mask_(seen.coverage.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {}
 
   [[nodiscard]] std::optional<double> at(double u, double v) const {
     const double fu = std::floor(u);
@@ -25,9 +24,8 @@ class CoverageSampler {
     const int u0 = static_cast<int>(fu);
     const int v0 = static_cast<int>(fv);
     if (u0 < 0 || v0 < 0 || u0 + 1 >= width_ || v0 + 1 >= height_) return std::nullopt;
-    if (!seen_.valid.empty() &&
-        !(seen_.valid.at(u0, v0) && seen_.valid.at(u0 + 1, v0) && seen_.valid.at(u0, v0 + 1) &&
-          seen_.valid.at(u0 + 1, v0 + 1))) {
+    if (!seen_.valid.empty() && !(seen_.valid.at(u0, v0) && seen_.valid.at(u0 + 1, v0) && seen_.valid.at(u0, v0 + 1) &&
+                                  seen_.valid.at(u0 + 1, v0 + 1))) {
       return std::nullopt;
     }
     const double a = u - fu;
@@ -39,8 +37,7 @@ class CoverageSampler {
  private:
   [[nodiscard]] double pixel(int u, int v) const {
     if (from_mask_) return seen_.mask.at(u, v) ? 255.0 : 0.0;
-    return seen_.coverage[static_cast<std::size_t>(v) * static_cast<std::size_t>(width_) +
-                          static_cast<std::size_t>(u)];
+    return seen_.coverage[static_cast<std::size_t>(v) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(u)];
   }
   const CameraObservation& seen_;
   int width_;
@@ -88,32 +85,29 @@ double ContourEvidence::matched_share() const {
 }
 
 ContourAlignment::ContourAlignment(BodyPoseModel& body, const SilhouetteModel& silhouettes,
-                                   std::span<const PinholeIntrinsics> cameras,
-                                   const ContourAlignmentOptions& options)
-    : body_(body), extractor_(silhouettes, cameras), cameras_(cameras.begin(), cameras.end()),
-      options_(options), X_CB_(body.part_count()), X_plus_(body.part_count()),
-      X_minus_(body.part_count()), dX_dB_(body.part_count() * body.parameters().size()),
+                                   std::span<const PinholeIntrinsics> cameras, const ContourAlignmentOptions& options)
+    : body_(body), extractor_(silhouettes, cameras), cameras_(cameras.begin(), cameras.end()), options_(options),
+      X_CB_(body.part_count()), X_plus_(body.part_count()), X_minus_(body.part_count()),
+      dX_dB_(body.part_count() * body.parameters().size()),
       jacobian_row_(static_cast<Eigen::Index>(body.parameters().size())) {}
 
-void ContourAlignment::linearise(const Observation& observation, const Eigen::VectorXd& x,
-                                 double search_px, ContourEvidence& evidence) {
+void ContourAlignment::linearise(const Observation& observation, const Eigen::VectorXd& x, double search_px,
+                                 ContourEvidence& evidence) {
   const auto n = static_cast<Eigen::Index>(body_.parameters().size());
   evidence.A.setZero(n, n);
   evidence.b.setZero(n);
   evidence.cost = 0.0;
   evidence.matched = evidence.sampled = 0;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    if (c < observation.cameras.size() && observation.cameras[c] &&
-        !observation.cameras[c]->mask.empty()) {
+    if (c < observation.cameras.size() && observation.cameras[c] && !observation.cameras[c]->mask.empty()) {
       add_camera(*observation.cameras[c], x, c, search_px, evidence);
     }
   }
   evidence.A = evidence.A.selfadjointView<Eigen::Lower>();
 }
 
-void ContourAlignment::add_camera(const CameraObservation& seen, const Eigen::VectorXd& x,
-                                  std::size_t camera, double search_px,
-                                  ContourEvidence& evidence) {
+void ContourAlignment::add_camera(const CameraObservation& seen, const Eigen::VectorXd& x, std::size_t camera,
+                                  double search_px, ContourEvidence& evidence) {
   const auto parameters = body_.parameters();
   const std::size_t parts = body_.part_count();
   body_.compute(seen, x, camera, X_CB_);
@@ -137,11 +131,9 @@ void ContourAlignment::add_camera(const CameraObservation& seen, const Eigen::Ve
     x_work_(index) = x(index);
     for (std::size_t part = 0; part < parts; ++part) {
       const Eigen::Matrix3d inverse = X_CB_[part].linear().cast<double>().inverse();
-      const Eigen::Matrix3d dR =
-          (X_plus_[part].linear() - X_minus_[part].linear()).cast<double>() / (2.0 * step);
+      const Eigen::Matrix3d dR = (X_plus_[part].linear() - X_minus_[part].linear()).cast<double>() / (2.0 * step);
       const Eigen::Vector3d dt =
-          (X_plus_[part].translation() - X_minus_[part].translation()).cast<double>() /
-          (2.0 * step);
+          (X_plus_[part].translation() - X_minus_[part].translation()).cast<double>() / (2.0 * step);
       auto& derivative = dX_dB_[k * parts + part];
       derivative.leftCols<3>() = dR * inverse;
       derivative.col(3) = dt - dR * inverse * X_CB_[part].translation().cast<double>();
@@ -162,8 +154,7 @@ void ContourAlignment::add_camera(const CameraObservation& seen, const Eigen::Ve
     // d(normal . pixel) / d p_C
     const Eigen::RowVector3d gradient(
         normal.x() * intrinsics.fx * z_inverse, normal.y() * intrinsics.fy * z_inverse,
-        -(normal.x() * intrinsics.fx * p_C.x() + normal.y() * intrinsics.fy * p_C.y()) *
-            z_inverse * z_inverse);
+        -(normal.x() * intrinsics.fx * p_C.x() + normal.y() * intrinsics.fy * p_C.y()) * z_inverse * z_inverse);
     for (std::size_t k = 0; k < parameters.size(); ++k) {
       const auto index = static_cast<Eigen::Index>(k);
       if (parameters[k].kind == ParameterKind::kDilation) {
@@ -171,8 +162,7 @@ void ContourAlignment::add_camera(const CameraObservation& seen, const Eigen::Ve
         continue;
       }
       const auto& derivative = dX_dB_[k * parts + point.part];
-      jacobian_row_(index) =
-          gradient.dot(derivative.leftCols<3>() * p_C + derivative.col(3));
+      jacobian_row_(index) = gradient.dot(derivative.leftCols<3>() * p_C + derivative.col(3));
     }
     const double magnitude = std::abs(*distance);
     const double weight = magnitude <= options_.huber_px ? 1.0 : options_.huber_px / magnitude;

@@ -44,8 +44,7 @@ Eigen::VectorXd prior_sds(const std::vector<Parameter>& parameters) {
 }
 
 /// Encoder errors of one frame: those of the arm's joints.
-Eigen::VectorXd encoder_sds(const std::vector<Parameter>& parameters, std::size_t arm_joints,
-                            double sd_rad) {
+Eigen::VectorXd encoder_sds(const std::vector<Parameter>& parameters, std::size_t arm_joints, double sd_rad) {
   Eigen::VectorXd sd = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
   sd.head(static_cast<Eigen::Index>(arm_joints)).setConstant(sd_rad);
   return sd;
@@ -74,18 +73,15 @@ const char* to_string(EstimatorState state) {
 }
 
 struct Estimator::Impl {
-  Impl(std::shared_ptr<const RobotModel> robot_model, const RobotSetup& robot_setup,
-       const StereoRig& stereo_rig, const EstimatorOptions& estimator_options)
+  Impl(std::shared_ptr<const RobotModel> robot_model, const RobotSetup& robot_setup, const StereoRig& stereo_rig,
+       const EstimatorOptions& estimator_options)
       : options(estimator_options), setup(robot_setup), rig(stereo_rig),
         parameters(estimated_parameters(robot_model, setup, rig, options)),
-        silhouettes(make_silhouette_model(*robot_model, setup)),
-        intrinsics(rig.intrinsics()),
-        body(robot_model, setup, rig, parameters),
-        alignment(body, silhouettes, intrinsics, options.contour),
+        silhouettes(make_silhouette_model(*robot_model, setup)), intrinsics(rig.intrinsics()),
+        body(robot_model, setup, rig, parameters), alignment(body, silhouettes, intrinsics, options.contour),
         scorer(body, silhouettes, intrinsics, options.silhouette, options.filter.particles),
         filter(static_cast<Eigen::Index>(setup.estimated_joints.size()), options.filter),
-        fusion(prior_sds(parameters),
-               encoder_sds(parameters, setup.estimated_joints.size(), options.encoder_sd_rad)),
+        fusion(prior_sds(parameters), encoder_sds(parameters, setup.estimated_joints.size(), options.encoder_sd_rad)),
         first_look(fusion),
         fitter(alignment, scorer, first_look, static_cast<Eigen::Index>(setup.estimated_joints.size()), options) {
     for (const auto& name : setup.estimated_joints) joint_index.push_back(robot_model->joint_index(name));
@@ -154,9 +150,7 @@ struct Estimator::Impl {
   }
 
   /// The estimate is one of the particles, as in the paper.
-  [[nodiscard]] bool particles_only() const {
-    return options.mode == EstimatorMode::kPaper || !options.refine_outline;
-  }
+  [[nodiscard]] bool particles_only() const { return options.mode == EstimatorMode::kPaper || !options.refine_outline; }
 
   void particle_step() {
     const auto start = Clock::now();
@@ -364,8 +358,7 @@ struct Estimator::Impl {
     start = Clock::now();
     const bool locked = fusion.frames() > 0.5;
     current = locked ? EstimatorState::kConverging
-                     : (surprised_frames > 0 ? EstimatorState::kDiverged
-                                             : EstimatorState::kConverging);
+                     : (surprised_frames > 0 ? EstimatorState::kDiverged : EstimatorState::kConverging);
     spread(locked);
     times.filter_ms += elapsed_ms(start);
   }
@@ -397,9 +390,7 @@ struct Estimator::Impl {
   }
 
   /// The best of the three most likely particles once they are moved onto the outline.
-  OutlineFit search(const Observation& observation) {
-    return search(observation, filter.states(), distance, state, 3);
-  }
+  OutlineFit search(const Observation& observation) { return search(observation, filter.states(), distance, state, 3); }
   /// The same of the first `count` of any offsets.
   /// @param rest  its nuisances go with them
   OutlineFit search(const Observation& observation, const Eigen::MatrixXd& offsets, const Eigen::VectorXd& distances,
@@ -557,7 +548,7 @@ struct Estimator::Impl {
 
   static constexpr double kSearchSpread_rad = 0.0349066;  ///< 2 deg
   static constexpr double kLargestSlip_rad = 0.2094395;   ///< 12 deg; larger ones take more frames
-  static constexpr double kUsualPull = 20.0;  ///< chi-square of a frame that agrees with the memory
+  static constexpr double kUsualPull = 20.0;              ///< chi-square of a frame that agrees with the memory
   static constexpr double kYoungMemory_frames = 3.5;
   static constexpr double kSettled_frames = 4.5;  ///< fewer may still hold a wrong minimum
   static constexpr int kShelf_frames = 30;
@@ -579,22 +570,22 @@ struct Estimator::Impl {
     PullJudge pulls;  ///< what was usual for it
     int frames_left;
   };
-  std::optional<Shelf> shelf;  ///< the memory that the last contradiction cost
+  std::optional<Shelf> shelf;     ///< the memory that the last contradiction cost
   const OffsetFusion first_look;  ///< the prior alone
   OutlineFitter fitter;
 
   Eigen::Index joints = 0;
   std::vector<Eigen::Index> joint_index;  ///< of the estimated joints in the RobotModel
   Eigen::VectorXd reading;                ///< their encoders
-  Eigen::VectorXd state;  ///< one value per parameter, fused over frames
-  OffsetFusion::FrameState frame_state;  ///< the same with the last frame's own encoder error
+  Eigen::VectorXd state;                  ///< one value per parameter, fused over frames
+  OffsetFusion::FrameState frame_state;   ///< the same with the last frame's own encoder error
   EstimatorState current = EstimatorState::kHandNotInView;
   double best_likelihood = 0.0;
   double effective_size = 0.0;
   double contour_rms_px = 0.0;
   int surprised_frames = 0;
   bool contradicted = false;
-  bool cameras_swapped = false;  ///< the last frame's pictures
+  bool cameras_swapped = false;   ///< the last frame's pictures
   Eigen::MatrixXd first_guesses;  ///< of the joint offsets: the first particles
   EyeOrder eye_order;
   PullJudge pulls;
@@ -607,22 +598,24 @@ struct Estimator::Impl {
   Eigen::VectorXd weights;
 };
 
-Estimator::Estimator(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
-                     const StereoRig& rig, const EstimatorOptions& options)
+Estimator::Estimator(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                     const EstimatorOptions& options)
     : impl_(std::make_unique<Impl>(std::move(robot), setup, rig, options)) {}
 Estimator::~Estimator() = default;
 Estimator::Estimator(Estimator&&) noexcept = default;
 
-Eigen::VectorXd Estimator::likelihood(const Observation& observation,
-                                      const Eigen::MatrixXd& offsets_rad) {
+Eigen::VectorXd Estimator::likelihood(const Observation& observation, const Eigen::MatrixXd& offsets_rad) {
   return impl_->likelihood(observation, offsets_rad);
 }
 
-Estimate Estimator::step(const Observation& observation) { return impl_->step(observation); }
-void Estimator::reset() { impl_->reset(); }
+Estimate Estimator::step(const Observation& observation) {
+  return impl_->step(observation);
+}
+void Estimator::reset() {
+  impl_->reset();
+}
 
-BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::size_t camera,
-                                           bool corrected) {
+BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::size_t camera, bool corrected) {
   std::vector<Eigen::Isometry3f> X_CB(impl_->body.part_count());
   const CameraObservation& seen = *observation.cameras[camera];
   if (corrected) {
@@ -638,8 +631,7 @@ Pose Estimator::hand_pose(const Exposure& at, std::size_t camera, bool corrected
                    : impl_->body.hand_pose(at.q, impl_->uncorrected(), camera);
 }
 
-std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& at, std::size_t camera,
-                                                   bool corrected) {
+std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& at, std::size_t camera, bool corrected) {
   std::vector<Eigen::Vector3d> tips;
   if (corrected) {
     impl_->body.fingertips(at, impl_->state, camera, tips);

@@ -18,13 +18,13 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
 
   const Configuration silhouette = configuration.section("silhouette");
   o.silhouette.engine = silhouette.choice_or("engine", "auto", {"auto", "atlas", "contour"});
-  o.silhouette.gl_platform = silhouette.choice_or(
-      "gl_platform", "auto", {"auto", "egl_device", "egl_surfaceless", "osmesa"});
+  o.silhouette.gl_platform =
+      silhouette.choice_or("gl_platform", "auto", {"auto", "egl_device", "egl_surfaceless", "osmesa"});
   o.silhouette.threads = static_cast<int>(silhouette.integer_or("threads", 0, 0, 1024));
 
   const Configuration estimator = configuration.section("estimator");
-  o.mode = estimator.choice_or("mode", "best", {"paper", "best"}) == "paper" ? EstimatorMode::kPaper
-                                                                              : EstimatorMode::kBest;
+  o.mode =
+      estimator.choice_or("mode", "best", {"paper", "best"}) == "paper" ? EstimatorMode::kPaper : EstimatorMode::kBest;
   o.min_mask_px = static_cast<std::size_t>(estimator.integer_or("min_mask_px", 150, 1, 1000000000));
   const Configuration best = estimator.section("best");
   o.temperature = best.number_or("temperature", o.temperature, 1e-6, 10.0);

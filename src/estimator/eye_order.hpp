@@ -17,7 +17,9 @@ class EyeOrder {
   /// @param as_they_are, exchanged  Hammoude distance of what was found, or of the nearest guess
   bool exchanged(double as_they_are, double exchanged);
   /// Whether there is nothing more to ask: they are in order, or this hand does not tell.
-  [[nodiscard]] bool settled() const { return evidence_ <= kInOrder || (frames_ >= kPatience && evidence_ <= kExchanged); }
+  [[nodiscard]] bool settled() const {
+    return evidence_ <= kInOrder || (frames_ >= kPatience && evidence_ <= kExchanged);
+  }
 
   /// Whether one frame alone tells that offsets fit the exchanged pictures and not those as they are.
   static bool clearly_exchanged(double as_they_are, double exchanged) { return exchanged < kClearly * as_they_are; }

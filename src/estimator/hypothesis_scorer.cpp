@@ -80,6 +80,8 @@ std::string HypothesisScorer::description() const {
   return scorer_->description() + (engine_reason_.empty() ? "" : ": " + engine_reason_);
 }
 
-double HypothesisScorer::take_scoring_ms() { return std::exchange(scoring_ms_, 0.0); }
+double HypothesisScorer::take_scoring_ms() {
+  return std::exchange(scoring_ms_, 0.0);
+}
 
 }  // namespace bodyschema

@@ -36,7 +36,9 @@ class HypothesisScorer {
   [[nodiscard]] bool can_be_exchanged() const;
 
   /// The predicted silhouette of one pose of all parts in a camera.
-  BinaryMask render(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera) { return scorer_->render(X_CB, camera); }
+  BinaryMask render(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera) {
+    return scorer_->render(X_CB, camera);
+  }
   /// The engine, and why it was taken.
   [[nodiscard]] std::string description() const;
   /// Wall clock spent drawing and counting since the last call.
@@ -52,7 +54,7 @@ class HypothesisScorer {
   const Observation* observation_ = nullptr;
   std::uint32_t camera_mask_ = 0;  ///< cameras that have a mask
   std::vector<ObservedSilhouette> observed_;
-  std::size_t slots_;  ///< and one more behind them, for `distance`
+  std::size_t slots_;                    ///< and one more behind them, for `distance`
   std::vector<Eigen::Isometry3f> X_CB_;  ///< [slot][camera][part]
   std::vector<SilhouetteCounts> counts_;
   Eigen::VectorXd distances_, one_distance_;

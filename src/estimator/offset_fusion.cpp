@@ -23,28 +23,24 @@ void OffsetFusion::fade(double factor) {
   frames_ *= factor;
 }
 
-void OffsetFusion::add(const ContourEvidence& evidence, const Eigen::VectorXd& x0,
-                       double variance_px2, double share) {
+void OffsetFusion::add(const ContourEvidence& evidence, const Eigen::VectorXd& x0, double variance_px2, double share) {
   // The picture sees x + e with e ~ N(0, R): marginalised, A becomes A (I + R A)^-1.
   const Eigen::Index n = x0.size();
   const Eigen::MatrixXd A = evidence.A / variance_px2;
-  const Eigen::MatrixXd damping =
-      (Eigen::MatrixXd::Identity(n, n) + A * encoder_variance_.asDiagonal()).inverse();
+  const Eigen::MatrixXd damping = (Eigen::MatrixXd::Identity(n, n) + A * encoder_variance_.asDiagonal()).inverse();
   const Eigen::MatrixXd A_marginal = damping * A;
   information_ += 0.5 * share * (A_marginal + A_marginal.transpose());
   vector_ += share * (A_marginal * x0 + damping * evidence.b / variance_px2);
   frames_ += 1.0;
 }
 
-OffsetFusion::FrameState OffsetFusion::frame_state(const ContourEvidence& evidence,
-                                                   const Eigen::VectorXd& x0,
+OffsetFusion::FrameState OffsetFusion::frame_state(const ContourEvidence& evidence, const Eigen::VectorXd& x0,
                                                    double variance_px2) const {
   const FrameState before = frame_state();
   const Eigen::Index n = x0.size();
   const Eigen::MatrixXd prior = before.covariance.inverse();
   FrameState after;
-  after.covariance =
-      (prior + evidence.A / variance_px2).ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  after.covariance = (prior + evidence.A / variance_px2).ldlt().solve(Eigen::MatrixXd::Identity(n, n));
   after.x = x0 + after.covariance * (evidence.b / variance_px2 + prior * (before.x - x0));
   return after;
 }
@@ -57,10 +53,9 @@ OffsetFusion::FrameState OffsetFusion::frame_state() const {
   return state;
 }
 
-Eigen::VectorXd OffsetFusion::solve_with(const ContourEvidence& evidence,
-                                         const Eigen::VectorXd& x0, double variance_px2) const {
-  const Eigen::MatrixXd information =
-      prior_information_ + information_ + evidence.A / variance_px2;
+Eigen::VectorXd OffsetFusion::solve_with(const ContourEvidence& evidence, const Eigen::VectorXd& x0,
+                                         double variance_px2) const {
+  const Eigen::MatrixXd information = prior_information_ + information_ + evidence.A / variance_px2;
   return information.ldlt().solve(vector_ + (evidence.A * x0 + evidence.b) / variance_px2);
 }
 
@@ -69,9 +64,7 @@ Eigen::VectorXd OffsetFusion::mean() const {
 }
 
 Eigen::MatrixXd OffsetFusion::covariance() const {
-  return (prior_information_ + information_)
-      .ldlt()
-      .solve(Eigen::MatrixXd::Identity(vector_.size(), vector_.size()));
+  return (prior_information_ + information_).ldlt().solve(Eigen::MatrixXd::Identity(vector_.size(), vector_.size()));
 }
 
 }  // namespace bodyschema

@@ -42,9 +42,8 @@ OutlineFit OutlineFitter::search(const Observation& observation, std::span<const
     refine(observation, prior_, kWide_px, fits[i]);
     fits[i].distance = scorer_.distance(fits[i].x);
   }
-  return std::move(*std::min_element(fits.begin(), fits.end(), [](const auto& a, const auto& b) {
-    return a.distance < b.distance;
-  }));
+  return std::move(*std::min_element(fits.begin(), fits.end(),
+                                     [](const auto& a, const auto& b) { return a.distance < b.distance; }));
 }
 
 double OutlineFitter::pull_of(const OutlineFit& fit) const {

@@ -8,8 +8,8 @@ namespace {
 
 /// Head joints that move every camera. A joint of one eye alone changes the vergence, which is a
 /// parameter of its own.
-std::vector<std::string> shared_head_joints(const std::shared_ptr<const RobotModel>& robot,
-                                            const RobotSetup& setup, const StereoRig& rig) {
+std::vector<std::string> shared_head_joints(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                                            const StereoRig& rig) {
   std::vector<std::string> links;
   for (const auto& camera : rig.cameras) links.push_back(camera.link);
   const ForwardKinematics kinematics(robot, links);
@@ -40,21 +40,18 @@ const char* unit_of(ParameterKind kind) {
   return "1";
 }
 
-std::vector<Parameter> estimated_parameters(const std::shared_ptr<const RobotModel>& model,
-                                            const RobotSetup& setup, const StereoRig& rig,
-                                            const EstimatorOptions& options) {
+std::vector<Parameter> estimated_parameters(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup,
+                                            const StereoRig& rig, const EstimatorOptions& options) {
   const RobotModel& robot = *model;
   std::vector<Parameter> parameters;
   for (const auto& name : setup.estimated_joints) {
-    parameters.push_back({name, ParameterKind::kJointOffset, robot.joint_index(name),
-                          options.filter.initial_sd_rad});
+    parameters.push_back({name, ParameterKind::kJointOffset, robot.joint_index(name), options.filter.initial_sd_rad});
   }
   if (options.mode == EstimatorMode::kPaper) return parameters;
   const NuisancePriors& priors = options.priors;
   if (priors.head_rad > 0.0) {
     for (const auto& name : shared_head_joints(model, setup, rig)) {
-      parameters.push_back(
-          {name, ParameterKind::kJointOffset, robot.joint_index(name), priors.head_rad});
+      parameters.push_back({name, ParameterKind::kJointOffset, robot.joint_index(name), priors.head_rad});
     }
   }
   const auto add = [&](const char* name, ParameterKind kind, double sd) {
@@ -63,10 +60,8 @@ std::vector<Parameter> estimated_parameters(const std::shared_ptr<const RobotMod
   add("finger_curl", ParameterKind::kFingerCurl, priors.finger_curl_rad);
   if (rig.cameras.size() > 1) {
     add("vergence", ParameterKind::kVergence, priors.vergence_rad);
-    add("principal_difference_x", ParameterKind::kPrincipalDifferenceX,
-        priors.principal_difference_px);
-    add("principal_difference_y", ParameterKind::kPrincipalDifferenceY,
-        priors.principal_difference_px);
+    add("principal_difference_x", ParameterKind::kPrincipalDifferenceX, priors.principal_difference_px);
+    add("principal_difference_y", ParameterKind::kPrincipalDifferenceY, priors.principal_difference_px);
   }
   add("focal_scale", ParameterKind::kFocalScale, priors.focal_scale);
   add("mesh_scale", ParameterKind::kMeshScale, priors.mesh_scale);

@@ -19,6 +19,8 @@ PullJudge::Verdict PullJudge::judge(double pull) {
   return Verdict::kAgrees;
 }
 
-void PullJudge::forget() { *this = {}; }
+void PullJudge::forget() {
+  *this = {};
+}
 
 }  // namespace bodyschema

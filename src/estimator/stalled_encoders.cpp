@@ -18,7 +18,9 @@ constexpr double kRuns_rad_s = 0.105;   // 6 deg/s; a slower joint's error stays
 
 }  // namespace
 
-bool StalledEncoders::Track::moved_to(double reading) const { return std::abs(reading_rad - reading) > kStands_rad; }
+bool StalledEncoders::Track::moved_to(double reading) const {
+  return std::abs(reading_rad - reading) > kStands_rad;
+}
 
 StalledEncoders::Track StalledEncoders::Track::moved_on(double time_s, double reading) const {
   Track next;

@@ -10,8 +10,7 @@
 
 namespace bodyschema {
 
-WeakestDirection weakest_direction(const Eigen::MatrixXd& covariance_rad2,
-                                   const std::vector<std::string>& joints) {
+WeakestDirection weakest_direction(const Eigen::MatrixXd& covariance_rad2, const std::vector<std::string>& joints) {
   constexpr double kWorthNaming = 0.3;
   WeakestDirection result;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance_rad2);

@@ -47,11 +47,10 @@ void run_ablations(ExperimentContext& context) {
     const char* title;
     std::function<TrialSetting(std::uint64_t)> setting;
   };
-  const Condition conditions[] = {
-      {"experiment1", "what each part is worth: experiment 1",
-       [&](std::uint64_t) { return standard_setting(context); }},
-      {"mismatch", "what each part is worth: model mismatch",
-       [&](std::uint64_t seed) { return mismatch_setting(context, seed); }}};
+  const Condition conditions[] = {{"experiment1", "what each part is worth: experiment 1",
+                                   [&](std::uint64_t) { return standard_setting(context); }},
+                                  {"mismatch", "what each part is worth: model mismatch",
+                                   [&](std::uint64_t seed) { return mismatch_setting(context, seed); }}};
   for (const auto& condition : conditions) {
     const auto records = run_trials(context, condition.title, trials, condition.setting, contestants);
     add_heading(context, condition.title);

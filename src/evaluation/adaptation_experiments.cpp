@@ -53,17 +53,16 @@ RecoveryFigures figures_of(const std::vector<Recovery>& recoveries) {
 }
 
 Json to_json(const RecoveryFigures& figures) {
-  return {{"frames_to_recover",
-           {{"mean", figures.frames_to_recover.mean}, {"max", figures.frames_to_recover.worst}}},
-          {"frames_outside_999",
-           {{"mean", figures.frames_outside_999.mean}, {"max", figures.frames_outside_999.worst}}}};
+  return {
+      {"frames_to_recover", {{"mean", figures.frames_to_recover.mean}, {"max", figures.frames_to_recover.worst}}},
+      {"frames_outside_999", {{"mean", figures.frames_outside_999.mean}, {"max", figures.frames_outside_999.worst}}}};
 }
 
 void add_row(ExperimentContext& context, const std::string& name, const RecoveryFigures& f) {
-  context.table += fmt::format(
-      "{:<38} below 1 mm within {:>3.0f} frames (mean {:.1f}, slowest seed {}), outside 99.9 %: {:.0f}\n",
-      name, f.frames_to_recover.worst, f.frames_to_recover.mean, context.options.seed + f.slowest,
-      f.frames_outside_999.worst);
+  context.table +=
+      fmt::format("{:<38} below 1 mm within {:>3.0f} frames (mean {:.1f}, slowest seed {}), outside 99.9 %: {:.0f}\n",
+                  name, f.frames_to_recover.worst, f.frames_to_recover.mean, context.options.seed + f.slowest,
+                  f.frames_outside_999.worst);
 }
 
 /// Runs both modes and judges each trial by `judge(trial, contestant)`.
@@ -87,20 +86,19 @@ void run_adaptation(ExperimentContext& context, const std::string& title, const 
 }  // namespace
 
 void run_slip(ExperimentContext& context) {
-  const std::vector<std::string> joints =
-      RobotSetup::from(context.simulated.section("robot")).estimated_joints;
-  run_adaptation(context, "a joint slips by 5 degrees", "slip",
-                 [&](std::uint64_t seed) {
-                   TrialSetting setting = standard_setting(context);
-                   FaultSpec slip =
-                       FaultSpec::of("slip", joints[seed % joints.size()], seed % 2 == 0 ? 5.0 : -5.0);
-                   slip.set("at", kEventFrame / setting.simulator.camera_rate_hz);
-                   setting.plan.faults = {slip};
-                   return setting;
-                 },
-                 [](const TrialRecord& record, std::size_t contestant) {
-                   return recovery(record.contestants[contestant].frames, kEventFrame, kLeft);
-                 });
+  const std::vector<std::string> joints = RobotSetup::from(context.simulated.section("robot")).estimated_joints;
+  run_adaptation(
+      context, "a joint slips by 5 degrees", "slip",
+      [&](std::uint64_t seed) {
+        TrialSetting setting = standard_setting(context);
+        FaultSpec slip = FaultSpec::of("slip", joints[seed % joints.size()], seed % 2 == 0 ? 5.0 : -5.0);
+        slip.set("at", kEventFrame / setting.simulator.camera_rate_hz);
+        setting.plan.faults = {slip};
+        return setting;
+      },
+      [](const TrialRecord& record, std::size_t contestant) {
+        return recovery(record.contestants[contestant].frames, kEventFrame, kLeft);
+      });
 }
 
 void run_hand_leaves(ExperimentContext& context) {
@@ -133,17 +131,16 @@ void run_hand_leaves(ExperimentContext& context) {
 
 void run_camera_dies(ExperimentContext& context) {
   const auto dead_camera = [](std::uint64_t seed) { return static_cast<std::size_t>(seed % 2); };
-  run_adaptation(context, "one camera dies", "camera_dies",
-                 [&](std::uint64_t seed) {
-                   TrialSetting setting = standard_setting(context);
-                   setting.plan.camera_dies = {dead_camera(seed),
-                                               kEventFrame / setting.simulator.camera_rate_hz};
-                   return setting;
-                 },
-                 [&](const TrialRecord& record, std::size_t contestant) {
-                   return recovery(record.contestants[contestant].frames, kEventFrame,
-                                   1 - dead_camera(record.seed));
-                 });
+  run_adaptation(
+      context, "one camera dies", "camera_dies",
+      [&](std::uint64_t seed) {
+        TrialSetting setting = standard_setting(context);
+        setting.plan.camera_dies = {dead_camera(seed), kEventFrame / setting.simulator.camera_rate_hz};
+        return setting;
+      },
+      [&](const TrialRecord& record, std::size_t contestant) {
+        return recovery(record.contestants[contestant].frames, kEventFrame, 1 - dead_camera(record.seed));
+      });
 }
 
 }  // namespace bodyschema

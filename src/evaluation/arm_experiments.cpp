@@ -10,9 +10,8 @@ namespace {
 using simulator::FaultSpec;
 
 /// Both modes on the same pictures; results under summary[mode][key].stereo.
-void compare_modes(ExperimentContext& context, const std::string& title, const std::string& key,
-                   int trials, const std::function<TrialSetting(std::uint64_t)>& setting_of,
-                   std::size_t camera) {
+void compare_modes(ExperimentContext& context, const std::string& title, const std::string& key, int trials,
+                   const std::function<TrialSetting(std::uint64_t)>& setting_of, std::size_t camera) {
   const std::vector<Contestant> contestants = stereo_contestants(context);
   const auto records = run_trials(context, title, trials, setting_of, contestants);
   add_heading(context, title);
@@ -38,8 +37,9 @@ void run_experiment1(ExperimentContext& context, bool paper_only) {
     contestants.push_back({mode + ".stereo", options_for(context, mode), false});
     contestants.push_back({mode + ".mono", options_for(context, mode), true});
   }
-  const auto records = run_trials(context, "experiment 1: offsets in the arm", context.options.trials,
-                                  [&](std::uint64_t) { return standard_setting(context); }, contestants);
+  const auto records = run_trials(
+      context, "experiment 1: offsets in the arm", context.options.trials,
+      [&](std::uint64_t) { return standard_setting(context); }, contestants);
   add_heading(context, "experiment 1: offsets in the arm");
   chart_errors(context, "experiment 1: offsets in the arm", records, contestants, kLeft);
   for (std::size_t i = 0; i < contestants.size(); ++i) {
@@ -53,8 +53,8 @@ void run_experiment1(ExperimentContext& context, bool paper_only) {
     nominal.push_back(mean_of_last(record.contestants[0].frames, kLeft, &FrameRecord::nominal_mm));
   }
   context.table += fmt::format("{:<38} {:>5.2f}\n", "without correction", Statistics::of(nominal).mean);
-  context.table += fmt::format("{:<38} {:>5.2f} +- {:<5.2f} {:>5.2f} +- {:<5.2f}\n",
-                               "Table I of the paper (stereo)", 3.34, 1.52, 4.55, 2.03);
+  context.table += fmt::format("{:<38} {:>5.2f} +- {:<5.2f} {:>5.2f} +- {:<5.2f}\n", "Table I of the paper (stereo)",
+                               3.34, 1.52, 4.55, 2.03);
   for (std::size_t i = 0; i < contestants.size(); ++i) {
     if (contestants[i].mono) continue;
     judge_converged(context, paper_only ? "paper" : modes()[i / 2], records, i);
@@ -62,31 +62,33 @@ void run_experiment1(ExperimentContext& context, bool paper_only) {
 }
 
 void run_clutter(ExperimentContext& context) {
-  compare_modes(context, "experiment 1 before clutter", "experiment1_clutter", context.options.trials,
-                [&](std::uint64_t) {
-                  TrialSetting setting = standard_setting(context);
-                  setting.simulator.clutter = true;
-                  return setting;
-                },
-                kLeft);
+  compare_modes(
+      context, "experiment 1 before clutter", "experiment1_clutter", context.options.trials,
+      [&](std::uint64_t) {
+        TrialSetting setting = standard_setting(context);
+        setting.simulator.clutter = true;
+        return setting;
+      },
+      kLeft);
 }
 
 void run_mismatch(ExperimentContext& context) {
-  compare_modes(context, "model mismatch", "mismatch", context.options.trials,
-                [&](std::uint64_t seed) { return mismatch_setting(context, seed); }, kLeft);
+  compare_modes(
+      context, "model mismatch", "mismatch", context.options.trials,
+      [&](std::uint64_t seed) { return mismatch_setting(context, seed); }, kLeft);
 }
 
 void run_experiment2(ExperimentContext& context) {
-  compare_modes(context, "experiment 2: offsets in arm and head", "experiment2", context.options.trials,
-                [&](std::uint64_t) {
-                  TrialSetting setting = standard_setting(context);
-                  setting.plan.faults = {FaultSpec::of("head_offset", "neck_pitch", -4),
-                                         FaultSpec::of("head_offset", "neck_roll", 6),
-                                         FaultSpec::of("head_offset", "neck_yaw", -2),
-                                         FaultSpec::of("head_offset", "eyes_tilt", -1)};
-                  return setting;
-                },
-                kRight);
+  compare_modes(
+      context, "experiment 2: offsets in arm and head", "experiment2", context.options.trials,
+      [&](std::uint64_t) {
+        TrialSetting setting = standard_setting(context);
+        setting.plan.faults = {
+            FaultSpec::of("head_offset", "neck_pitch", -4), FaultSpec::of("head_offset", "neck_roll", 6),
+            FaultSpec::of("head_offset", "neck_yaw", -2), FaultSpec::of("head_offset", "eyes_tilt", -1)};
+        return setting;
+      },
+      kRight);
 }
 
 }  // namespace bodyschema

@@ -44,12 +44,11 @@ simulator::FaultSpec spec_of(const TrialFault& fault) {
 /// A log written by the simulator, diagnosed by what `bodyschema diagnose` runs; deleted at the end.
 class PictureLog final : public TrialLog {
  public:
-  PictureLog(const TrialRobot& robot, const simulator::SimulatorSettings& settings,
-             fs::path configuration, const TrialOptions& options, std::uint64_t seed)
+  PictureLog(const TrialRobot& robot, const simulator::SimulatorSettings& settings, fs::path configuration,
+             const TrialOptions& options, std::uint64_t seed)
       : configuration_(std::move(configuration)) {
     static std::atomic<int> number{0};
-    file_ = fs::temp_directory_path() /
-            fmt::format("bodyschema_{}_diagnosis_{}.log", getpid(), number++);
+    file_ = fs::temp_directory_path() / fmt::format("bodyschema_{}_diagnosis_{}.log", getpid(), number++);
     simulator::SimulationPlan plan;
     plan.seed = seed;
     plan.motion = simulator::Motion::kBabble;
@@ -94,12 +93,12 @@ TrialLogMaker picture_logs(const ExperimentContext& context, const TrialRobot& r
 /// One figure of the table with what is demanded of it.
 struct Figure {
   const char* row;
-  const char* name;      ///< as in summary.json
+  const char* name;  ///< as in summary.json
   double value;
-  bool at_most;          ///< else at least
+  bool at_most;  ///< else at least
   double demand;
-  double upper = 1e9;    ///< coverage has both bounds
-  bool is_rate = true;   ///< may be five points worse through pictures
+  double upper = 1e9;   ///< coverage has both bounds
+  bool is_rate = true;  ///< may be five points worse through pictures
 };
 
 std::vector<Figure> figures(const TrialRates& r) {
@@ -126,8 +125,7 @@ std::vector<Figure> figures(const TrialRates& r) {
 std::string demand_text(const Figure& f, double slack) {
   const double share = f.is_rate ? slack : 0.0;
   if (f.upper < 1e8) return fmt::format("{:.2f} to {:.2f}", f.demand - share, f.upper + share);
-  return fmt::format("{} {:.2f}", f.at_most ? "at most" : "at least",
-                     f.at_most ? f.demand + share : f.demand - share);
+  return fmt::format("{} {:.2f}", f.at_most ? "at most" : "at least", f.at_most ? f.demand + share : f.demand - share);
 }
 
 bool reached(const Figure& f, double slack) {
@@ -144,8 +142,7 @@ std::size_t trials_of(const Figure& f, const TrialRates& r) {
   return std::string(f.row) == "parameters" ? r.parameters : r.gains;
 }
 
-void add_table(ExperimentContext& context, const std::string& title, const TrialRates& r,
-               Json& summary, double slack) {
+void add_table(ExperimentContext& context, const std::string& title, const TrialRates& r, Json& summary, double slack) {
   context.table += fmt::format("\n{:<44} {:>6} {:>9}   {}\n", title, "trials", "measured", "demand");
   for (std::size_t s = 0; s < kTrialRows; ++s) {
     summary[kTrialRowNames[s]]["trials"] = r.trials[s];
@@ -156,17 +153,16 @@ void add_table(ExperimentContext& context, const std::string& title, const Trial
     const bool known = std::isfinite(f.value);
     summary[f.row][f.name] = known ? Json(f.value) : Json(nullptr);
     if (!known) continue;
-    context.table += fmt::format("{:<44} {:>6} {:>9.3f}   {:<14} {}\n",
-                                 fmt::format("{} {}", f.row, f.name), trials_of(f, r), f.value,
-                                 demand_text(f, slack), reached(f, slack) ? "" : "missed");
+    context.table += fmt::format("{:<44} {:>6} {:>9.3f}   {:<14} {}\n", fmt::format("{} {}", f.row, f.name),
+                                 trials_of(f, r), f.value, demand_text(f, slack), reached(f, slack) ? "" : "missed");
   }
 }
 
 Json json_of(const TrialOutcome& o) {
   Json truth = Json::array(), answer = Json::array();
   for (const auto& f : o.truth) {
-    truth.push_back({{"cause", f.cause.text()}, {"value", f.value}, {"second", f.second},
-                     {"detectable", f.detectable}});
+    truth.push_back(
+        {{"cause", f.cause.text()}, {"value", f.value}, {"second", f.second}, {"detectable", f.detectable}});
   }
   for (const auto& c : o.report.causes) {
     Json same = Json::array();
@@ -175,12 +171,21 @@ Json json_of(const TrialOutcome& o) {
     for (const auto& p : c.parameters) {
       parameters.push_back({{"parameter", p.parameter}, {"estimate", p.estimate}, {"ci95", {p.ci95[0], p.ci95[1]}}});
     }
-    answer.push_back({{"cause", c.cause.text()}, {"variable", c.variable}, {"class", same},
-                      {"z", c.z}, {"heldout_gain", c.heldout_gain}, {"parameters", parameters}});
+    answer.push_back({{"cause", c.cause.text()},
+                      {"variable", c.variable},
+                      {"class", same},
+                      {"z", c.z},
+                      {"heldout_gain", c.heldout_gain},
+                      {"parameters", parameters}});
   }
-  return {{"row", kTrialRowNames[static_cast<std::size_t>(o.row)]}, {"seed", o.seed},
-          {"truth", truth}, {"answer", answer}, {"sentence", o.report.sentence}, {"crowded", o.report.crowded},
-          {"rms_px", {o.report.before.rms_px, o.report.after.rms_px}}, {"seconds", o.seconds}};
+  return {{"row", kTrialRowNames[static_cast<std::size_t>(o.row)]},
+          {"seed", o.seed},
+          {"truth", truth},
+          {"answer", answer},
+          {"sentence", o.report.sentence},
+          {"crowded", o.report.crowded},
+          {"rms_px", {o.report.before.rms_px, o.report.after.rms_px}},
+          {"seconds", o.seconds}};
 }
 
 TrialRates run_rows(ExperimentContext& context, const std::string& label, const TrialRobot& robot,
@@ -190,12 +195,11 @@ TrialRates run_rows(ExperimentContext& context, const std::string& label, const 
   ProgressBar bar(label, static_cast<std::uint64_t>(total));
   int threads = context.options.threads;
   if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  const auto outcomes = run_diagnosis_trials(
-      robot, counts, context.options.seed, threads, maker,
-      [&](const TrialOutcome& outcome, std::size_t done, std::size_t) {
-        trials << json_of(outcome).dump() << '\n';
-        bar.set(done);
-      });
+  const auto outcomes = run_diagnosis_trials(robot, counts, context.options.seed, threads, maker,
+                                             [&](const TrialOutcome& outcome, std::size_t done, std::size_t) {
+                                               trials << json_of(outcome).dump() << '\n';
+                                               bar.set(done);
+                                             });
   return rates(outcomes);
 }
 
@@ -210,17 +214,14 @@ void run_diagnosis(ExperimentContext& context) {
   std::ofstream trials(file);
   if (!trials) throw FileError(file.string() + ": cannot be written");
 
-  const auto silhouettes =
-      run_rows(context, "silhouette-level logs", robot, trial_counts(context.options.trials),
-               silhouette_logs(robot), trials);
+  const auto silhouettes = run_rows(context, "silhouette-level logs", robot, trial_counts(context.options.trials),
+                                    silhouette_logs(robot), trials);
   add_table(context, "at the level of silhouettes", silhouettes, context.summary, 0.0);
   TrialCounts counts{};
   for (std::size_t s = 0; s < counts.size(); ++s) {
-    counts[s] = std::max(1, static_cast<int>(std::lround(kPictureLogs[s] * context.options.trials /
-                                                         kTrialsOfThose)));
+    counts[s] = std::max(1, static_cast<int>(std::lround(kPictureLogs[s] * context.options.trials / kTrialsOfThose)));
   }
-  const auto pictures = run_rows(context, "logs through pictures", robot, counts,
-                                 picture_logs(context, robot), trials);
+  const auto pictures = run_rows(context, "logs through pictures", robot, counts, picture_logs(context, robot), trials);
   add_table(context, "through full pictures, 60 s at 10 Hz", pictures, context.summary["images"], 0.05);
 }
 

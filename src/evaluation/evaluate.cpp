@@ -43,7 +43,8 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   simulator::SimulatorSettings::from(simulated.section("simulator"));
   simulated.reject_unknown_keys();
   if (reader.options().mode != EstimatorMode::kBest) {
-    throw ConfigurationError("estimator.mode: 'paper' changes nothing here: every experiment runs the modes it compares");
+    throw ConfigurationError(
+        "estimator.mode: 'paper' changes nothing here: every experiment runs the modes it compares");
   }
 
   std::error_code error;
@@ -55,9 +56,7 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   std::string table;
   Report report("Body Schema: experiment " + options.experiment);
   ExperimentContext context{simulated, recorded, options, summary, table, report};
-  const auto wanted = [&](const char* name) {
-    return options.experiment == name || options.experiment == "all";
-  };
+  const auto wanted = [&](const char* name) { return options.experiment == name || options.experiment == "all"; };
   if (options.experiment == "paper") run_experiment1(context, true);
   if (wanted("experiment1")) run_experiment1(context, false);
   if (wanted("clutter")) run_clutter(context);
@@ -76,11 +75,10 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   summary["seed"] = options.seed;
   file << summary.dump(2) << '\n';
   if (!file.flush()) throw FileError((options.out / "summary.json").string() + ": cannot be written");
-  report.figures_first(
-      table, "Trials: " + std::to_string(options.trials) + ", seed " + std::to_string(options.seed) +
-                 (options.experiment == "diagnosis"
-                      ? "."
-                      : ". Simulated robot; means over trials of the mean over the last ten frames."));
+  report.figures_first(table, "Trials: " + std::to_string(options.trials) + ", seed " + std::to_string(options.seed) +
+                                  (options.experiment == "diagnosis"
+                                       ? "."
+                                       : ". Simulated robot; means over trials of the mean over the last ten frames."));
   report.write(options.out / "report.html");
   return table;
 }

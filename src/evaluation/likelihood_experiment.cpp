@@ -46,8 +46,7 @@ void run_likelihood(ExperimentContext& context) {
   std::vector<Sweep> sweeps;
   TrialSetting setting = standard_setting(context);
   const int last = setting.plan.frames - 1;
-  setting.on_frame = [&](Estimator& estimator, const Observation& observation,
-                         const TrialRecord& trial, int frame) {
+  setting.on_frame = [&](Estimator& estimator, const Observation& observation, const TrialRecord& trial, int frame) {
     if (frame != 0 && frame != last) return;
     const Eigen::Index joints = trial.true_offset_deg.size();
     const int steps = static_cast<int>(std::lround(2.0 * kRange_deg / kStep_deg)) + 1;
@@ -64,11 +63,10 @@ void run_likelihood(ExperimentContext& context) {
     sweeps.push_back(std::move(sweep));
   };
   const std::vector<Contestant> contestants = {{"paper.stereo", options_for(context, "paper"), false}};
-  const auto records = run_trials(context, "likelihood over one offset", 1,
-                                  [&](std::uint64_t) { return setting; }, contestants);
+  const auto records = run_trials(
+      context, "likelihood over one offset", 1, [&](std::uint64_t) { return setting; }, contestants);
 
-  const std::string joint =
-      RobotSetup::from(context.simulated.section("robot")).estimated_joints.back();
+  const std::string joint = RobotSetup::from(context.simulated.section("robot")).estimated_joints.back();
   Chart chart;
   chart.title = "Likelihood 1 - d over the offset of " + joint + ", all others true (Fig. 2)";
   chart.x_label = "error of the offset, deg";

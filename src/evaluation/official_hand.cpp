@@ -74,8 +74,7 @@ Pose pose_of_frame(const XMLElement* robot, const HandGraft& graft) {
       return origin_of(joint);
     }
   }
-  throw DataError(graft.hand_urdf.string() + ": no joint from '" + graft.hand_root + "' to '" +
-                  graft.hand_frame + "'");
+  throw DataError(graft.hand_urdf.string() + ": no joint from '" + graft.hand_root + "' to '" + graft.hand_frame + "'");
 }
 
 }  // namespace

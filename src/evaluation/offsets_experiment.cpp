@@ -12,17 +12,18 @@ namespace bodyschema {
 void run_offsets(ExperimentContext& context) {
   constexpr int kLogs = 6;
   const std::vector<Contestant> contestants = stereo_contestants(context);
-  const auto records = run_trials(context, "offsets after 60 s of babbling", kLogs,
-                                  [&](std::uint64_t seed) {
-                                    TrialSetting setting = standard_setting(context);
-                                    setting.plan.motion = simulator::Motion::kBabble;
-                                    setting.plan.seconds = 60.0;
-                                    std::mt19937_64 random(seed * 104729u + 11u);
-                                    std::normal_distribution<double> normal(0.0, 4.0);
-                                    for (auto& [joint, offset] : setting.plan.offsets_deg) offset = normal(random);
-                                    return setting;
-                                  },
-                                  contestants);
+  const auto records = run_trials(
+      context, "offsets after 60 s of babbling", kLogs,
+      [&](std::uint64_t seed) {
+        TrialSetting setting = standard_setting(context);
+        setting.plan.motion = simulator::Motion::kBabble;
+        setting.plan.seconds = 60.0;
+        std::mt19937_64 random(seed * 104729u + 11u);
+        std::normal_distribution<double> normal(0.0, 4.0);
+        for (auto& [joint, offset] : setting.plan.offsets_deg) offset = normal(random);
+        return setting;
+      },
+      contestants);
   context.table += "\noffsets after 60 s of babbling\n";
   for (std::size_t i = 0; i < contestants.size(); ++i) {
     double squares = 0.0;

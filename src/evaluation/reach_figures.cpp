@@ -32,8 +32,7 @@ double mean_of_last(const std::vector<FrameRecord>& frames, std::size_t camera,
                     const std::array<double, 2> FrameRecord::*figure) {
   double sum = 0.0;
   int n = 0;
-  for (std::size_t i = frames.size() - std::min(kLastFrames, frames.size());
-       i < frames.size(); ++i) {
+  for (std::size_t i = frames.size() - std::min(kLastFrames, frames.size()); i < frames.size(); ++i) {
     const double value = (frames[i].*figure)[camera];
     if (value < 0.0) continue;
     sum += value;
@@ -42,8 +41,7 @@ double mean_of_last(const std::vector<FrameRecord>& frames, std::size_t camera,
   return n > 0 ? sum / n : 0.0;
 }
 
-ReachResult reach_result(const std::vector<TrialRecord>& trials, std::size_t contestant,
-                         std::size_t camera) {
+ReachResult reach_result(const std::vector<TrialRecord>& trials, std::size_t contestant, std::size_t camera) {
   std::vector<double> position, rotation, frames;
   for (const auto& trial : trials) {
     const auto& record = trial.contestants[contestant].frames;
@@ -56,29 +54,25 @@ ReachResult reach_result(const std::vector<TrialRecord>& trials, std::size_t con
 }
 
 Json to_json(const ReachResult& r) {
-  const auto figures = [](const Statistics& s) {
-    return Json{{"mean", s.mean}, {"sd", s.sd}, {"worst", s.worst}};
-  };
+  const auto figures = [](const Statistics& s) { return Json{{"mean", s.mean}, {"sd", s.sd}, {"worst", s.worst}}; };
   return {{"position_mm", figures(r.position_mm)},
           {"orientation_deg", figures(r.rotation_deg)},
           {"frames_to_converge", {{"mean", r.frames_to_converge.mean}}}};
 }
 
 void add_row(ExperimentContext& context, const std::string& name, const ReachResult& r) {
-  context.table += fmt::format("{:<38} {:>5.2f} +- {:<5.2f} {:>5.2f} +- {:<5.2f} {:>6.2f} {:>6.2f} {:>7.1f}\n",
-                               name, r.position_mm.mean, r.position_mm.sd, r.rotation_deg.mean,
-                               r.rotation_deg.sd, r.position_mm.worst, r.rotation_deg.worst,
-                               r.frames_to_converge.mean);
+  context.table += fmt::format("{:<38} {:>5.2f} +- {:<5.2f} {:>5.2f} +- {:<5.2f} {:>6.2f} {:>6.2f} {:>7.1f}\n", name,
+                               r.position_mm.mean, r.position_mm.sd, r.rotation_deg.mean, r.rotation_deg.sd,
+                               r.position_mm.worst, r.rotation_deg.worst, r.frames_to_converge.mean);
 }
 
 void add_heading(ExperimentContext& context, const std::string& title) {
-  context.table += fmt::format("\n{:<38} {:>14} {:>14} {:>6} {:>6} {:>7}\n", title, "position mm",
-                               "rotation deg", "worst", "worst", "frames");
+  context.table += fmt::format("\n{:<38} {:>14} {:>14} {:>6} {:>6} {:>7}\n", title, "position mm", "rotation deg",
+                               "worst", "worst", "frames");
 }
 
-void chart_errors(ExperimentContext& context, const std::string& title,
-                  const std::vector<TrialRecord>& trials, const std::vector<Contestant>& contestants,
-                  std::size_t camera) {
+void chart_errors(ExperimentContext& context, const std::string& title, const std::vector<TrialRecord>& trials,
+                  const std::vector<Contestant>& contestants, std::size_t camera) {
   context.report.heading(title);
   struct Figure {
     const char* what;
@@ -112,8 +106,8 @@ void chart_errors(ExperimentContext& context, const std::string& title,
   }
 }
 
-void judge_converged(ExperimentContext& context, const std::string& mode,
-                     const std::vector<TrialRecord>& trials, std::size_t contestant) {
+void judge_converged(ExperimentContext& context, const std::string& mode, const std::vector<TrialRecord>& trials,
+                     std::size_t contestant) {
   int in_time = 0;
   int converged_frames = 0;
   int false_frames = 0;
@@ -131,8 +125,9 @@ void judge_converged(ExperimentContext& context, const std::string& mode,
   const double within = static_cast<double>(in_time) / static_cast<double>(trials.size());
   const double wrong = converged_frames > 0 ? static_cast<double>(false_frames) / converged_frames : 0.0;
   context.summary[mode]["converged"] = {{"within_45_rate", within}, {"false_rate", wrong}};
-  context.table += fmt::format("{}: state converged within 45 frames in {:.0f} %, wrong (over 2 mm) in {:.2f} % of its frames\n",
-                               mode, 100.0 * within, 100.0 * wrong);
+  context.table +=
+      fmt::format("{}: state converged within 45 frames in {:.0f} %, wrong (over 2 mm) in {:.2f} % of its frames\n",
+                  mode, 100.0 * within, 100.0 * wrong);
 }
 
 }  // namespace bodyschema

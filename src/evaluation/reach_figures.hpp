@@ -22,8 +22,7 @@ struct ReachResult {
 double mean_of_last(const std::vector<FrameRecord>& frames, std::size_t camera,
                     const std::array<double, 2> FrameRecord::*figure);
 
-ReachResult reach_result(const std::vector<TrialRecord>& trials, std::size_t contestant,
-                         std::size_t camera);
+ReachResult reach_result(const std::vector<TrialRecord>& trials, std::size_t contestant, std::size_t camera);
 Json to_json(const ReachResult& result);
 
 /// Lines of the printed table.
@@ -31,12 +30,11 @@ void add_heading(ExperimentContext& context, const std::string& title);
 void add_row(ExperimentContext& context, const std::string& name, const ReachResult& result);
 
 /// Errors of the hand over the frames, mean over trials (Figs. 6 and 8).
-void chart_errors(ExperimentContext& context, const std::string& title,
-                  const std::vector<TrialRecord>& trials,
+void chart_errors(ExperimentContext& context, const std::string& title, const std::vector<TrialRecord>& trials,
                   const std::vector<Contestant>& contestants, std::size_t camera);
 
 /// How often the state `converged` came in time, and how often it was wrong.
-void judge_converged(ExperimentContext& context, const std::string& mode,
-                     const std::vector<TrialRecord>& trials, std::size_t contestant);
+void judge_converged(ExperimentContext& context, const std::string& mode, const std::vector<TrialRecord>& trials,
+                     std::size_t contestant);
 
 }  // namespace bodyschema

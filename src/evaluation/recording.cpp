@@ -20,8 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLastPoses = 30;
-constexpr const char* kOfficialRobot =
-    "icub-models/iCub_manual/robots/iCubGazeboV2_5_visuomanip/model.urdf";
+constexpr const char* kOfficialRobot = "icub-models/iCub_manual/robots/iCubGazeboV2_5_visuomanip/model.urdf";
 /// The official iCub is a newer robot: its hand sits this much further out than the recording's.
 constexpr double kOfficialHandFurther_m = 0.00998;
 
@@ -121,8 +120,7 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
       seen.push_back({c, picture.utime, picture.joints.q, picture.corrections});
       if (const TruthInstant* instant = truth.at(picture.utime)) {
         online.emplace_back(instant->begin,
-                            hand_error(last.X_CP[c], *instant, c, pipeline.rig().cameras[c].intrinsics)
-                                .fingertip_px);
+                            hand_error(last.X_CP[c], *instant, c, pipeline.rig().cameras[c].intrinsics).fingertip_px);
       }
     }
     last_view = std::move(observation);
@@ -150,10 +148,10 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
     if (instant == nullptr) continue;
     const auto& intrinsics = pipeline.rig().cameras[frame.camera].intrinsics;
     const Exposure at(frame.q, frame.corrections ? &*frame.corrections : nullptr);
-    const auto before = hand_error(pipeline.estimator().hand_pose(at, frame.camera, false), *instant,
-                                   frame.camera, intrinsics);
-    const auto after = hand_error(pipeline.estimator().hand_pose(at, frame.camera, true), *instant,
-                                  frame.camera, intrinsics);
+    const auto before =
+        hand_error(pipeline.estimator().hand_pose(at, frame.camera, false), *instant, frame.camera, intrinsics);
+    const auto after =
+        hand_error(pipeline.estimator().hand_pose(at, frame.camera, true), *instant, frame.camera, intrinsics);
     before_px.push_back(before.fingertip_px);
     before_mm.push_back(1e3 * before.fingertip_m);
     before_deg.push_back(degrees(before.rotation_rad));
@@ -168,8 +166,7 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
   }
   result.uncorrected = {Statistics::of(before_px).mean, Statistics::of(before_mm).mean,
                         Statistics::of(before_deg).mean};
-  result.final = {Statistics::of(after_px).mean, Statistics::of(after_mm).mean,
-                  Statistics::of(after_deg).mean};
+  result.final = {Statistics::of(after_px).mean, Statistics::of(after_mm).mean, Statistics::of(after_deg).mean};
   result.online_px = Statistics::of(online_px).mean;
   result.offset_deg = last.offset_rad * (180.0 / kPi);
   return result;
@@ -178,12 +175,10 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
 }  // namespace
 
 void run_recording(ExperimentContext& context) {
-  const fs::path data =
-      context.options.data.empty() ? fs::path() : fs::weakly_canonical(context.options.data);
+  const fs::path data = context.options.data.empty() ? fs::path() : fs::weakly_canonical(context.options.data);
   const fs::path recording = data / "eyehand-sim";
   if (data.empty() || !fs::exists(recording / "truth.json")) {
-    context.table += "\nrecording: skipped, no eyehand-sim/truth.json in '" +
-                     data.string() + "' (BODYSCHEMA_DATA)\n";
+    context.table += "\nrecording: skipped, no eyehand-sim/truth.json in '" + data.string() + "' (BODYSCHEMA_DATA)\n";
     return;
   }
   setenv("BODYSCHEMA_DATA", data.c_str(), 1);  // the robot's files refer to it
@@ -192,8 +187,7 @@ void run_recording(ExperimentContext& context) {
   const Configuration import = Configuration::load(context.recorded / "icub_unity/import_official_hand.yaml");
   const ScratchFile log("recording.log");
   const BusOptions bus = BusOptions::from(import.section("bus"));
-  import_yarp(recording / "yarp", YarpImportOptions::from(import.section("yarp_import")), bus.channels(),
-              log.path());
+  import_yarp(recording / "yarp", YarpImportOptions::from(import.section("yarp_import")), bus.channels(), log.path());
   const ScratchFile official_hand("official_hand.urdf");
   write_grafted_urdf({.arm_urdf = recording / "robot/icub_unity.urdf",
                       .hand_urdf = data / kOfficialRobot,
@@ -204,8 +198,8 @@ void run_recording(ExperimentContext& context) {
                       .prefix = "official_"},
                      official_hand.path());
 
-  context.table += fmt::format("\n{:<38} {:>16} {:>16} {:>9} {:>12}\n", "recording, fingertips",
-                               "uncorrected px/mm", "final px/mm", "hand deg", "last 30 px");
+  context.table += fmt::format("\n{:<38} {:>16} {:>16} {:>9} {:>12}\n", "recording, fingertips", "uncorrected px/mm",
+                               "final px/mm", "hand deg", "last 30 px");
   struct Case {
     const char* key;
     const char* file;
@@ -214,12 +208,14 @@ void run_recording(ExperimentContext& context) {
     std::vector<std::string> modes = {"best", "paper"};
     bool diagnosed = false;  ///< extended by what the diagnosis finds in the same log
   };
-  for (const Case& robot : {Case{"exact", "icub_unity/estimator.yaml", "exact robot"},
-                            Case{"icub_hand", "icub_unity/estimator_official_hand.yaml", "official hand",
-                                 {"robot.urdf=" + official_hand.path().string()}},
-                            Case{"nominal", "icub_unity/estimator_v1.yaml", "nominal robot (icub_v1)"},
-                            Case{"nominal_diagnosed", "icub_unity/estimator_v1.yaml", "nominal robot, diagnosed", {}, {"best"},
-                                 true}}) {
+  for (const Case& robot :
+       {Case{"exact", "icub_unity/estimator.yaml", "exact robot"},
+        Case{"icub_hand",
+             "icub_unity/estimator_official_hand.yaml",
+             "official hand",
+             {"robot.urdf=" + official_hand.path().string()}},
+        Case{"nominal", "icub_unity/estimator_v1.yaml", "nominal robot (icub_v1)"},
+        Case{"nominal_diagnosed", "icub_unity/estimator_v1.yaml", "nominal robot, diagnosed", {}, {"best"}, true}}) {
     std::vector<std::string> choices = about_estimating(context.options.overrides);
     if (robot.diagnosed) {
       const auto model = diagnose_into(Configuration::load(context.recorded / robot.file, choices), log.path(),
@@ -259,7 +255,8 @@ void run_recording(ExperimentContext& context) {
                                    result.uncorrected.mm, final_px, final_mm, final_deg, online_px);
     }
   }
-  context.table += "published, not measured here: the recording's authors, in their own model, are 16.3 px / 17.3 mm off\n";
+  context.table +=
+      "published, not measured here: the recording's authors, in their own model, are 16.3 px / 17.3 mm off\n";
 }
 
 }  // namespace bodyschema

@@ -12,8 +12,8 @@ namespace {
 
 /// The arm moves from where it is until the corrected model sees the hand at `target_C` in the left
 /// eye: least change of the joints, by Newton steps. Encoder readings, radians.
-Eigen::VectorXd correct_reach(Estimator& estimator, const std::vector<Eigen::Index>& joints,
-                              Eigen::VectorXd q, const Eigen::Vector3d& target_C) {
+Eigen::VectorXd correct_reach(Estimator& estimator, const std::vector<Eigen::Index>& joints, Eigen::VectorXd q,
+                              const Eigen::Vector3d& target_C) {
   constexpr double kStep = 1e-5;
   Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, static_cast<Eigen::Index>(joints.size()));
   for (int iteration = 0; iteration < 15; ++iteration) {
@@ -21,8 +21,7 @@ Eigen::VectorXd correct_reach(Estimator& estimator, const std::vector<Eigen::Ind
     for (std::size_t k = 0; k < joints.size(); ++k) {
       Eigen::VectorXd moved = q;
       moved(joints[k]) += kStep;
-      J.col(static_cast<Eigen::Index>(k)) =
-          (estimator.hand_pose(moved, 0, true).translation() - hand) / kStep;
+      J.col(static_cast<Eigen::Index>(k)) = (estimator.hand_pose(moved, 0, true).translation() - hand) / kStep;
     }
     const Eigen::VectorXd step = J.completeOrthogonalDecomposition().solve(target_C - hand);
     for (std::size_t k = 0; k < joints.size(); ++k) q(joints[k]) += step(static_cast<Eigen::Index>(k));
@@ -51,8 +50,8 @@ void run_reach(ExperimentContext& context) {
     trial.contestants[contestant].reach_miss_mm =
         1e3 * (estimator.hand_pose(q_true, 0, false).translation() - target_C).norm();
   };
-  const auto records = run_trials(context, "reach to a target", context.options.trials,
-                                  [&](std::uint64_t) { return reach; }, contestants);
+  const auto records = run_trials(
+      context, "reach to a target", context.options.trials, [&](std::uint64_t) { return reach; }, contestants);
   std::vector<double> nominal_mm;
   for (const auto& record : records) {
     nominal_mm.push_back(record.contestants[0].frames.back().nominal_mm[kLeft]);

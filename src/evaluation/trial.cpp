@@ -19,16 +19,15 @@ FrameRecord record_of(const Estimate& estimate, const simulator::SimulatedFrame&
     const Pose& truth = frame.truth[c].X_CP;
     record.position_mm[c] = 1e3 * (estimate.X_CP[c].translation() - truth.translation()).norm();
     record.rotation_deg[c] = degrees(rotation_distance(truth.linear(), estimate.X_CP[c].linear()));
-    record.nominal_mm[c] =
-        1e3 * (estimate.X_CP_nominal[c].translation() - truth.translation()).norm();
+    record.nominal_mm[c] = 1e3 * (estimate.X_CP_nominal[c].translation() - truth.translation()).norm();
   }
   return record;
 }
 
 }  // namespace
 
-TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>& contestants,
-                      std::uint64_t seed, const std::function<void(double)>& progress) {
+TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>& contestants, std::uint64_t seed,
+                      const std::function<void(double)>& progress) {
   Pipeline pipeline(setting.estimator);
   std::vector<Estimator> estimators;
   for (const auto& contestant : contestants) {
@@ -39,13 +38,11 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
   }
   simulator::SimulationPlan plan = setting.plan;
   plan.seed = seed;
-  simulator::Simulator simulator(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(),
-                                 setting.simulator, plan);
+  simulator::Simulator simulator(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(), setting.simulator, plan);
   TrialRecord trial;
   trial.seed = seed;
   trial.contestants.resize(contestants.size());
-  trial.true_offset_deg = Eigen::VectorXd::Zero(
-      static_cast<Eigen::Index>(pipeline.setup().estimated_joints.size()));
+  trial.true_offset_deg = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(pipeline.setup().estimated_joints.size()));
   for (std::size_t k = 0; k < pipeline.setup().estimated_joints.size(); ++k) {
     const auto found = plan.offsets_deg.find(pipeline.setup().estimated_joints[k]);
     if (found != plan.offsets_deg.end()) {

@@ -36,18 +36,14 @@ std::vector<Contestant> stereo_contestants(const ExperimentContext& context) {
 }
 
 TrialSetting standard_setting(const ExperimentContext& context) {
-  TrialSetting setting{context.simulated,
-                       simulator::SimulatorSettings::from(context.simulated.section("simulator")),
-                       {},
-                       {}};
+  TrialSetting setting{
+      context.simulated, simulator::SimulatorSettings::from(context.simulated.section("simulator")), {}, {}};
   setting.simulator.background_frames = kBackgroundFrames;
   setting.simulator.entry_frames = 0;
   setting.simulator.clutter = false;
   setting.plan.frames = 100;
-  setting.plan.offsets_deg = {{"r_shoulder_pitch", 5}, {"r_shoulder_roll", 4},
-                              {"r_shoulder_yaw", 3},   {"r_elbow", -2},
-                              {"r_wrist_prosup", 3},   {"r_wrist_pitch", -7},
-                              {"r_wrist_yaw", 3}};
+  setting.plan.offsets_deg = {{"r_shoulder_pitch", 5}, {"r_shoulder_roll", 4}, {"r_shoulder_yaw", 3}, {"r_elbow", -2},
+                              {"r_wrist_prosup", 3},   {"r_wrist_pitch", -7},  {"r_wrist_yaw", 3}};
   return setting;
 }
 
@@ -69,8 +65,7 @@ TrialSetting mismatch_setting(const ExperimentContext& context, std::uint64_t se
   return setting;
 }
 
-std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std::string& label,
-                                    int trials,
+std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std::string& label, int trials,
                                     const std::function<TrialSetting(std::uint64_t)>& setting_of,
                                     const std::vector<Contestant>& contestants) {
   std::vector<TrialRecord> records(static_cast<std::size_t>(trials));
@@ -94,8 +89,8 @@ std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std:
           bar.advance(now - done);
           done = now;
         };
-        records[index] = run_trial(settings[index], contestants,
-                                   context.options.seed + static_cast<std::uint64_t>(t), progress);
+        records[index] =
+            run_trial(settings[index], contestants, context.options.seed + static_cast<std::uint64_t>(t), progress);
         progress(1.0);
       } catch (...) {
         const std::lock_guard lock(mutex);
@@ -104,9 +99,8 @@ std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std:
       }
     }
   };
-  int count = context.options.threads > 0
-                  ? context.options.threads
-                  : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  int count = context.options.threads > 0 ? context.options.threads
+                                          : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   count = std::min(count, trials);
   std::vector<std::thread> threads;
   for (int i = 1; i < count; ++i) threads.emplace_back(work);

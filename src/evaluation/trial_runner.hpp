@@ -24,8 +24,7 @@ TrialSetting mismatch_setting(const ExperimentContext& context, std::uint64_t se
 
 /// Runs `trials` seeded trials on all cores with a progress bar; the order of the results is that
 /// of the seeds. `setting_of` may differ from trial to trial.
-std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std::string& label,
-                                    int trials,
+std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std::string& label, int trials,
                                     const std::function<TrialSetting(std::uint64_t)>& setting_of,
                                     const std::vector<Contestant>& contestants);
 

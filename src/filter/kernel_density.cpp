@@ -13,12 +13,11 @@ constexpr double kCutoffSd = 7.0;
 
 double kernel(double squared_distance_deg2, double sd_deg, Eigen::Index dimension) {
   const double determinant = std::pow(sd_deg, 2.0 * static_cast<double>(dimension));
-  return std::exp(-0.5 * squared_distance_deg2 / (sd_deg * sd_deg)) /
-         std::sqrt(2.0 * kPi * determinant);
+  return std::exp(-0.5 * squared_distance_deg2 / (sd_deg * sd_deg)) / std::sqrt(2.0 * kPi * determinant);
 }
 
-void kernel_density(const Eigen::MatrixXd& states_rad, const Eigen::VectorXd& likelihood,
-                    double sd_deg, Eigen::VectorXd& kde) {
+void kernel_density(const Eigen::MatrixXd& states_rad, const Eigen::VectorXd& likelihood, double sd_deg,
+                    Eigen::VectorXd& kde) {
   const Eigen::Index n = states_rad.cols();
   const Eigen::Index dimension = states_rad.rows();
   const double peak = kernel(0.0, sd_deg, dimension);
@@ -41,8 +40,7 @@ void kernel_density(const Eigen::MatrixXd& states_rad, const Eigen::VectorXd& li
   kde /= static_cast<double>(n);
 }
 
-Eigen::Index densest_particle(const Eigen::VectorXd& likelihood, const Eigen::VectorXd& kde,
-                              double alpha) {
+Eigen::Index densest_particle(const Eigen::VectorXd& likelihood, const Eigen::VectorXd& kde, double alpha) {
   Eigen::Index best = 0;
   double best_weight = -1.0;
   for (Eigen::Index i = 0; i < likelihood.size(); ++i) {

@@ -58,19 +58,16 @@ Eigen::MatrixXd ParticleFilter::covariance() const {
 }
 
 double ParticleFilter::effective_sample_size() const {
-  return bodyschema::effective_sample_size(
-      {weights_.data(), static_cast<std::size_t>(weights_.size())});
+  return bodyschema::effective_sample_size({weights_.data(), static_cast<std::size_t>(weights_.size())});
 }
 
 void ParticleFilter::resample_and_spread() {
   const double u = std::uniform_real_distribution<double>(0.0, 1.0)(random_);
-  systematic_resampling({weights_.data(), static_cast<std::size_t>(weights_.size())}, u,
-                        ancestors_);
+  systematic_resampling({weights_.data(), static_cast<std::size_t>(weights_.size())}, u, ancestors_);
   for (std::size_t i = 0; i < ancestors_.size(); ++i) {
     const auto ancestor = static_cast<Eigen::Index>(ancestors_[i]);
     for (Eigen::Index k = 0; k < states_.rows(); ++k) {
-      scratch_(k, static_cast<Eigen::Index>(i)) =
-          states_(k, ancestor) + spread_rad_ * normal_(random_);
+      scratch_(k, static_cast<Eigen::Index>(i)) = states_(k, ancestor) + spread_rad_ * normal_(random_);
     }
   }
   states_.swap(scratch_);

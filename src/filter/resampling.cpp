@@ -4,8 +4,7 @@
 
 namespace bodyschema {
 
-void systematic_resampling(std::span<const double> weights, double u,
-                           std::span<std::size_t> ancestors) {
+void systematic_resampling(std::span<const double> weights, double u, std::span<std::size_t> ancestors) {
   const double total = std::accumulate(weights.begin(), weights.end(), 0.0);
   const double step = total / static_cast<double>(ancestors.size());
   double cumulative = weights[0];

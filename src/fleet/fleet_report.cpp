@@ -33,8 +33,7 @@ std::string first_line_of(const fs::path& file) {
 
 Json read_json(const fs::path& file) {
   std::error_code error;
-  if (fs::file_size(file, error) > kMostFileBytes || error)
-    throw FileError(file.string() + ": missing or too large");
+  if (fs::file_size(file, error) > kMostFileBytes || error) throw FileError(file.string() + ": missing or too large");
   std::ifstream stream(file);
   try {
     return Json::parse(stream);
@@ -75,12 +74,10 @@ void read_report(const fs::path& file, FleetLog& log) {
   log.verdict = text(json, "verdict");
   log.sentence = text(json, "sentence");
   if (json.contains("causes") && json["causes"].is_array()) {
-    for (const auto& cause : json["causes"])
-      log.causes.push_back(cause_of(cause));
+    for (const auto& cause : json["causes"]) log.causes.push_back(cause_of(cause));
   }
   if (json.contains("offsets_deg") && json["offsets_deg"].contains("after")) {
-    for (const auto& [joint, value] : json["offsets_deg"]["after"].items())
-      log.offsets_deg[joint] = number(value);
+    for (const auto& [joint, value] : json["offsets_deg"]["after"].items()) log.offsets_deg[joint] = number(value);
   }
 }
 
@@ -123,8 +120,7 @@ double slope(const std::vector<double>& x, const std::vector<double>& y) {
 void find_trends(FleetRobot& robot) {
   if (robot.logs.empty()) return;
   std::map<std::string, FleetTrend> causes, offsets;
-  const auto add = [](FleetTrend& trend, const std::string& name, const std::string& unit,
-                      double week, double value) {
+  const auto add = [](FleetTrend& trend, const std::string& name, const std::string& unit, double week, double value) {
     if (!std::isfinite(value)) return;
     trend.name = name;
     trend.unit = unit;
@@ -140,8 +136,7 @@ void find_trends(FleetRobot& robot) {
                                    : cause.name + " (" + cause.parameter + ")";
       add(causes[name + cause.unit], name, cause.unit, week, cause.estimate);
     }
-    for (const auto& [joint, value] : log.offsets_deg)
-      add(offsets[joint], joint, "deg", week, value);
+    for (const auto& [joint, value] : log.offsets_deg) add(offsets[joint], joint, "deg", week, value);
   }
   const auto gather = [](std::map<std::string, FleetTrend>& from, std::vector<FleetTrend>& to) {
     for (auto& [key, trend] : from) {
@@ -169,18 +164,16 @@ std::string causes_text(const FleetLog& log) {
   std::vector<std::string> parts;
   for (const auto& cause : log.causes) {
     parts.push_back(std::isfinite(cause.estimate)
-                        ? fmt::format("{}: {:.3g} {} ({:.3g} to {:.3g})", cause.name,
-                                      cause.estimate, cause.unit, cause.ci95[0], cause.ci95[1])
+                        ? fmt::format("{}: {:.3g} {} ({:.3g} to {:.3g})", cause.name, cause.estimate, cause.unit,
+                                      cause.ci95[0], cause.ci95[1])
                         : cause.name);
   }
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 
-Chart chart_of(const std::string& title, const std::string& y_label,
-               const std::vector<const FleetTrend*>& trends) {
+Chart chart_of(const std::string& title, const std::string& y_label, const std::vector<const FleetTrend*>& trends) {
   Chart chart{title, "weeks since the first log", y_label, Chart::Kind::kLine, {}, {}, false};
-  for (const auto* trend : trends)
-    chart.series.push_back({trend->name, trend->week, trend->value});
+  for (const auto* trend : trends) chart.series.push_back({trend->name, trend->week, trend->value});
   return chart;
 }
 
@@ -189,8 +182,8 @@ void add_robot(Report& report, const FleetRobot& robot) {
   report.verdict(robot.sentence());
   std::vector<std::vector<std::string>> rows;
   for (const auto& log : robot.logs) {
-    rows.push_back({date_text(log.begin), log.name, fmt::format("{:.0f}", log.duration_s),
-                    log.verdict, log.causes.empty() ? log.sentence : causes_text(log)});
+    rows.push_back({date_text(log.begin), log.name, fmt::format("{:.0f}", log.duration_s), log.verdict,
+                    log.causes.empty() ? log.sentence : causes_text(log)});
   }
   report.table({"begin (UTC)", "log", "s", "verdict", "causes, with 95 % intervals"}, rows);
   // One chart for each unit: causes in degrees and in milliseconds share no axis.
@@ -206,16 +199,11 @@ void add_robot(Report& report, const FleetRobot& robot) {
   for (const auto& trend : robot.offsets) {
     if (trend.value.size() > 1) offsets.push_back(&trend);
   }
-  if (!offsets.empty())
-    report.chart(chart_of(robot.name + ": joint offsets over time", "deg", offsets));
+  if (!offsets.empty()) report.chart(chart_of(robot.name + ": joint offsets over time", "deg", offsets));
 }
 
 Json json_of(const FleetTrend& t) {
-  return {{"name", t.name},
-          {"unit", t.unit},
-          {"week", t.week},
-          {"value", t.value},
-          {"per_week", t.per_week}};
+  return {{"name", t.name}, {"unit", t.unit}, {"week", t.week}, {"value", t.value}, {"per_week", t.per_week}};
 }
 
 Json json_of(const FleetRobot& robot) {
@@ -241,10 +229,8 @@ Json json_of(const FleetRobot& robot) {
                          {"sentence", log.sentence},
                          {"causes", causes}});
   }
-  for (const auto& trend : robot.causes)
-    j["causes"].push_back(json_of(trend));
-  for (const auto& trend : robot.offsets)
-    j["offsets"].push_back(json_of(trend));
+  for (const auto& trend : robot.causes) j["causes"].push_back(json_of(trend));
+  for (const auto& trend : robot.offsets) j["offsets"].push_back(json_of(trend));
   return j;
 }
 
@@ -261,34 +247,32 @@ std::vector<fs::path> folders_in(const fs::path& folder) {
 }  // namespace
 
 std::string FleetRobot::sentence() const {
-  const auto diagnosed = static_cast<std::size_t>(std::count_if(
-      logs.begin(), logs.end(), [](const auto& log) { return log.verdict != kNotDiagnosed; }));
+  const auto diagnosed = static_cast<std::size_t>(
+      std::count_if(logs.begin(), logs.end(), [](const auto& log) { return log.verdict != kNotDiagnosed; }));
   std::string out = fmt::format("{} of {} logs diagnosed", diagnosed, logs.size());
   std::vector<std::string> parts;
   for (const auto& trend : causes) {
-    std::string part = fmt::format("{} in {} log{}", trend.name, trend.value.size(),
-                                   trend.value.size() == 1 ? "" : "s");
+    std::string part =
+        fmt::format("{} in {} log{}", trend.name, trend.value.size(), trend.value.size() == 1 ? "" : "s");
     if (trend.value.size() > 1 && trend.week.back() > trend.week.front()) {
-      part += fmt::format(" ({:.3g} to {:.3g} {}, {:+.2g} a week)", trend.value.front(),
-                          trend.value.back(), trend.unit, trend.per_week);
+      part += fmt::format(" ({:.3g} to {:.3g} {}, {:+.2g} a week)", trend.value.front(), trend.value.back(), trend.unit,
+                          trend.per_week);
     } else {
       part += fmt::format(" ({:.3g} {})", trend.value.back(), trend.unit);
     }
     parts.push_back(part);
   }
   if (diagnosed > 0)
-    out += parts.empty() ? "; nothing wrong beside the offsets"
-                         : "; " + fmt::format("{}", fmt::join(parts, ", "));
+    out += parts.empty() ? "; nothing wrong beside the offsets" : "; " + fmt::format("{}", fmt::join(parts, ", "));
   const auto moved = [](const FleetTrend& t) { return std::abs(t.value.back() - t.value.front()); };
-  const auto most =
-      std::max_element(offsets.begin(), offsets.end(),
-                       [&](const auto& a, const auto& b) { return moved(a) < moved(b); });
+  const auto most = std::max_element(offsets.begin(), offsets.end(),
+                                     [&](const auto& a, const auto& b) { return moved(a) < moved(b); });
   if (most != offsets.end() && moved(*most) > kMoved_deg) {
-    out += fmt::format("; the offset of {} moved most, {:.2f} to {:.2f} deg", most->name,
-                       most->value.front(), most->value.back());
+    out += fmt::format("; the offset of {} moved most, {:.2f} to {:.2f} deg", most->name, most->value.front(),
+                       most->value.back());
   }
-  const bool unexplained = std::any_of(
-      logs.begin(), logs.end(), [](const auto& log) { return log.verdict == "unexplained"; });
+  const bool unexplained =
+      std::any_of(logs.begin(), logs.end(), [](const auto& log) { return log.verdict == "unexplained"; });
   if (unexplained) out += "; some logs hold structure that no known cause explains";
   return out;
 }
@@ -298,8 +282,7 @@ std::vector<FleetRobot> gather_fleet(const fs::path& results) {
   for (const auto& folder : folders_in(results)) {
     FleetRobot robot;
     robot.name = folder.filename().string();
-    for (const auto& log : folders_in(folder))
-      robot.logs.push_back(read_log(log));
+    for (const auto& log : folders_in(folder)) robot.logs.push_back(read_log(log));
     if (robot.logs.empty()) continue;
     std::stable_sort(robot.logs.begin(), robot.logs.end(),
                      [](const auto& a, const auto& b) { return a.begin < b.begin; });
@@ -307,8 +290,7 @@ std::vector<FleetRobot> gather_fleet(const fs::path& results) {
     robots.push_back(std::move(robot));
   }
   if (robots.empty()) {
-    throw FileError(results.string() +
-                    ": no results, expected <robot>/<log>/info.json and outcome.txt");
+    throw FileError(results.string() + ": no results, expected <robot>/<log>/info.json and outcome.txt");
   }
   return robots;
 }
@@ -319,14 +301,13 @@ std::string write_fleet_report(const std::vector<FleetRobot>& robots, const fs::
   Json json = {{"robots", Json::array()}};
   std::string lines;
   for (const auto& robot : robots) {
-    rows.push_back({robot.name, date_text(robot.logs.front().begin),
-                    date_text(robot.logs.back().begin), robot.sentence()});
+    rows.push_back(
+        {robot.name, date_text(robot.logs.front().begin), date_text(robot.logs.back().begin), robot.sentence()});
     json["robots"].push_back(json_of(robot));
     lines += robot.name + ": " + robot.sentence() + '\n';
   }
   report.table({"robot", "first log", "last log", "what is wrong with it"}, rows);
-  for (const auto& robot : robots)
-    add_robot(report, robot);
+  for (const auto& robot : robots) add_robot(report, robot);
   report.write(out / "report.html");
   std::ofstream file(out / "fleet.json");
   file << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';

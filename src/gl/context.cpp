@@ -56,12 +56,11 @@ class EglContext final : public Context {
     }
     if (eglBindAPI(EGL_OPENGL_API) != EGL_TRUE) throw ContextError("EGL has no desktop OpenGL");
     const char* extensions = eglQueryString(display_, EGL_EXTENSIONS);
-    const EGLint config_attributes[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE,
-                                        EGL_OPENGL_BIT, EGL_NONE};
+    const EGLint config_attributes[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
+                                        EGL_NONE};
     EGLConfig config = nullptr;
     EGLint configs = 0;
-    const bool found =
-        eglChooseConfig(display_, config_attributes, &config, 1, &configs) == EGL_TRUE && configs > 0;
+    const bool found = eglChooseConfig(display_, config_attributes, &config, 1, &configs) == EGL_TRUE && configs > 0;
     if (!found) {
       if (!has_word(extensions, "EGL_KHR_no_config_context")) {
         throw ContextError("EGL offers no configuration for OpenGL");
@@ -100,12 +99,9 @@ class EglContext final : public Context {
  private:
   bool make_current() noexcept override {
     // The bound API is a property of the thread.
-    return eglBindAPI(EGL_OPENGL_API) == EGL_TRUE &&
-           eglMakeCurrent(display_, surface_, surface_, context_) == EGL_TRUE;
+    return eglBindAPI(EGL_OPENGL_API) == EGL_TRUE && eglMakeCurrent(display_, surface_, surface_, context_) == EGL_TRUE;
   }
-  void release() noexcept override {
-    eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
-  }
+  void release() noexcept override { eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT); }
   void destroy() noexcept {
     release();
     if (surface_ != EGL_NO_SURFACE) eglDestroySurface(display_, surface_);
@@ -128,30 +124,25 @@ std::unique_ptr<Context> create_egl_device() {
   const auto query_devices = egl_extension<PFNEGLQUERYDEVICESEXTPROC>("eglQueryDevicesEXT");
   const auto query_string = egl_extension<PFNEGLQUERYDEVICESTRINGEXTPROC>("eglQueryDeviceStringEXT");
   const auto get_display = egl_extension<PFNEGLGETPLATFORMDISPLAYEXTPROC>("eglGetPlatformDisplayEXT");
-  const bool enumerates = has_word(client, "EGL_EXT_device_base") ||
-                          has_word(client, "EGL_EXT_device_enumeration");
+  const bool enumerates = has_word(client, "EGL_EXT_device_base") || has_word(client, "EGL_EXT_device_enumeration");
   if (!enumerates || query_devices == nullptr || get_display == nullptr) {
     throw ContextError("this EGL does not list devices");
   }
   std::array<EGLDeviceEXT, 64> devices{};
   EGLint count = 0;
-  if (query_devices(static_cast<EGLint>(devices.size()), devices.data(), &count) != EGL_TRUE ||
-      count == 0) {
+  if (query_devices(static_cast<EGLint>(devices.size()), devices.data(), &count) != EGL_TRUE || count == 0) {
     throw ContextError("EGL finds no device");
   }
   std::string problems;
   for (const bool software : {false, true}) {
     for (EGLint i = 0; i < count; ++i) {
       const EGLDeviceEXT device = devices[static_cast<std::size_t>(i)];
-      const char* extensions =
-          query_string != nullptr ? query_string(device, EGL_EXTENSIONS) : nullptr;
+      const char* extensions = query_string != nullptr ? query_string(device, EGL_EXTENSIONS) : nullptr;
       if (has_word(extensions, "EGL_MESA_device_software") != software) continue;
       try {
-        return std::make_unique<EglContext>(get_display(EGL_PLATFORM_DEVICE_EXT, device, nullptr),
-                                            "EGL device");
+        return std::make_unique<EglContext>(get_display(EGL_PLATFORM_DEVICE_EXT, device, nullptr), "EGL device");
       } catch (const ContextError& error) {
-        problems += (problems.empty() ? "" : ", ") + std::string("device ") + std::to_string(i) +
-                    ": " + error.what();
+        problems += (problems.empty() ? "" : ", ") + std::string("device ") + std::to_string(i) + ": " + error.what();
       }
     }
   }
@@ -164,8 +155,8 @@ std::unique_ptr<Context> create_egl_surfaceless() {
   if (!has_word(client, "EGL_MESA_platform_surfaceless") || get_display == nullptr) {
     throw ContextError("this EGL has no surfaceless platform");
   }
-  return std::make_unique<EglContext>(
-      get_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr), "EGL surfaceless");
+  return std::make_unique<EglContext>(get_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr),
+                                      "EGL surfaceless");
 }
 
 std::unique_ptr<Context> create_egl_default() {
@@ -180,8 +171,7 @@ struct OsmesaLibrary {
   using OSMesaContext = struct osmesa_context*;
   OSMesaContext (*create)(const int* attributes, OSMesaContext shared) = nullptr;
   void (*destroy)(OSMesaContext) = nullptr;
-  GLboolean (*make_current)(OSMesaContext, void* buffer, GLenum type, GLsizei width,
-                            GLsizei height) = nullptr;
+  GLboolean (*make_current)(OSMesaContext, void* buffer, GLenum type, GLsizei width, GLsizei height) = nullptr;
   GetFunction get_function = nullptr;
 
   // Stays loaded: drivers do not like to be unloaded.
@@ -217,8 +207,8 @@ class OsmesaContext final : public Context {
   OsmesaContext() : library_(OsmesaLibrary::get()) {
     constexpr int kFormat = 0x22, kProfile = 0x33, kCoreProfile = 0x34, kMajor = 0x36, kMinor = 0x37;
     for (const auto version : kVersions) {
-      const int attributes[] = {kFormat, GL_RGBA, kProfile, kCoreProfile, kMajor, version.major,
-                                kMinor, version.minor, 0};
+      const int attributes[] = {kFormat, GL_RGBA,       kProfile, kCoreProfile, kMajor, version.major,
+                                kMinor,  version.minor, 0};
       context_ = library_.create(attributes, nullptr);
       if (context_ != nullptr) break;
     }
@@ -249,7 +239,9 @@ class OsmesaContext final : public Context {
   std::array<std::uint8_t, 4> window_{};
 };
 
-std::unique_ptr<Context> create_osmesa() { return std::make_unique<OsmesaContext>(); }
+std::unique_ptr<Context> create_osmesa() {
+  return std::make_unique<OsmesaContext>();
+}
 
 }  // namespace
 
@@ -258,8 +250,8 @@ Context::~Context() = default;
 
 void Context::load(std::string platform, GetFunction get_function) {
   functions_ = std::make_unique<Functions>();
-#define BODYSCHEMA_GL_LOAD(name, type)                                           \
-  functions_->name = reinterpret_cast<type>(get_function("gl" #name));           \
+#define BODYSCHEMA_GL_LOAD(name, type)                                 \
+  functions_->name = reinterpret_cast<type>(get_function("gl" #name)); \
   if (functions_->name == nullptr) throw ContextError("the driver has no gl" #name);
   BODYSCHEMA_GL_FUNCTIONS(BODYSCHEMA_GL_LOAD)
 #undef BODYSCHEMA_GL_LOAD
@@ -269,8 +261,7 @@ void Context::load(std::string platform, GetFunction get_function) {
   functions_->GetIntegerv(GL_MAJOR_VERSION, &major_);
   functions_->GetIntegerv(GL_MINOR_VERSION, &minor_);
   if (major_ < 4 || (major_ == 4 && minor_ < 3)) {
-    throw ContextError("OpenGL " + std::to_string(major_) + "." + std::to_string(minor_) +
-                       " is less than 4.3");
+    throw ContextError("OpenGL " + std::to_string(major_) + "." + std::to_string(minor_) + " is less than 4.3");
   }
   for (const char* name : {"llvmpipe", "softpipe", "swrast", "SWR", "Software"}) {
     if (renderer_.find(name) != std::string::npos) is_software_ = true;
@@ -279,8 +270,7 @@ void Context::load(std::string platform, GetFunction get_function) {
 
 std::string Context::description() const {
   const auto name = renderer_.substr(0, renderer_.find(" ("));
-  return name + " (" + platform_ + ", OpenGL " + std::to_string(major_) + "." +
-         std::to_string(minor_) + ")";
+  return name + " (" + platform_ + ", OpenGL " + std::to_string(major_) + "." + std::to_string(minor_) + ")";
 }
 
 std::unique_ptr<Context> Context::create(std::string_view platform) {
@@ -307,8 +297,7 @@ std::unique_ptr<Context> Context::create(std::string_view platform) {
       problems += (problems.empty() ? "" : "; ") + std::string(way.name) + ": " + error.what();
     }
   }
-  throw ContextError("no headless OpenGL context of version 4.3 or later on this machine (" +
-                     problems + ")");
+  throw ContextError("no headless OpenGL context of version 4.3 or later on this machine (" + problems + ")");
 }
 
 }  // namespace bodyschema::gl

@@ -59,8 +59,12 @@ Program::~Program() {
 
 Program::Program(Program&& other) noexcept : gl_(other.gl_), id_(std::exchange(other.id_, 0)) {}
 
-void Program::use() const { gl_->UseProgram(id_); }
+void Program::use() const {
+  gl_->UseProgram(id_);
+}
 
-GLint Program::uniform(const char* name) const { return gl_->GetUniformLocation(id_, name); }
+GLint Program::uniform(const char* name) const {
+  return gl_->GetUniformLocation(id_, name);
+}
 
 }  // namespace bodyschema::gl

@@ -42,8 +42,7 @@ class Stamps {
     }
     result.longest_gap_s = seconds(*std::max_element(steps.begin(), steps.end()));
     auto sorted = steps;
-    std::nth_element(sorted.begin(),
-                     sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
     const double usual = static_cast<double>(sorted[sorted.size() / 2]);
     for (const Microseconds step : steps) {
       result.gaps += usual > 0.0 && static_cast<double>(step) > kGapPeriods * usual ? 1 : 0;
@@ -68,12 +67,10 @@ class JointWatcher {
     motion.highest_rad = std::max(motion.highest_rad, q);
     if (!recent_.empty() && utime <= recent_.back().first) return;
     recent_.emplace_back(utime, q);
-    while (recent_.size() > 1 && recent_[1].first <= utime - kSpeedWindow)
-      recent_.pop_front();
+    while (recent_.size() > 1 && recent_[1].first <= utime - kSpeedWindow) recent_.pop_front();
     const double span_s = seconds(utime - recent_.front().first);
     if (span_s >= 0.5 * seconds(kSpeedWindow)) {
-      motion.fastest_rad_s =
-          std::max(motion.fastest_rad_s, std::abs(q - recent_.front().second) / span_s);
+      motion.fastest_rad_s = std::max(motion.fastest_rad_s, std::abs(q - recent_.front().second) / span_s);
     }
     // Turning points at least kTurn_rad apart, so that encoder noise is none.
     if (direction_ >= 0 && q < extreme_ - kTurn_rad) {
@@ -98,24 +95,17 @@ class JointWatcher {
 
 const char* encoding_name(std::int32_t format) {
   switch (format) {
-    case bot_core::image_t::PIXEL_FORMAT_GRAY:
-      return "gray";
-    case bot_core::image_t::PIXEL_FORMAT_RGB:
-      return "RGB";
-    case bot_core::image_t::PIXEL_FORMAT_BGR:
-      return "BGR";
-    case bot_core::image_t::PIXEL_FORMAT_MJPEG:
-      return "JPEG";
-    default:
-      return "unknown";
+    case bot_core::image_t::PIXEL_FORMAT_GRAY: return "gray";
+    case bot_core::image_t::PIXEL_FORMAT_RGB: return "RGB";
+    case bot_core::image_t::PIXEL_FORMAT_BGR: return "BGR";
+    case bot_core::image_t::PIXEL_FORMAT_MJPEG: return "JPEG";
+    default: return "unknown";
   }
 }
 
 class Summariser {
  public:
-  explicit Summariser(const std::filesystem::path& log) : reader_(log) {
-    summary_.file = log.string();
-  }
+  explicit Summariser(const std::filesystem::path& log) : reader_(log) { summary_.file = log.string(); }
 
   LogSummary run() {
     ProgressBar bar("reading", reader_.size());
@@ -151,22 +141,12 @@ class Summariser {
     }
     bool good = true;
     switch (kind) {
-      case MessageKind::kJointState:
-        good = take_joints(event);
-        break;
-      case MessageKind::kImages:
-        good = take_images(event);
-        break;
-      case MessageKind::kJointOffsets:
-        good = decode(event.data, offsets_).ok();
-        break;
-      case MessageKind::kOffsetsStatus:
-        good = decode(event.data, status_).ok();
-        break;
+      case MessageKind::kJointState: good = take_joints(event); break;
+      case MessageKind::kImages: good = take_images(event); break;
+      case MessageKind::kJointOffsets: good = decode(event.data, offsets_).ok(); break;
+      case MessageKind::kOffsetsStatus: good = decode(event.data, status_).ok(); break;
       // Noise on a channel of ours is unreadable; a channel of others is none of our business.
-      case MessageKind::kUnknown:
-        good = channel.summary.type == name_of(MessageKind::kUnknown);
-        break;
+      case MessageKind::kUnknown: good = channel.summary.type == name_of(MessageKind::kUnknown); break;
     }
     channel.summary.unreadable += good ? 0 : 1;
   }
@@ -181,16 +161,14 @@ class Summariser {
     }
     encoder_stamps_[port->second].add(joint_state_.utime);
     auto& channels = summary_.joint_channels;
-    if (std::find(channels.begin(), channels.end(), event.channel) == channels.end())
-      channels.push_back(event.channel);
+    if (std::find(channels.begin(), channels.end(), event.channel) == channels.end()) channels.push_back(event.channel);
     for (std::size_t i = 0; i < joint_state_.names.size(); ++i) {
       const auto [at, is_new] = joint_index_.try_emplace(joint_state_.names[i], joints_.size());
       if (is_new) {
         joints_.emplace_back();
         joints_.back().motion.name = joint_state_.names[i];
       }
-      joints_[at->second].add(joint_state_.utime,
-                              static_cast<double>(joint_state_.position_rad[i]));
+      joints_[at->second].add(joint_state_.utime, static_cast<double>(joint_state_.position_rad[i]));
     }
     return true;
   }
@@ -198,8 +176,7 @@ class Summariser {
   bool take_images(const LogEvent& event) {
     if (!decode(event.data, images_).ok()) return false;
     for (const auto& image : images_.images) {
-      pictures_[{event.channel, image.type, image.width, image.height, image.pixelformat}].add(
-          image.utime);
+      pictures_[{event.channel, image.type, image.width, image.height, image.pixelformat}].add(image.utime);
     }
     return true;
   }
@@ -217,8 +194,7 @@ class Summariser {
     }
     for (std::size_t e = 0; e < encoder_stamps_.size(); ++e)
       summary_.encoders[e].stamps = encoder_stamps_[e].regularity();
-    for (auto& joint : joints_)
-      summary_.joints.push_back(std::move(joint.motion));
+    for (auto& joint : joints_) summary_.joints.push_back(std::move(joint.motion));
   }
 
   LogReader reader_;
@@ -250,10 +226,8 @@ std::string plural(std::uint64_t n, const std::string& word) {
 
 std::string gaps_text(const Regularity& r) {
   std::string text;
-  if (r.gaps > 0)
-    text += fmt::format("{}, the longest {:.0f} ms", plural(r.gaps, "gap"), 1e3 * r.longest_gap_s);
-  if (r.backwards > 0)
-    text += fmt::format("{}{} out of order", text.empty() ? "" : "; ", r.backwards);
+  if (r.gaps > 0) text += fmt::format("{}, the longest {:.0f} ms", plural(r.gaps, "gap"), 1e3 * r.longest_gap_s);
+  if (r.backwards > 0) text += fmt::format("{}{} out of order", text.empty() ? "" : "; ", r.backwards);
   return text.empty() ? "no gaps" : text;
 }
 
@@ -268,26 +242,23 @@ Json regularity_json(const Regularity& r) {
 }  // namespace
 
 std::string LogSummary::text() const {
-  std::string out =
-      fmt::format("{}: {:.1f} MB, {}, {:.1f} s from {}\n", file, 1e-6 * static_cast<double>(bytes),
-                  plural(messages, "message"), duration_s, date_text(begin));
+  std::string out = fmt::format("{}: {:.1f} MB, {}, {:.1f} s from {}\n", file, 1e-6 * static_cast<double>(bytes),
+                                plural(messages, "message"), duration_s, date_text(begin));
   if (damaged_places > 0)
-    out += fmt::format("damaged at {}; what could be read counts below\n",
-                       plural(damaged_places, "place"));
-  out +=
-      fmt::format("\n{:<28} {:<28} {:>9} {:>8} {:>9}\n", "channel", "type", "messages", "Hz", "MB");
+    out += fmt::format("damaged at {}; what could be read counts below\n", plural(damaged_places, "place"));
+  out += fmt::format("\n{:<28} {:<28} {:>9} {:>8} {:>9}\n", "channel", "type", "messages", "Hz", "MB");
   for (const auto& c : channels) {
-    out += fmt::format("{:<28} {:<28} {:>9} {:>8.1f} {:>9.1f}{}\n", c.channel, c.type,
-                       c.arrivals.count, c.arrivals.rate_hz, 1e-6 * static_cast<double>(c.bytes),
+    out += fmt::format("{:<28} {:<28} {:>9} {:>8.1f} {:>9.1f}{}\n", c.channel, c.type, c.arrivals.count,
+                       c.arrivals.rate_hz, 1e-6 * static_cast<double>(c.bytes),
                        c.unreadable > 0 ? fmt::format("  {} unreadable", c.unreadable) : "");
   }
   if (!pictures.empty())
-    out += fmt::format("\n{:<28} {:<10} {:<18} {:>9} {:>8}  by their stamps\n", "pictures",
-                       "camera", "size", "pictures", "Hz");
+    out += fmt::format("\n{:<28} {:<10} {:<18} {:>9} {:>8}  by their stamps\n", "pictures", "camera", "size",
+                       "pictures", "Hz");
   for (const auto& p : pictures) {
     out += fmt::format("{:<28} {:<10} {:<18} {:>9} {:>8.1f}  {}\n", p.channel, p.camera,
-                       fmt::format("{}x{} {}", p.width, p.height, p.encoding), p.stamps.count,
-                       p.stamps.rate_hz, gaps_text(p.stamps));
+                       fmt::format("{}x{} {}", p.width, p.height, p.encoding), p.stamps.count, p.stamps.rate_hz,
+                       gaps_text(p.stamps));
   }
   if (joints.empty()) return out;
   out += "\n";
@@ -299,21 +270,18 @@ std::string LogSummary::text() const {
   }
   if (encoders.size() > kMostPorts)
     out += fmt::format("encoders: {} other sets of joints\n", encoders.size() - kMostPorts);
-  out += fmt::format("{:<28} {:>10} {:>10} {:>12} {:>6}\n", "joint that moved", "from deg",
-                     "to deg", "deg/s at most", "turns");
+  out += fmt::format("{:<28} {:>10} {:>10} {:>12} {:>6}\n", "joint that moved", "from deg", "to deg", "deg/s at most",
+                     "turns");
   std::size_t still = 0;
   for (const auto& j : joints) {
     if (j.highest_rad - j.lowest_rad < kTurn_rad) {
       ++still;
       continue;
     }
-    out +=
-        fmt::format("{:<28} {:>10.1f} {:>10.1f} {:>12.0f} {:>6}\n", j.name, degrees(j.lowest_rad),
-                    degrees(j.highest_rad), degrees(j.fastest_rad_s), j.turns);
+    out += fmt::format("{:<28} {:>10.1f} {:>10.1f} {:>12.0f} {:>6}\n", j.name, degrees(j.lowest_rad),
+                       degrees(j.highest_rad), degrees(j.fastest_rad_s), j.turns);
   }
-  if (still > 0)
-    out += fmt::format("{} moved by less than {:.1f} deg\n", plural(still, "joint"),
-                       degrees(kTurn_rad));
+  if (still > 0) out += fmt::format("{} moved by less than {:.1f} deg\n", plural(still, "joint"), degrees(kTurn_rad));
   return out;
 }
 

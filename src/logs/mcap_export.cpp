@@ -41,12 +41,10 @@ std::string text_of(const Json& json) {
 Json schema_of(const Json& value) {
   if (value.is_object()) {
     Json properties = Json::object();
-    for (const auto& [key, member] : value.items())
-      properties[key] = schema_of(member);
+    for (const auto& [key, member] : value.items()) properties[key] = schema_of(member);
     return {{"type", "object"}, {"properties", properties}};
   }
-  if (value.is_array())
-    return {{"type", "array"}, {"items", value.empty() ? Json::object() : schema_of(value[0])}};
+  if (value.is_array()) return {{"type", "array"}, {"items", value.empty() ? Json::object() : schema_of(value[0])}};
   if (value.is_string()) return {{"type", "string"}};
   if (value.is_number_integer()) return {{"type", "integer"}};
   return {{"type", {"number", "null"}}};
@@ -77,8 +75,7 @@ Json json_of(const JointStateMessage& m) {
     position[m.names[i]] = degrees(static_cast<double>(m.position_rad[i]));
     velocity[m.names[i]] = degrees(static_cast<double>(m.velocity_rad_s[i]));
   }
-  return {
-      {"timestamp", timestamp(m.utime)}, {"position_deg", position}, {"velocity_deg_s", velocity}};
+  return {{"timestamp", timestamp(m.utime)}, {"position_deg", position}, {"velocity_deg_s", velocity}};
 }
 
 Json json_of(const joint_offsets_t& m) {
@@ -92,8 +89,7 @@ Json json_of(const joint_offsets_t& m) {
     const auto& q = m.hand_pose_in_camera[c].quaternion_wxyz;
     hand[m.camera_name[c]] = {
         {"position_m", {{"x", number(p[0])}, {"y", number(p[1])}, {"z", number(p[2])}}},
-        {"orientation",
-         {{"x", number(q[1])}, {"y", number(q[2])}, {"z", number(q[3])}, {"w", number(q[0])}}}};
+        {"orientation", {{"x", number(q[1])}, {"y", number(q[2])}, {"z", number(q[3])}, {"w", number(q[0])}}}};
   }
   for (std::size_t i = 0; i < m.parameter_name.size(); ++i) {
     others[m.parameter_name[i]] = {{"value", number(m.parameter_value[i])},
@@ -117,8 +113,7 @@ Json json_of(const joint_offsets_t& m) {
 Json json_of(const offsets_status_t& m) {
   static constexpr const char* kLevels[] = {"OK", "WARN", "ERROR", "STALE"};
   Json counters = Json::object(), median = Json::object(), p99 = Json::object();
-  for (std::size_t i = 0; i < m.counter_name.size(); ++i)
-    counters[m.counter_name[i]] = m.counter_value[i];
+  for (std::size_t i = 0; i < m.counter_name.size(); ++i) counters[m.counter_name[i]] = m.counter_value[i];
   for (std::size_t i = 0; i < m.stage_name.size(); ++i) {
     median[m.stage_name[i]] = number(m.stage_median_ms[i]);
     p99[m.stage_name[i]] = number(m.stage_p99_ms[i]);
@@ -155,8 +150,7 @@ Json json_of(const offsets_status_t& m) {
 
 class Exporter {
  public:
-  explicit Exporter(const McapExportOptions& options)
-      : options_(options), reader_(options.log), writer_(options.out) {}
+  explicit Exporter(const McapExportOptions& options) : options_(options), reader_(options.log), writer_(options.out) {}
 
   McapExportSummary run() {
     ProgressBar bar("to-mcap", reader_.size());
@@ -166,9 +160,8 @@ class Exporter {
       bar.set(reader_.position());
     }
     if (summary_.messages.empty()) {
-      throw DataError(
-          options_.log.string() +
-          ": no joint states, pictures, offsets or status in this log; nothing is written");
+      throw DataError(options_.log.string() +
+                      ": no joint states, pictures, offsets or status in this log; nothing is written");
     }
     writer_.close();
     summary_.bytes = writer_.bytes_written();
@@ -178,21 +171,11 @@ class Exporter {
  private:
   void take(const LogEvent& event) {
     switch (kind_of(event.data)) {
-      case MessageKind::kJointState:
-        write_decoded(event, joint_state_, "bodyschema.JointState");
-        break;
-      case MessageKind::kJointOffsets:
-        write_decoded(event, offsets_, "bodyschema.JointOffsets");
-        break;
-      case MessageKind::kOffsetsStatus:
-        write_decoded(event, status_, "bodyschema.OffsetsStatus");
-        break;
-      case MessageKind::kImages:
-        take_images(event);
-        break;
-      case MessageKind::kUnknown:
-        ++summary_.unknown;
-        break;
+      case MessageKind::kJointState: write_decoded(event, joint_state_, "bodyschema.JointState"); break;
+      case MessageKind::kJointOffsets: write_decoded(event, offsets_, "bodyschema.JointOffsets"); break;
+      case MessageKind::kOffsetsStatus: write_decoded(event, status_, "bodyschema.OffsetsStatus"); break;
+      case MessageKind::kImages: take_images(event); break;
+      case MessageKind::kUnknown: ++summary_.unknown; break;
     }
   }
 
@@ -223,16 +206,12 @@ class Exporter {
       }
       std::string name = camera_name(view.type);
       std::replace(name.begin(), name.end(), ' ', '_');
-      const std::string data =
-          view.pixelformat == bot_core::image_t::PIXEL_FORMAT_MJPEG
-              ? base64(view.data)
-              : base64(to_jpeg_message(image_, view.utime, options_.jpeg_quality).data);
-      const Json json = {{"timestamp", timestamp(view.utime)},
-                         {"frame_id", name},
-                         {"format", "jpeg"},
-                         {"data", data}};
-      write("/" + event.channel + "/" + name, "foxglove.CompressedImage", event.time_us, view.utime,
-            text_of(json), [] { return picture_schema(); });
+      const std::string data = view.pixelformat == bot_core::image_t::PIXEL_FORMAT_MJPEG
+                                   ? base64(view.data)
+                                   : base64(to_jpeg_message(image_, view.utime, options_.jpeg_quality).data);
+      const Json json = {{"timestamp", timestamp(view.utime)}, {"frame_id", name}, {"format", "jpeg"}, {"data", data}};
+      write("/" + event.channel + "/" + name, "foxglove.CompressedImage", event.time_us, view.utime, text_of(json),
+            [] { return picture_schema(); });
     }
   }
 

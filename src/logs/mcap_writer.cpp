@@ -51,8 +51,7 @@ class McapWriter::Fields {
   template <class Items, class Write>
   Fields& list(const Items& items, Write write) {
     Fields inner;
-    for (const auto& item : items)
-      write(inner, item);
+    for (const auto& item : items) write(inner, item);
     return text(inner.bytes_);
   }
   operator const std::string&() const { return bytes_; }
@@ -61,8 +60,7 @@ class McapWriter::Fields {
   std::string bytes_;
 };
 
-McapWriter::McapWriter(std::filesystem::path file)
-    : file_(std::move(file)), part_(file_.string() + ".part") {
+McapWriter::McapWriter(std::filesystem::path file) : file_(std::move(file)), part_(file_.string() + ".part") {
   stream_.open(part_, std::ios::binary | std::ios::trunc);
   if (!stream_) throw FileError(file_.string() + ": cannot be created");
   put(kMagic);
@@ -87,8 +85,7 @@ McapWriter::SchemaId McapWriter::add_schema(std::string_view name, std::string_v
 McapWriter::ChannelId McapWriter::add_channel(std::string_view topic, SchemaId schema) {
   check_room(channels_.size());
   const auto id = static_cast<ChannelId>(channels_.size());
-  channels_.push_back(
-      Fields().number(id).number(schema).text(topic).text("json").number(std::uint32_t{0}));
+  channels_.push_back(Fields().number(id).number(schema).text(topic).text("json").number(std::uint32_t{0}));
   counts_.push_back(0);
   put_record(kChannel, channels_.back());
   return id;
@@ -100,8 +97,7 @@ void McapWriter::check_room(std::size_t id) const {
   }
 }
 
-void McapWriter::write(ChannelId channel, std::uint64_t log_time, std::uint64_t publish_time,
-                       std::string_view json) {
+void McapWriter::write(ChannelId channel, std::uint64_t log_time, std::uint64_t publish_time, std::string_view json) {
   if (chunk_.empty()) chunk_begin_ = chunk_end_ = log_time;
   if (messages_ == 0) begin_ = end_ = log_time;
   chunk_begin_ = std::min(chunk_begin_, log_time);
@@ -111,8 +107,7 @@ void McapWriter::write(ChannelId channel, std::uint64_t log_time, std::uint64_t 
   const auto sequence = static_cast<std::uint32_t>(counts_[channel]++);
   ++messages_;
   chunk_index_[channel].emplace_back(log_time, chunk_.size());
-  const std::string content =
-      Fields().number(channel).number(sequence).number(log_time).number(publish_time).raw(json);
+  const std::string content = Fields().number(channel).number(sequence).number(log_time).number(publish_time).raw(json);
   chunk_ += static_cast<char>(kMessage);
   chunk_ += static_cast<const std::string&>(Fields().number(std::uint64_t{content.size()}));
   chunk_ += content;
@@ -134,9 +129,8 @@ void McapWriter::write_chunk() {
   for (auto& [channel, entries] : chunk_index_) {
     std::sort(entries.begin(), entries.end());
     index.index_offsets[channel] = position_;
-    put_record(kMessageIndex, Fields().number(channel).list(entries, [](Fields& f, const auto& e) {
-      f.number(e.first).number(e.second);
-    }));
+    put_record(kMessageIndex, Fields().number(channel).list(
+                                  entries, [](Fields& f, const auto& e) { f.number(e.first).number(e.second); }));
   }
   index.index_length = position_ - index.start - index.length;
   chunks_.push_back(std::move(index));
@@ -152,36 +146,29 @@ void McapWriter::close() {
   std::string offset_records;
   const auto group = [&](Opcode opcode, const auto& items, const auto& content) {
     const std::uint64_t start = position_;
-    for (const auto& item : items)
-      put_record(opcode, content(item));
+    for (const auto& item : items) put_record(opcode, content(item));
     if (position_ == start) return;
-    const std::string record =
-        Fields().number(std::uint8_t{opcode}).number(start).number(position_ - start);
+    const std::string record = Fields().number(std::uint8_t{opcode}).number(start).number(position_ - start);
     offset_records += static_cast<char>(kSummaryOffset);
-    offset_records +=
-        static_cast<const std::string&>(Fields().number(std::uint64_t{record.size()}));
+    offset_records += static_cast<const std::string&>(Fields().number(std::uint64_t{record.size()}));
     offset_records += record;
   };
   const auto as_it_is = [](const std::string& content) -> const std::string& { return content; };
   group(kSchema, schemas_, as_it_is);
   group(kChannel, channels_, as_it_is);
   std::map<ChannelId, std::uint64_t> counts;
-  for (std::size_t i = 0; i < counts_.size(); ++i)
-    counts[static_cast<ChannelId>(i)] = counts_[i];
-  const auto pairs = [](Fields& f, const auto& entry) {
-    f.number(entry.first).number(entry.second);
-  };
-  const std::vector<std::string> statistics = {
-      Fields()
-          .number(messages_)
-          .number(static_cast<std::uint16_t>(schemas_.size()))
-          .number(static_cast<std::uint32_t>(channels_.size()))
-          .number(std::uint32_t{0})
-          .number(std::uint32_t{0})
-          .number(static_cast<std::uint32_t>(chunks_.size()))
-          .number(begin_)
-          .number(end_)
-          .list(counts, pairs)};
+  for (std::size_t i = 0; i < counts_.size(); ++i) counts[static_cast<ChannelId>(i)] = counts_[i];
+  const auto pairs = [](Fields& f, const auto& entry) { f.number(entry.first).number(entry.second); };
+  const std::vector<std::string> statistics = {Fields()
+                                                   .number(messages_)
+                                                   .number(static_cast<std::uint16_t>(schemas_.size()))
+                                                   .number(static_cast<std::uint32_t>(channels_.size()))
+                                                   .number(std::uint32_t{0})
+                                                   .number(std::uint32_t{0})
+                                                   .number(static_cast<std::uint32_t>(chunks_.size()))
+                                                   .number(begin_)
+                                                   .number(end_)
+                                                   .list(counts, pairs)};
   group(kStatistics, statistics, as_it_is);
   group(kChunkIndex, chunks_, [&](const ChunkIndex& c) -> std::string {
     return Fields()

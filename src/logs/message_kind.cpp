@@ -10,8 +10,7 @@ namespace bodyschema {
 MessageKind kind_of(Bytes message) {
   if (message.size() < 8) return MessageKind::kUnknown;
   std::uint64_t word = 0;
-  for (std::size_t i = 0; i < 8; ++i)
-    word = (word << 8) | message[i];
+  for (std::size_t i = 0; i < 8; ++i) word = (word << 8) | message[i];
   const auto fingerprint = static_cast<std::int64_t>(word);
   if (fingerprint == bot_core::joint_state_t::getHash()) return MessageKind::kJointState;
   if (fingerprint == bot_core::images_t::getHash()) return MessageKind::kImages;
@@ -22,16 +21,11 @@ MessageKind kind_of(Bytes message) {
 
 const char* name_of(MessageKind kind) {
   switch (kind) {
-    case MessageKind::kJointState:
-      return "bot_core.joint_state_t";
-    case MessageKind::kImages:
-      return "bot_core.images_t";
-    case MessageKind::kJointOffsets:
-      return "bodyschema.joint_offsets_t";
-    case MessageKind::kOffsetsStatus:
-      return "bodyschema.offsets_status_t";
-    case MessageKind::kUnknown:
-      return "?";
+    case MessageKind::kJointState: return "bot_core.joint_state_t";
+    case MessageKind::kImages: return "bot_core.images_t";
+    case MessageKind::kJointOffsets: return "bodyschema.joint_offsets_t";
+    case MessageKind::kOffsetsStatus: return "bodyschema.offsets_status_t";
+    case MessageKind::kUnknown: return "?";
   }
   return "?";
 }

@@ -23,13 +23,12 @@ constexpr double kSteps_rad = 0.02;
 std::span<const JointSample> between(std::span<const JointSample> ordered, Microseconds from, Microseconds to) {
   const auto first = std::lower_bound(ordered.begin(), ordered.end(), from,
                                       [](const JointSample& s, Microseconds t) { return s.utime < t; });
-  const auto last = std::upper_bound(first, ordered.end(), to,
-                                     [](Microseconds t, const JointSample& s) { return t < s.utime; });
+  const auto last =
+      std::upper_bound(first, ordered.end(), to, [](Microseconds t, const JointSample& s) { return t < s.utime; });
   return {first, last};
 }
 
-std::span<const JointSample> window(std::span<const JointSample> ordered, Microseconds utime,
-                                    Microseconds half) {
+std::span<const JointSample> window(std::span<const JointSample> ordered, Microseconds utime, Microseconds half) {
   const Microseconds newest = ordered.empty() ? utime : ordered.back().utime;
   const Microseconds after = std::clamp<Microseconds>(newest - utime, 0, half);
   return between(ordered, utime + after - 2 * half, utime + after);
@@ -41,8 +40,8 @@ bool jumps(std::span<const JointSample> near, Eigen::Index joint) {
     const double after_s = seconds(near[i + 1].utime - near[i].utime);
     if (before_s <= 0.0 || after_s <= 0.0) continue;
     const double step_s = std::min(before_s, after_s);
-    const double change = (near[i + 1].q[joint] - near[i].q[joint]) / after_s -
-                          (near[i].q[joint] - near[i - 1].q[joint]) / before_s;
+    const double change =
+        (near[i + 1].q[joint] - near[i].q[joint]) / after_s - (near[i].q[joint] - near[i - 1].q[joint]) / before_s;
     if (std::abs(change) * step_s > kSteps_rad + kMostAcceleration_rad_s2 * step_s * step_s) return true;
   }
   return false;

@@ -59,8 +59,7 @@ nlohmann::ordered_json error_model_json(const ErrorModel& model) {
 }
 
 std::string estimate_line(const Estimate& estimate, const StereoRig& rig) {
-  return estimate_json(estimate, rig)
-      .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return estimate_json(estimate, rig).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
 }  // namespace bodyschema

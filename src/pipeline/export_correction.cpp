@@ -23,8 +23,7 @@ using tinyxml2::XMLElement;
 
 constexpr double kHardlyKnown_deg = 0.5;
 
-Eigen::Vector3d triple(const XMLElement* element, const char* attribute,
-                       const Eigen::Vector3d& fallback) {
+Eigen::Vector3d triple(const XMLElement* element, const char* attribute, const Eigen::Vector3d& fallback) {
   return urdf_triple(element != nullptr ? element->Attribute(attribute) : nullptr, fallback);
 }
 
@@ -40,8 +39,7 @@ XMLElement* origin_of(tinyxml2::XMLDocument& document, XMLElement* joint) {
 
 void correct_joint(tinyxml2::XMLDocument& document, XMLElement* joint, double offset) {
   XMLElement* origin = origin_of(document, joint);
-  const Eigen::Vector3d axis =
-      triple(joint->FirstChildElement("axis"), "xyz", Eigen::Vector3d::UnitX()).normalized();
+  const Eigen::Vector3d axis = triple(joint->FirstChildElement("axis"), "xyz", Eigen::Vector3d::UnitX()).normalized();
   const Eigen::Matrix3d R = urdf_rotation(triple(origin, "rpy", Eigen::Vector3d::Zero()));
   if (std::string(joint->Attribute("type")) == "prismatic") {
     const Eigen::Vector3d p = triple(origin, "xyz", Eigen::Vector3d::Zero()) - R * axis * offset;
@@ -77,8 +75,7 @@ void place_joint(tinyxml2::XMLDocument& document, XMLElement* joint, const Joint
   origin->SetAttribute("xyz", urdf_text(p).c_str());
   const double angle = placement.tilt.norm();
   if (angle == 0.0) return;
-  const Eigen::Matrix3d R =
-      urdf_rotation(triple(origin_of(document, joint), "rpy", Eigen::Vector3d::Zero()));
+  const Eigen::Matrix3d R = urdf_rotation(triple(origin_of(document, joint), "rpy", Eigen::Vector3d::Zero()));
   axis = R.transpose() * (Eigen::AngleAxisd(angle, placement.tilt / angle) * (R * axis));
   if (axis_element == nullptr) {
     axis_element = document.NewElement("axis");
@@ -137,10 +134,10 @@ std::string cameras_yaml(const StereoRig& rig) {
   for (const auto& camera : rig.cameras) {
     const auto& k = camera.intrinsics;
     const auto& d = camera.distortion;
-    text += fmt::format("  {}:\n    link: {}\n    width: {}\n    height: {}\n    fx: {:.4f}\n    fy: {:.4f}\n"
-                        "    cx: {:.4f}\n    cy: {:.4f}\n    distortion: [{:.6g}, {:.6g}, {:.6g}, {:.6g}, {:.6g}]\n",
-                        camera.name, camera.link, k.width, k.height, k.fx, k.fy, k.cx, k.cy, d[0], d[1], d[2],
-                        d[3], d[4]);
+    text += fmt::format(
+        "  {}:\n    link: {}\n    width: {}\n    height: {}\n    fx: {:.4f}\n    fy: {:.4f}\n"
+        "    cx: {:.4f}\n    cy: {:.4f}\n    distortion: [{:.6g}, {:.6g}, {:.6g}, {:.6g}, {:.6g}]\n",
+        camera.name, camera.link, k.width, k.height, k.fx, k.fy, k.cx, k.cy, d[0], d[1], d[2], d[3], d[4]);
   }
   return text;
 }
@@ -148,16 +145,18 @@ std::string cameras_yaml(const StereoRig& rig) {
 std::string applied_text(const std::vector<AppliedEffect>& applied) {
   std::string yes, no;
   for (const auto& effect : applied) {
-    (effect.applied.empty() ? no : yes) += fmt::format(
-        "  {}: {}{}\n", effect.effect, effect.applied.empty() ? "" : "in " + effect.applied,
-        effect.remark.empty() ? "" : (effect.applied.empty() ? "" : "; ") + effect.remark);
+    (effect.applied.empty() ? no : yes) +=
+        fmt::format("  {}: {}{}\n", effect.effect, effect.applied.empty() ? "" : "in " + effect.applied,
+                    effect.remark.empty() ? "" : (effect.applied.empty() ? "" : "; ") + effect.remark);
   }
   std::string text;
   if (!yes.empty()) text += "Of the extended model these files hold:\n" + yes;
   if (!no.empty()) {
-    text += "They cannot hold the following; load extended_model.yaml in bodyschemad or bodyschema replay\n"
-            "(--extended-model), with the original URDF and cameras, or do as said. Beside corrected.urdf it would\n"
-            "apply twice what that holds:\n" + no;
+    text +=
+        "They cannot hold the following; load extended_model.yaml in bodyschemad or bodyschema replay\n"
+        "(--extended-model), with the original URDF and cameras, or do as said. Beside corrected.urdf it would\n"
+        "apply twice what that holds:\n" +
+        no;
   }
   return text.empty() ? "The extended model holds joint offsets alone; those of the replay are used.\n" : text;
 }
@@ -199,8 +198,8 @@ Correction read_correction(const std::filesystem::path& summary, bool anyway) {
   }
   for (const auto& [joint, sd] : correction.sd_rad) {
     if (degrees(sd) <= kHardlyKnown_deg) continue;
-    correction.warnings.push_back(fmt::format(
-        "{}: known to {:.2f} deg only (one sigma); this motion hardly told it", joint, degrees(sd)));
+    correction.warnings.push_back(
+        fmt::format("{}: known to {:.2f} deg only (one sigma); this motion hardly told it", joint, degrees(sd)));
   }
   return correction;
 }
@@ -246,8 +245,8 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
   }
 }
 
-std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup,
-                              const StereoRig& rig, const std::filesystem::path& out, bool anyway) {
+std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup, const StereoRig& rig,
+                              const std::filesystem::path& out, bool anyway) {
   Correction correction = read_correction(summary, anyway);
   std::optional<ErrorModel> model;
   std::vector<AppliedEffect> applied;
@@ -283,8 +282,9 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
     delta += fmt::format("{:<24} {:+.4f}\n", joint, degrees(offset));
   }
   if (!correction.nuisances.empty()) {
-    yaml += "# Estimated beside the offsets; joints in rad, encoder - true. Arm and head offsets hold together:\n"
-            "# apply both or neither.\nnuisance:\n";
+    yaml +=
+        "# Estimated beside the offsets; joints in rad, encoder - true. Arm and head offsets hold together:\n"
+        "# apply both or neither.\nnuisance:\n";
     std::string head;
     for (const auto& [name, value] : correction.nuisances) {
       yaml += fmt::format("  {}: {:.6g}\n", name, value);
@@ -297,13 +297,12 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
   write_text(out / "offsets.yaml", yaml);
   write_text(out / "calibration_delta.txt", delta);
   std::string files =
-      warnings +
-      fmt::format("corrected URDF        {}\noffsets by joint      {}\niCub calibrationDelta {}\n",
-                  (out / "corrected.urdf").string(), (out / "offsets.yaml").string(),
-                  (out / "calibration_delta.txt").string());
+      warnings + fmt::format("corrected URDF        {}\noffsets by joint      {}\niCub calibrationDelta {}\n",
+                             (out / "corrected.urdf").string(), (out / "offsets.yaml").string(),
+                             (out / "calibration_delta.txt").string());
   if (!model) return files;
-  const bool cameras = std::any_of(applied.begin(), applied.end(),
-                                   [](const auto& a) { return a.applied == "cameras.yaml"; });
+  const bool cameras =
+      std::any_of(applied.begin(), applied.end(), [](const auto& a) { return a.applied == "cameras.yaml"; });
   if (cameras) {
     write_text(out / "cameras.yaml", cameras_yaml(model->corrected(rig)));
     files += fmt::format("camera intrinsics     {}\n", (out / "cameras.yaml").string());

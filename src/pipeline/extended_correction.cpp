@@ -28,8 +28,8 @@ bool in_cameras(const std::string& name) {
 }
 
 bool in_urdf(const std::string& name) {
-  return name == "head_offset" || name == "vergence" || name == "link_length" ||
-         name == "axis_tilt" || name == "axis_shift" || name == "baseline" || name == "base_shift";
+  return name == "head_offset" || name == "vergence" || name == "link_length" || name == "axis_tilt" ||
+         name == "axis_shift" || name == "baseline" || name == "base_shift";
 }
 
 Instant at_rest(Eigen::Index joints, std::size_t camera) {
@@ -41,8 +41,8 @@ Instant at_rest(Eigen::Index joints, std::size_t camera) {
 
 /// Where an adjustment puts the joint, in terms of the URDF: along its axis as written there; a shift
 /// and a rotation vector in its parent's frame.
-JointPlacement placed(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
-                      const StereoRig& rig, Eigen::Index joint, const JointAdjustment& adjustment) {
+JointPlacement placed(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup, const StereoRig& rig,
+                      Eigen::Index joint, const JointAdjustment& adjustment) {
   const auto& info = robot->joints()[static_cast<std::size_t>(joint)];
   CorrectedKinematics kinematics(robot, {info.parent_link, info.child_link, setup.hand_link},
                                  {rig.cameras.front().link});
@@ -54,12 +54,11 @@ JointPlacement placed(const std::shared_ptr<const RobotModel>& robot, const Robo
   kinematics.compute(q, corrections, 0, moved);
   // An adjustment counts away from the root, whichever way the URDF's axis points.
   const Eigen::Vector3d axis_W = kinematics.tilt_axis(joint, 0).cross(kinematics.tilt_axis(joint, 1));
-  const Eigen::Vector3d step_W =
-      kinematics.X_WC().linear() * (moved[1].translation() - X_CL[1].translation());
-  const Eigen::Vector3d tilt_W = adjustment.tilt_1_rad * kinematics.tilt_axis(joint, 0) +
-                                 adjustment.tilt_2_rad * kinematics.tilt_axis(joint, 1);
-  const Eigen::Vector3d shift_W = adjustment.shift_1_m * kinematics.tilt_axis(joint, 0) +
-                                  adjustment.shift_2_m * kinematics.tilt_axis(joint, 1);
+  const Eigen::Vector3d step_W = kinematics.X_WC().linear() * (moved[1].translation() - X_CL[1].translation());
+  const Eigen::Vector3d tilt_W =
+      adjustment.tilt_1_rad * kinematics.tilt_axis(joint, 0) + adjustment.tilt_2_rad * kinematics.tilt_axis(joint, 1);
+  const Eigen::Vector3d shift_W =
+      adjustment.shift_1_m * kinematics.tilt_axis(joint, 0) + adjustment.shift_2_m * kinematics.tilt_axis(joint, 1);
   const Eigen::Matrix3d R_PW = (kinematics.X_WC() * X_CL.front()).linear().transpose();
   return {info.name, axis_W.dot(step_W), R_PW * shift_W, R_PW * tilt_W};
 }
@@ -79,10 +78,8 @@ JointPlacement shifted_base(const std::shared_ptr<const RobotModel>& robot, cons
 
 }  // namespace
 
-std::vector<AppliedEffect> add_extended_model(const ErrorModel& model,
-                                              const std::shared_ptr<const RobotModel>& robot,
-                                              const RobotSetup& setup, const StereoRig& rig,
-                                              Correction& correction) {
+std::vector<AppliedEffect> add_extended_model(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
+                                              const RobotSetup& setup, const StereoRig& rig, Correction& correction) {
   const auto joints = robot->joint_count();
   std::vector<AppliedEffect> list;
   for (std::size_t e = 0; e < model.size(); ++e) {

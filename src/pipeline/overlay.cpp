@@ -25,8 +25,7 @@ cv::Mat to_matrix(const Image& image) {
   return rgb;
 }
 
-void draw_outline(cv::Mat& picture, const BinaryMask& mask, int enlargement,
-                  const cv::Scalar& colour) {
+void draw_outline(cv::Mat& picture, const BinaryMask& mask, int enlargement, const cv::Scalar& colour) {
   if (mask.empty()) return;
   cv::Mat bits(mask.height(), mask.width(), CV_8UC1);
   for (int v = 0; v < mask.height(); ++v) {
@@ -45,15 +44,14 @@ std::vector<OverlayView> overlay_views(Pipeline& pipeline, const Observation& ob
   std::vector<OverlayView> views;
   for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
     if (!observation.cameras[c]) continue;
-    views.push_back({&observation.cameras[c]->image,
-                     pipeline.estimator().predicted_silhouette(observation, c, false),
+    views.push_back({&observation.cameras[c]->image, pipeline.estimator().predicted_silhouette(observation, c, false),
                      pipeline.estimator().predicted_silhouette(observation, c, true)});
   }
   return views;
 }
 
-Image draw_overlay(const std::vector<OverlayView>& views, const std::string& caption,
-                   int enlargement, const OverlayNames& names) {
+Image draw_overlay(const std::vector<OverlayView>& views, const std::string& caption, int enlargement,
+                   const OverlayNames& names) {
   std::vector<cv::Mat> pictures;
   for (const auto& view : views) {
     cv::Mat picture;
@@ -65,7 +63,8 @@ Image draw_overlay(const std::vector<OverlayView>& views, const std::string& cap
       const cv::Rect whole(0, 0, view.image->width, view.image->height);
       const cv::Rect shown = part & whole;
       picture = picture(cv::Rect(shown.x * enlargement, shown.y * enlargement, shown.width * enlargement,
-                                 shown.height * enlargement)).clone();
+                                 shown.height * enlargement))
+                    .clone();
     }
     pictures.push_back(picture);
   }

@@ -32,8 +32,7 @@ class Digest {
   std::uint64_t state_ = 0xcbf29ce484222325ull;
 };
 
-std::optional<ErrorModel> load_error_model(const RobotSetup& setup,
-                                           const std::shared_ptr<const RobotModel>& robot,
+std::optional<ErrorModel> load_error_model(const RobotSetup& setup, const std::shared_ptr<const RobotModel>& robot,
                                            const StereoRig& rig) {
   if (setup.extended_model.empty()) return std::nullopt;
   return ErrorModel::load(setup.extended_model, JointRoles::of(robot, setup, rig));
@@ -43,8 +42,7 @@ StereoRig corrected(const StereoRig& rig, const std::optional<ErrorModel>& model
   return model ? model->corrected(rig) : rig;
 }
 
-std::string digest_of(const RobotSetup& setup, const RobotModel& robot,
-                      const std::optional<ErrorModel>& error_model) {
+std::string digest_of(const RobotSetup& setup, const RobotModel& robot, const std::optional<ErrorModel>& error_model) {
   Digest digest;
   std::ifstream file(setup.model.urdf, std::ios::binary);
   const std::string urdf((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
@@ -89,21 +87,17 @@ VisionSetup by(std::optional<SegmentationMethod> method, VisionSetup vision) {
 Pipeline::Pipeline(const Configuration& configuration, std::optional<SegmentationMethod> method)
     : setup_(RobotSetup::from(configuration.section("robot"))),
       vision_(by(method, VisionSetup::from(configuration.section("vision")))),
-      bus_(BusOptions::from(configuration.section("bus"))),
-      options_(EstimatorOptions::from(configuration)),
+      bus_(BusOptions::from(configuration.section("bus"))), options_(EstimatorOptions::from(configuration)),
       robot_(load(setup_, StereoRig::from(configuration.section("cameras")))),
       error_model_(load_error_model(setup_, robot_, StereoRig::from(configuration.section("cameras")))),
       rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
-      background_watch_(robot_, links_of(rig_)),
-      background_turned_rad_(rig_.cameras.size(), 0.0),
-      estimator_(robot_, setup_, rig_, options_),
-      configuration_hash_(configuration.hash()),
+      background_watch_(robot_, links_of(rig_)), background_turned_rad_(rig_.cameras.size(), 0.0),
+      estimator_(robot_, setup_, rig_, options_), configuration_hash_(configuration.hash()),
       model_hash_(digest_of(setup_, *robot_, error_model_)) {
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
   for (const auto& camera : rig_.cameras) {
-    eyes_.push_back({Segmenter(vision_, camera.name, camera.intrinsics.width,
-                               camera.intrinsics.height),
+    eyes_.push_back({Segmenter(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height),
                      camera.has_distortion() ? std::optional<Undistorter>(camera) : std::nullopt});
   }
   changes_.resize(eyes_.size());
@@ -178,8 +172,8 @@ Pipeline::Looks Pipeline::look(const Observation& observation) {
     if (vision_.method == SegmentationMethod::kStatistics) {
       predicted = estimator_.predicted_silhouette(observation, c, true);
     }
-    eye.segmenter.segment(look.straightened ? *look.straightened : seen.image, look.mask, look.valid,
-                          look.coverage, predicted ? &*predicted : nullptr);
+    eye.segmenter.segment(look.straightened ? *look.straightened : seen.image, look.mask, look.valid, look.coverage,
+                          predicted ? &*predicted : nullptr);
     look.learning = !eye.segmenter.ready();
   }
   return looks;
@@ -221,8 +215,7 @@ bool Pipeline::segment(Observation& observation) {
       if (seen) seen->mask = BinaryMask();
     }
   }
-  segmentation_ms_ =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  segmentation_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   return !learning_;
 }
 

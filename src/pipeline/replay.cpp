@@ -68,13 +68,11 @@ struct SeenFrame {
   std::array<Microseconds, 2> utime{-1, -1};
   std::array<Eigen::VectorXd, 2> q;
   std::array<std::optional<Corrections>, 2> corrections;
-  [[nodiscard]] Exposure exposure(std::size_t c) const {
-    return {q[c], corrections[c] ? &*corrections[c] : nullptr};
-  }
+  [[nodiscard]] Exposure exposure(std::size_t c) const { return {q[c], corrections[c] ? &*corrections[c] : nullptr}; }
 };
 
-void write_overlay(Pipeline& pipeline, const Observation& observation,
-                   const std::filesystem::path& file, const std::string& caption) {
+void write_overlay(Pipeline& pipeline, const Observation& observation, const std::filesystem::path& file,
+                   const std::string& caption) {
   const auto views = overlay_views(pipeline, observation);
   if (!views.empty()) write_png(file, draw_overlay(views, caption));
 }
@@ -104,22 +102,20 @@ class Replay {
     std::size_t expected = count_frames();
     for_each("replay", [&](Observation& o, const Observation* next) { take(o, next, expected); });
     if (frames_.empty()) {
-      throw DataError(options_.log.string() + ": no synchronised pictures and encoders in this log; " +
-                      complaint_);
+      throw DataError(options_.log.string() + ": no synchronised pictures and encoders in this log; " + complaint_);
     }
     for (std::size_t c = 0; c < pipeline_.rig().cameras.size(); ++c) {
-      const bool seen = std::any_of(frames_.begin(), frames_.end(),
-                                    [&](const SeenFrame& frame) { return frame.utime[c] >= 0; });
+      const bool seen =
+          std::any_of(frames_.begin(), frames_.end(), [&](const SeenFrame& frame) { return frame.utime[c] >= 0; });
       if (seen) continue;
       const auto& camera = pipeline_.rig().cameras[c];
       if (statistics_.faults[static_cast<std::size_t>(MessageFault::kWrongSize)] > 0) {
         throw DataError(fmt::format(
             "{}: no picture of camera '{}' has the configured size {}x{} (cameras.{}.width, .height)",
-            options_.log.string(), camera.name, camera.intrinsics.width, camera.intrinsics.height,
-            camera.name));
+            options_.log.string(), camera.name, camera.intrinsics.width, camera.intrinsics.height, camera.name));
       }
-      spdlog::warn("{}: no usable picture of camera '{}'; estimated from the other one",
-                   options_.log.string(), camera.name);
+      spdlog::warn("{}: no usable picture of camera '{}'; estimated from the other one", options_.log.string(),
+                   camera.name);
     }
     estimates_.flush();
     if (!estimates_) throw FileError(options_.out.string() + ": disk full? estimates.jsonl is cut short");
@@ -154,8 +150,8 @@ class Replay {
     drain();
     if (held) action(held->observation, nullptr);
     statistics_ = stream.statistics();
-    complaint_ = fmt::format("{} messages on {} and {}", statistics_.messages,
-                             stream.channels().joint_state, stream.channels().cameras);
+    complaint_ = fmt::format("{} messages on {} and {}", statistics_.messages, stream.channels().joint_state,
+                             stream.channels().cameras);
     if (statistics_.messages == 0) {
       complaint_ += fmt::format("; it holds {} (bus.channel_prefix)", fmt::join(channels, ", "));
     }
@@ -182,8 +178,8 @@ class Replay {
       frame.corrections[c] = observation.cameras[c]->corrections;
       if (truth_ && c < estimate.X_CP.size()) {
         if (const TruthInstant* truth = truth_->at(frame.utime[c])) {
-          json["error_" + pipeline_.rig().cameras[c].name] = error_json(hand_error(
-              estimate.X_CP[c], *truth, c, pipeline_.rig().cameras[c].intrinsics));
+          json["error_" + pipeline_.rig().cameras[c].name] =
+              error_json(hand_error(estimate.X_CP[c], *truth, c, pipeline_.rig().cameras[c].intrinsics));
         }
       }
     }
@@ -194,20 +190,19 @@ class Replay {
         options_.overlays > 0 ? std::max<std::size_t>(1, expected / static_cast<std::size_t>(options_.overlays)) : 0;
     if (every > 0 && frames_.size() % every == every / 2) {
       const std::string name = fmt::format("overlay_{:05d}.png", frames_.size());
-      write_overlay(pipeline_, observation, options_.out / name,
-                    fmt::format("frame {}", frames_.size()));
+      write_overlay(pipeline_, observation, options_.out / name, fmt::format("frame {}", frames_.size()));
     }
     if (options_.masks) {
       for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
         const auto& seen = observation.cameras[c];
         if (!seen || seen->mask.empty()) continue;
-        write_mask_png(options_.out / "masks" /
-                           fmt::format("{}_{:05d}.png", pipeline_.rig().cameras[c].name, frames_.size()),
-                       seen->mask, seen->valid);
+        write_mask_png(
+            options_.out / "masks" / fmt::format("{}_{:05d}.png", pipeline_.rig().cameras[c].name, frames_.size()),
+            seen->mask, seen->valid);
       }
     }
-    const bool complete = estimate.state != EstimatorState::kHandNotInView &&
-                          estimate.state != EstimatorState::kLearningBackground;
+    const bool complete =
+        estimate.state != EstimatorState::kHandNotInView && estimate.state != EstimatorState::kLearningBackground;
     frames_.push_back(std::move(frame));
     last_ = estimate;
     remember_convergence();
@@ -272,14 +267,12 @@ class Replay {
     table += '\n';
     for (std::size_t k = 0; k < last_.joint_names.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
-      table += fmt::format("{:<20} {:>10.2f} {:>8.2f}", last_.joint_names[k],
-                           degrees(last_.offset_rad(i)),
+      table += fmt::format("{:<20} {:>10.2f} {:>8.2f}", last_.joint_names[k], degrees(last_.offset_rad(i)),
                            degrees(std::sqrt(std::max(0.0, last_.covariance_rad2(i, i)))));
       if (truth_) {
         for (const auto& [name, offset] : truth_->offsets()) {
           if (name != last_.joint_names[k]) continue;
-          table += fmt::format(" {:>9.2f} {:>9.2f}", degrees(offset),
-                               degrees(last_.offset_rad(i) - offset));
+          table += fmt::format(" {:>9.2f} {:>9.2f}", degrees(offset), degrees(last_.offset_rad(i) - offset));
           summary["offset_error_deg"][name] = degrees(last_.offset_rad(i) - offset);
         }
       }
@@ -301,8 +294,10 @@ class Replay {
       lines = fmt::format("\nNOT CONVERGED: the log ended in state '{}': {}\n", to_string(last_.state),
                           why_not_converged());
     } else if (ended_after_) {
-      lines = fmt::format("\nThe last frames ({}) tell the hand less well: these are the offsets at {:.3f} s, the last "
-                          "that were 'converged'.\n", to_string(*ended_after_), seconds(last_.utime));
+      lines = fmt::format(
+          "\nThe last frames ({}) tell the hand less well: these are the offsets at {:.3f} s, the last "
+          "that were 'converged'.\n",
+          to_string(*ended_after_), seconds(last_.utime));
     }
     const auto warn = [&](const std::string& text) {
       if (text.empty()) return;
@@ -326,8 +321,9 @@ class Replay {
       case EstimatorState::kHandNotInView:
         return last_view_ ? "the arm had left the pictures; the offsets are of before" : "the arm is in no picture";
       case EstimatorState::kLearningBackground: return "it holds too few pictures to learn the background from";
-      default: return fmt::format("the offsets have not settled, the hand is known to {:.1f} mm; do not use them yet",
-                                  1e3 * last_.hand_sd_m);
+      default:
+        return fmt::format("the offsets have not settled, the hand is known to {:.1f} mm; do not use them yet",
+                           1e3 * last_.hand_sd_m);
     }
   }
 
@@ -335,16 +331,16 @@ class Replay {
     // The last tenth of the frames, at most 30, as the estimate was then; and the final estimate
     // applied to every frame of the log.
     const std::size_t tail = std::clamp<std::size_t>(online_.size() / 10, 1, 30);
-    std::string table = fmt::format("\n{:<34} {:>16} {:>16} {:>18} {:>18}\n", "error, before -> after",
-                                    "position mm", "rotation deg", "fingertips mm", "fingertips px");
+    std::string table = fmt::format("\n{:<34} {:>16} {:>16} {:>18} {:>18}\n", "error, before -> after", "position mm",
+                                    "rotation deg", "fingertips mm", "fingertips px");
     const bool tips = !pipeline_.setup().fingertip_links.empty();
     const auto row = [&](const std::string& name, const ErrorTotals& t) {
       const auto cell = [](const BeforeAfter& v) {
         const double n = static_cast<double>(std::max<std::size_t>(v.n, 1));
         return fmt::format("{:.2f} -> {:.2f}", v.before / n, v.after / n);
       };
-      table += fmt::format("{:<34} {:>16} {:>16} {:>18} {:>18}\n", name, cell(t.position_mm),
-                           cell(t.rotation_deg), tips ? cell(t.tip_mm) : "-", tips ? cell(t.tip_px) : "-");
+      table += fmt::format("{:<34} {:>16} {:>16} {:>18} {:>18}\n", name, cell(t.position_mm), cell(t.rotation_deg),
+                           tips ? cell(t.tip_mm) : "-", tips ? cell(t.tip_px) : "-");
     };
     for (std::size_t c = 0; c < pipeline_.rig().cameras.size(); ++c) {
       const std::string& name = pipeline_.rig().cameras[c].name;
@@ -363,8 +359,7 @@ class Replay {
       }
       row(fmt::format("{} eye, last {} frames", name, tail), last_frames);
       row(fmt::format("{} eye, final offsets, all frames", name), all);
-      summary["errors"][name] = {{"last_frames", last_frames.json()},
-                                {"final_on_all_frames", all.json()}};
+      summary["errors"][name] = {{"last_frames", last_frames.json()}, {"final_on_all_frames", all.json()}};
     }
     return table;
   }

@@ -64,24 +64,20 @@ class Tree {
     if (error != tinyxml2::XML_SUCCESS || robot == nullptr) {
       throw FileError(urdf.string() + ": " + kNotAUrdf);
     }
-    for (auto* link = robot->FirstChildElement("link"); link != nullptr;
-         link = link->NextSiblingElement("link")) {
+    for (auto* link = robot->FirstChildElement("link"); link != nullptr; link = link->NextSiblingElement("link")) {
       names_.push_back(attribute(link, "name"));
       for (auto* visual = link->FirstChildElement("visual"); visual != nullptr;
            visual = visual->NextSiblingElement("visual")) {
         with_shape_.insert(names_.back());
         const auto* geometry = visual->FirstChildElement("geometry");
         const auto* mesh = geometry != nullptr ? geometry->FirstChildElement("mesh") : nullptr;
-        if (const auto package = package_of(attribute(mesh, "filename")); !package.empty())
-          packages_.insert(package);
+        if (const auto package = package_of(attribute(mesh, "filename")); !package.empty()) packages_.insert(package);
       }
     }
     for (auto* element = robot->FirstChildElement("joint"); element != nullptr;
          element = element->NextSiblingElement("joint")) {
-      Joint joint{attribute(element, "name"),
-                  attribute(element->FirstChildElement("parent"), "link"),
-                  attribute(element->FirstChildElement("child"), "link"), false,
-                  attribute(element, "type") == "fixed"};
+      Joint joint{attribute(element, "name"), attribute(element->FirstChildElement("parent"), "link"),
+                  attribute(element->FirstChildElement("child"), "link"), false, attribute(element, "type") == "fixed"};
       joint.movable = !joint.fixed && element->FirstChildElement("mimic") == nullptr;
       if (attribute(element, "type") == "prismatic") sliding_.insert(joint.name);
       above_[joint.child] = joint;
@@ -91,15 +87,14 @@ class Tree {
 
   void require(const std::string& link, const std::string& option) const {
     if (std::find(names_.begin(), names_.end(), link) != names_.end()) return;
-    throw ConfigurationError(fmt::format("{} '{}': no such link in {}; did you mean '{}'?", option,
-                                         link, urdf_.string(), nearest_name(link, names_)));
+    throw ConfigurationError(fmt::format("{} '{}': no such link in {}; did you mean '{}'?", option, link,
+                                         urdf_.string(), nearest_name(link, names_)));
   }
   /// From the root down to a link.
   [[nodiscard]] std::vector<Joint> chain(std::string link) const {
     std::vector<Joint> joints;
     for (auto at = above_.find(link); at != above_.end(); at = above_.find(link)) {
-      if (joints.size() > above_.size())
-        throw FileError(urdf_.string() + ": link '" + link + "' hangs on itself");
+      if (joints.size() > above_.size()) throw FileError(urdf_.string() + ": link '" + link + "' hangs on itself");
       joints.insert(joints.begin(), at->second);
       link = at->second.parent;
     }
@@ -126,8 +121,7 @@ class Tree {
     for (const auto& package : packages_) {
       fs::path folder = fs::absolute(urdf_).lexically_normal().parent_path();
       std::error_code ignored;
-      while (folder.has_relative_path() && !fs::is_directory(folder / package, ignored))
-        folder = folder.parent_path();
+      while (folder.has_relative_path() && !fs::is_directory(folder / package, ignored)) folder = folder.parent_path();
       if (!fs::is_directory(folder / package, ignored)) continue;
       if (std::find(roots.begin(), roots.end(), folder) == roots.end()) roots.push_back(folder);
     }
@@ -145,8 +139,7 @@ class Tree {
 };
 
 std::string yaml(const std::string& name) {
-  static constexpr const char* kPlain =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-";
+  static constexpr const char* kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-";
   if (!name.empty() && name.find_first_not_of(kPlain) == std::string::npos && name[0] != '-') return name;
   std::string text = "\"";
   for (const char c : name) {
@@ -163,8 +156,7 @@ std::string yaml(const std::string& name) {
 
 std::string list(const std::vector<std::string>& names) {
   std::vector<std::string> quoted;
-  for (const auto& name : names)
-    quoted.push_back(yaml(name));
+  for (const auto& name : names) quoted.push_back(yaml(name));
   return fmt::format("[{}]", fmt::join(quoted, ", "));
 }
 
@@ -213,14 +205,13 @@ Parts parts_of(const Tree& tree, const StarterOptions& options) {
   return parts;
 }
 
-std::string robot_yaml(const StarterOptions& options, const Parts& parts,
-                       const std::vector<fs::path>& mesh_roots, double focal_px) {
+std::string robot_yaml(const StarterOptions& options, const Parts& parts, const std::vector<fs::path>& mesh_roots,
+                       double focal_px) {
   const auto from_here = [&](const fs::path& path) {
     return fs::proximate(fs::absolute(path), fs::absolute(options.out)).string();
   };
   std::vector<std::string> roots;
-  for (const auto& root : mesh_roots)
-    roots.push_back(from_here(root));
+  for (const auto& root : mesh_roots) roots.push_back(from_here(root));
   std::string text = fmt::format(
       "# Written from {}; every key is explained in config/icub_right/robot.yaml.\n"
       "version: 1\n\nrobot:\n  urdf: {}\n"
@@ -229,14 +220,13 @@ std::string robot_yaml(const StarterOptions& options, const Parts& parts,
       "  rendered_links: {}\n  hand_link: {}\n"
       "  fingertip_links: []               # links at the fingertips, for errors there\n"
       "  estimated_joints: {}\n",
-      yaml(options.urdf.filename().string()),
-      yaml(from_here(options.urdf)), list(roots), list(parts.rendered), yaml(options.hand_link), list(parts.arm));
+      yaml(options.urdf.filename().string()), yaml(from_here(options.urdf)), list(roots), list(parts.rendered),
+      yaml(options.hand_link), list(parts.arm));
   if (!parts.head.empty()) text += fmt::format("  head_joints: {}\n", list(parts.head));
   const auto fix = [&](const char* unit, const std::vector<std::string>& joints) {
     if (joints.empty()) return;
     text += fmt::format("  # {0}; take out the joints that the robot publishes.\n  fixed_joints_{0}:\n", unit);
-    for (const auto& joint : joints)
-      text += fmt::format("    {}: 0\n", yaml(joint));
+    for (const auto& joint : joints) text += fmt::format("    {}: 0\n", yaml(joint));
   };
   fix("deg", parts.others);
   fix("m", parts.others_m);
@@ -289,8 +279,7 @@ std::string simulator_yaml(const StarterOptions& options) {
 
 void write_new(const fs::path& file, const std::string& text) {
   std::error_code ignored;
-  if (fs::exists(file, ignored))
-    throw FileError(file.string() + ": is there already and is not replaced");
+  if (fs::exists(file, ignored)) throw FileError(file.string() + ": is there already and is not replaced");
   std::ofstream stream(file);
   stream << text;
   if (!stream.flush()) throw FileError(file.string() + ": cannot be written");
@@ -301,19 +290,15 @@ void write_new(const fs::path& file, const std::string& text) {
 std::string write_starter_configuration(const StarterOptions& options) {
   const Tree tree(options.urdf);
   tree.require(options.hand_link, "--hand");
-  for (const auto& camera : options.camera_links)
-    tree.require(camera, "--camera");
+  for (const auto& camera : options.camera_links) tree.require(camera, "--camera");
   const Parts parts = parts_of(tree, options);
   if (parts.arm.empty()) {
-    throw ConfigurationError(
-        fmt::format("--hand '{}': no joint moves it against the cameras", options.hand_link));
+    throw ConfigurationError(fmt::format("--hand '{}': no joint moves it against the cameras", options.hand_link));
   }
-  if (parts.rendered.empty())
-    throw FileError(options.urdf.string() + ": no link of the arm has a <visual> shape");
+  if (parts.rendered.empty()) throw FileError(options.urdf.string() + ": no link of the arm has a <visual> shape");
 
-  const double focal_px = options.focal_px > 0.0
-                              ? options.focal_px
-                              : 0.5 * options.width / std::tan(0.5 * kGuessedFieldOfView_rad);
+  const double focal_px =
+      options.focal_px > 0.0 ? options.focal_px : 0.5 * options.width / std::tan(0.5 * kGuessedFieldOfView_rad);
   std::error_code error;
   fs::create_directories(options.out, error);
   write_new(options.out / "robot.yaml", robot_yaml(options, parts, tree.mesh_roots(), focal_px));
@@ -329,8 +314,7 @@ std::string write_starter_configuration(const StarterOptions& options) {
   }
   told += fmt::format("seen: {}\n", fmt::join(parts.rendered, ", "));
   if (options.focal_px <= 0.0) {
-    told += fmt::format("focal length: a guess, {:.0f} px; fill in your cameras' in robot.yaml\n",
-                        focal_px);
+    told += fmt::format("focal length: a guess, {:.0f} px; fill in your cameras' in robot.yaml\n", focal_px);
   }
   told += fmt::format("wrote robot.yaml, estimator.yaml and simulator.yaml in {}\n", options.out.string());
   try {

@@ -19,7 +19,8 @@ constexpr Microseconds kTolerance_us = 60'000;
 Pose pose_from(const Json& rows) {
   Eigen::Matrix4d m;
   for (int r = 0; r < 4; ++r) {
-    for (int c = 0; c < 4; ++c) m(r, c) = rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)).get<double>();
+    for (int c = 0; c < 4; ++c)
+      m(r, c) = rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)).get<double>();
   }
   Pose pose;
   pose.matrix() = m;
@@ -77,9 +78,8 @@ Truth Truth::load(const std::filesystem::path& file, const std::vector<std::stri
         TruthInstant instant;
         instant.begin = instant.end = time_from(frame.at("utime"), "utime", 1.0);
         instant.X_CP = hand_in(cameras, frame);
-        instant.fingertips_P = frame.contains("fingertips_in_hand_m")
-                                   ? points_from(frame.at("fingertips_in_hand_m"))
-                                   : common_tips;
+        instant.fingertips_P =
+            frame.contains("fingertips_in_hand_m") ? points_from(frame.at("fingertips_in_hand_m")) : common_tips;
         truth.instants_.push_back(std::move(instant));
       }
     }
@@ -92,8 +92,7 @@ Truth Truth::load(const std::filesystem::path& file, const std::vector<std::stri
       } else {
         const auto& names = json.at("encoder_joints");
         for (std::size_t i = 0; i < offsets.size(); ++i) {
-          truth.offsets_.emplace_back(names.at(i).get<std::string>(),
-                                      radians(offsets.at(i).get<double>()));
+          truth.offsets_.emplace_back(names.at(i).get<std::string>(), radians(offsets.at(i).get<double>()));
         }
       }
     }
@@ -109,14 +108,12 @@ Truth Truth::load(const std::filesystem::path& file, const std::vector<std::stri
 }
 
 const TruthInstant* Truth::at(Microseconds utime) const {
-  const auto after =
-      std::upper_bound(instants_.begin(), instants_.end(), utime,
-                       [](Microseconds t, const TruthInstant& i) { return t < i.begin; });
+  const auto after = std::upper_bound(instants_.begin(), instants_.end(), utime,
+                                      [](Microseconds t, const TruthInstant& i) { return t < i.begin; });
   const TruthInstant* best = nullptr;
   Microseconds best_gap = kTolerance_us + 1;
   const auto consider = [&](const TruthInstant& instant) {
-    const Microseconds gap =
-        std::max<Microseconds>({0, instant.begin - utime, utime - instant.end});
+    const Microseconds gap = std::max<Microseconds>({0, instant.begin - utime, utime - instant.end});
     if (gap < best_gap) {
       best_gap = gap;
       best = &instant;

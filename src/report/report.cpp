@@ -15,8 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const char* const kColours[] = {"#1f6fb4", "#d1495b", "#3a9d5d", "#c98a1b",
-                                "#7a4fb0", "#3aa6a6", "#8a6d5a", "#5c677d"};
+const char* const kColours[] = {"#1f6fb4", "#d1495b", "#3a9d5d", "#c98a1b", "#7a4fb0", "#3aa6a6", "#8a6d5a", "#5c677d"};
 
 const char* const kStyle = R"css(
 :root { color-scheme: light dark; --line: #8884; --ink: #1b1f24; --paper: #fff; --soft: #5a6572; }
@@ -79,8 +78,10 @@ Json points(const std::vector<double>& x, const std::vector<double>& y) {
 /// Two nameless lines with the space between them filled; the legend leaves out what has no name.
 void add_band(Json& datasets, const ChartSeries& series, const char* colour) {
   for (const bool upper : {false, true}) {
-    datasets.push_back({{"label", ""}, {"data", points(series.x, upper ? series.high : series.low)},
-                        {"borderWidth", 0}, {"pointRadius", 0},
+    datasets.push_back({{"label", ""},
+                        {"data", points(series.x, upper ? series.high : series.low)},
+                        {"borderWidth", 0},
+                        {"pointRadius", 0},
                         {"fill", upper ? Json("-1") : Json(false)},
                         {"backgroundColor", std::string(colour) + "30"}});
   }
@@ -97,18 +98,25 @@ Json dataset(const ChartSeries& series, Chart::Kind kind, const char* colour) {
   } else {
     data = points(series.x, series.y);
   }
-  return {{"label", series.name},     {"data", data},
-          {"borderColor", colour},    {"backgroundColor", kind == Chart::Kind::kLine ? "transparent" : colour},
+  return {{"label", series.name},
+          {"data", data},
+          {"borderColor", colour},
+          {"backgroundColor", kind == Chart::Kind::kLine ? "transparent" : colour},
           {"borderWidth", kind == Chart::Kind::kScatter ? 0 : 2},
-          {"pointRadius", kind == Chart::Kind::kScatter ? 2 : 0}, {"tension", 0}};
+          {"pointRadius", kind == Chart::Kind::kScatter ? 2 : 0},
+          {"tension", 0}};
 }
 
 }  // namespace
 
 Report::Report(std::string title) : title_(std::move(title)) {}
 
-void Report::heading(const std::string& text) { body_ += "<h2>" + escaped(text) + "</h2>\n"; }
-void Report::paragraph(const std::string& text) { body_ += "<p>" + escaped(text) + "</p>\n"; }
+void Report::heading(const std::string& text) {
+  body_ += "<h2>" + escaped(text) + "</h2>\n";
+}
+void Report::paragraph(const std::string& text) {
+  body_ += "<p>" + escaped(text) + "</p>\n";
+}
 void Report::verdict(const std::string& text) {
   body_ += "<p class=\"verdict\">" + escaped(text) + "</p>\n";
 }
@@ -142,8 +150,7 @@ void Report::end() {
   open_.pop_back();
 }
 
-void Report::table(const std::vector<std::string>& head,
-                   const std::vector<std::vector<std::string>>& rows) {
+void Report::table(const std::vector<std::string>& head, const std::vector<std::vector<std::string>>& rows) {
   body_ += "<div class=\"scroll\"><table><thead><tr>";
   for (const auto& cell : head) body_ += "<th>" + escaped(cell) + "</th>";
   body_ += "</tr></thead><tbody>\n";
@@ -165,7 +172,9 @@ void Report::chart(const Chart& chart) {
       for (std::size_t i = 0; i < series.y.size(); ++i) {
         const bool named = chart.kind == Chart::Kind::kBar && i < chart.labels.size();
         rows.push_back({series.name,
-                        named ? chart.labels[i] : i < series.x.size() ? std::to_string(series.x[i]) : "",
+                        named                 ? chart.labels[i]
+                        : i < series.x.size() ? std::to_string(series.x[i])
+                                              : "",
                         std::to_string(series.y[i])});
       }
     }
@@ -187,13 +196,17 @@ void Report::chart(const Chart& chart) {
   if (bars && chart.threshold && !chart.labels.empty()) {
     Json line = Json::array();
     for (const auto& label : chart.labels) {
-      line.push_back(lying ? Json{{"x", *chart.threshold}, {"y", label}}
-                           : Json{{"x", label}, {"y", *chart.threshold}});
+      line.push_back(lying ? Json{{"x", *chart.threshold}, {"y", label}} : Json{{"x", label}, {"y", *chart.threshold}});
     }
     names += 1;
-    datasets.push_back({{"type", "line"}, {"label", chart.threshold_name}, {"data", line},
-                        {"borderColor", "#8a8f98"}, {"borderDash", {6, 4}}, {"borderWidth", 2},
-                        {"pointRadius", 0}, {"backgroundColor", "transparent"}});
+    datasets.push_back({{"type", "line"},
+                        {"label", chart.threshold_name},
+                        {"data", line},
+                        {"borderColor", "#8a8f98"},
+                        {"borderDash", {6, 4}},
+                        {"borderWidth", 2},
+                        {"pointRadius", 0},
+                        {"backgroundColor", "transparent"}});
   }
   Json data = {{"datasets", datasets}};
   if (bars) data["labels"] = chart.labels;
@@ -206,14 +219,14 @@ void Report::chart(const Chart& chart) {
   if (lying) names_axis["ticks"] = {{"autoSkip", false}};
   const Json values_axis = axis(chart.y_label, chart.logarithmic_y ? "logarithmic" : nullptr);
   const Json config = {
-      {"type", bars ? "bar" : chart.kind == Chart::Kind::kScatter ? "scatter" : "line"},
+      {"type", bars                                  ? "bar"
+               : chart.kind == Chart::Kind::kScatter ? "scatter"
+                                                     : "line"},
       {"data", data},
       {"options",
        {{"animation", false},
         {"maintainAspectRatio", false},
-        {"plugins",
-         {{"title", {{"display", true}, {"text", chart.title}}},
-          {"legend", {{"display", names > 1}}}}},
+        {"plugins", {{"title", {{"display", true}, {"text", chart.title}}}, {"legend", {{"display", names > 1}}}}},
         {"indexAxis", lying ? "y" : "x"},
         {"scales", {{lying ? "y" : "x", names_axis}, {lying ? "x" : "y", values_axis}}}}}};
   const std::string id = "chart" + std::to_string(charts_++);
@@ -222,8 +235,8 @@ void Report::chart(const Chart& chart) {
     const auto rows = chart.labels.size() * std::max<std::size_t>(1, chart.series.size());
     height = " style=\"height:" + std::to_string(7 + rows * 9 / 10) + "rem\"";
   }
-  body_ += "<div class=\"chart\"" + height + "><canvas id=\"" + id + "\" role=\"img\" aria-label=\"" + escaped(chart.title) +
-           "\"></canvas></div>\n";
+  body_ += "<div class=\"chart\"" + height + "><canvas id=\"" + id + "\" role=\"img\" aria-label=\"" +
+           escaped(chart.title) + "\"></canvas></div>\n";
   script_ += "new Chart(document.getElementById('" + id + "')," + script_json(config) + ");\n";
 }
 
@@ -244,19 +257,21 @@ void Report::picture(const Image& image, const std::string& caption) {
 }
 
 std::string Report::html() const {
-  std::string page = "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
-                     "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
-                     escaped(title_) + "</title>\n<style>" + kStyle + "</style></head><body>\n<h1>" +
-                     escaped(title_) + "</h1>\n" + first_ + body_;
+  std::string page =
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
+      escaped(title_) + "</title>\n<style>" + kStyle + "</style></head><body>\n<h1>" + escaped(title_) + "</h1>\n" +
+      first_ + body_;
   for (auto tag = open_.rbegin(); tag != open_.rend(); ++tag) page += *tag;
   if (!script_.empty()) {
     page += "<script>";
     page += report_assets::kChartJs;
-    page += "</script>\n<script>\n"
-            "Chart.defaults.plugins.legend.labels.filter = (item) => item.text !== '';\n"
-            "if (matchMedia('(prefers-color-scheme: dark)').matches) {\n"
-            "  Chart.defaults.color = '#b8c0c8'; Chart.defaults.borderColor = '#ffffff22';\n}\n" +
-            script_ + "</script>\n";
+    page +=
+        "</script>\n<script>\n"
+        "Chart.defaults.plugins.legend.labels.filter = (item) => item.text !== '';\n"
+        "if (matchMedia('(prefers-color-scheme: dark)').matches) {\n"
+        "  Chart.defaults.color = '#b8c0c8'; Chart.defaults.borderColor = '#ffffff22';\n}\n" +
+        script_ + "</script>\n";
   }
   return page + "</body></html>\n";
 }

@@ -17,10 +17,10 @@ constexpr int kMaxDepth = 100;
 constexpr std::uint64_t kMaxNodes = 100'000;
 
 struct Node {
-  std::vector<std::size_t> below;                 // nodes inside it
-  std::vector<std::string_view> instances;        // names of nodes it instances
+  std::vector<std::size_t> below;           // nodes inside it
+  std::vector<std::string_view> instances;  // names of nodes it instances
   enum class State { kNew, kOpen, kDone } state = State::kNew;
-  std::uint64_t unfolded = 0;                     // nodes it stands for, itself included
+  std::uint64_t unfolded = 0;  // nodes it stands for, itself included
 };
 
 struct Scene {
@@ -76,8 +76,7 @@ bool is_index_list(std::string_view content) {
 }
 
 /// A whole number of at most nine digits; an absent one is `fallback`, anything else is nothing.
-std::optional<std::uint64_t> count_of(const XmlTag& tag, std::string_view key,
-                                      std::uint64_t fallback) {
+std::optional<std::uint64_t> count_of(const XmlTag& tag, std::string_view key, std::uint64_t fallback) {
   const std::string_view text = tag.attribute(key);
   if (text.empty()) return fallback;
   std::uint64_t value = 0;
@@ -124,10 +123,9 @@ std::string accessor_danger(std::string_view text) {
     const auto array = values_of.find(accessor.source);
     if (array == values_of.end() && !accessor.of_mesh) continue;  // names, not numbers
     const std::uint64_t values = array == values_of.end() ? 0 : array->second;
-    const std::uint64_t needed =
-        accessor.count == 0 ? 0
-                            : accessor.offset + (accessor.count - 1) * accessor.stride +
-                                  std::max(accessor.stride, accessor.params);
+    const std::uint64_t needed = accessor.count == 0 ? 0
+                                                     : accessor.offset + (accessor.count - 1) * accessor.stride +
+                                                           std::max(accessor.stride, accessor.params);
     if (needed > values) {
       return "an <accessor> reaches " + std::to_string(needed) + " values into <float_array> '" +
              std::string(accessor.source) + "' of " + std::to_string(values);

@@ -10,15 +10,14 @@ namespace bodyschema {
 
 struct ForwardKinematics::Impl {
   std::shared_ptr<const RobotModel> model;
-  std::vector<TreeNode> nodes;      // the needed part of the tree, parents first, parent renumbered
-  std::vector<KDL::Frame> X_WN;     // pose of each node at the last compute
-  std::vector<int> node_of_link;    // by position in the constructor's list
-  std::vector<int> node_of_joint;   // by joint, -1 where not needed
+  std::vector<TreeNode> nodes;           // the needed part of the tree, parents first, parent renumbered
+  std::vector<KDL::Frame> X_WN;          // pose of each node at the last compute
+  std::vector<int> node_of_link;         // by position in the constructor's list
+  std::vector<int> node_of_joint;        // by joint, -1 where not needed
   std::vector<std::vector<bool>> moves;  // [joint][link]
 };
 
-ForwardKinematics::ForwardKinematics(std::shared_ptr<const RobotModel> model,
-                                     std::vector<std::string> links)
+ForwardKinematics::ForwardKinematics(std::shared_ptr<const RobotModel> model, std::vector<std::string> links)
     : impl_(std::make_unique<Impl>()) {
   const KinematicTree& tree = model->impl().tree;
   const auto joint_count = static_cast<std::size_t>(model->joint_count());
@@ -35,8 +34,7 @@ ForwardKinematics::ForwardKinematics(std::shared_ptr<const RobotModel> model,
   for (std::size_t l = 0; l < links.size(); ++l) {
     const auto at = tree.node_of_link.find(links[l]);
     if (at == tree.node_of_link.end()) {
-      throw ConfigurationError("robot '" + model->name() + "' has no link '" + links[l] +
-                               "'; did you mean '" +
+      throw ConfigurationError("robot '" + model->name() + "' has no link '" + links[l] + "'; did you mean '" +
                                nearest_name(links[l], model->link_names()) + "'?");
     }
     targets.push_back(at->second);
@@ -82,8 +80,7 @@ void ForwardKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q, std:
   for (std::size_t n = 0; n < impl_->nodes.size(); ++n) {
     const TreeNode& node = impl_->nodes[n];
     const KDL::Frame X_PN = node.segment.pose(node.joint_value(q));
-    impl_->X_WN[n] =
-        node.parent < 0 ? X_PN : impl_->X_WN[static_cast<std::size_t>(node.parent)] * X_PN;
+    impl_->X_WN[n] = node.parent < 0 ? X_PN : impl_->X_WN[static_cast<std::size_t>(node.parent)] * X_PN;
   }
   for (std::size_t l = 0; l < X_WB.size(); ++l) {
     const KDL::Frame& X = impl_->X_WN[static_cast<std::size_t>(impl_->node_of_link[l])];
@@ -97,8 +94,7 @@ ForwardKinematics::Axis ForwardKinematics::joint_axis(Eigen::Index joint) const 
   const int n = impl_->node_of_joint[static_cast<std::size_t>(joint)];
   if (n < 0) return {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   const TreeNode& node = impl_->nodes[static_cast<std::size_t>(n)];
-  const KDL::Frame X_WP = node.parent < 0 ? KDL::Frame::Identity()
-                                          : impl_->X_WN[static_cast<std::size_t>(node.parent)];
+  const KDL::Frame X_WP = node.parent < 0 ? KDL::Frame::Identity() : impl_->X_WN[static_cast<std::size_t>(node.parent)];
   return {to_eigen(X_WP.M * node.segment.getJoint().JointAxis()),
           to_eigen(X_WP * node.segment.getJoint().JointOrigin())};
 }

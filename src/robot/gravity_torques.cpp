@@ -16,8 +16,7 @@ struct GravityTorques::Impl {
   Eigen::VectorXd torque_Nm;
 };
 
-GravityTorques::GravityTorques(std::shared_ptr<const RobotModel> model)
-    : impl_(std::make_unique<Impl>()) {
+GravityTorques::GravityTorques(std::shared_ptr<const RobotModel> model) : impl_(std::make_unique<Impl>()) {
   impl_->nodes = model->impl().tree.nodes;
   impl_->X_WN.resize(impl_->nodes.size());
   impl_->mass_kg.resize(impl_->nodes.size());

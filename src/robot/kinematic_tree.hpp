@@ -46,7 +46,9 @@ struct RobotModel::Impl {
   bool has_masses = false;
 };
 
-inline Eigen::Vector3d to_eigen(const KDL::Vector& v) { return {v.x(), v.y(), v.z()}; }
+inline Eigen::Vector3d to_eigen(const KDL::Vector& v) {
+  return {v.x(), v.y(), v.z()};
+}
 inline Eigen::Matrix3d to_eigen(const KDL::Rotation& R) {
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(R.data);
 }

@@ -30,9 +30,7 @@ constexpr int kMaxNodeDepth = 256;
 class SingleFile : public Assimp::DefaultIOSystem {
  public:
   explicit SingleFile(std::string file) : file_(std::move(file)) {}
-  bool Exists(const char* path) const override {
-    return file_ == path && DefaultIOSystem::Exists(path);
-  }
+  bool Exists(const char* path) const override { return file_ == path && DefaultIOSystem::Exists(path); }
   Assimp::IOStream* Open(const char* path, const char* mode) override {
     return file_ == path ? DefaultIOSystem::Open(path, mode) : nullptr;
   }
@@ -47,23 +45,20 @@ struct PlacedNode {
   int depth;
 };
 
-void append(const aiMesh& source, const aiMatrix4x4& X_FN, const fs::path& file,
-            TriangleMesh& mesh) {
+void append(const aiMesh& source, const aiMatrix4x4& X_FN, const fs::path& file, TriangleMesh& mesh) {
   const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
   for (unsigned i = 0; i < source.mNumVertices; ++i) {
     const aiVector3D p = X_FN * source.mVertices[i];
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
       throw FileError(file.string() + ": vertex " + std::to_string(i) + " is not finite");
     }
-    mesh.vertices.emplace_back(static_cast<float>(p.x), static_cast<float>(p.y),
-                               static_cast<float>(p.z));
+    mesh.vertices.emplace_back(static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z));
   }
   const bool mirrored = X_FN.Determinant() < 0;
   for (unsigned f = 0; f < source.mNumFaces; ++f) {
     const aiFace& face = source.mFaces[f];
     if (face.mNumIndices != 3) continue;
-    std::array<std::uint32_t, 3> t{first + face.mIndices[0], first + face.mIndices[1],
-                                   first + face.mIndices[2]};
+    std::array<std::uint32_t, 3> t{first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]};
     if (mirrored) std::swap(t[1], t[2]);
     mesh.triangles.push_back(t);
   }
@@ -76,8 +71,7 @@ TriangleMesh read_mesh_file(const fs::path& file) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension != ".dae" && extension != ".stl" && extension != ".obj") {
-    throw FileError(file.string() + ": mesh format '" + extension +
-                    "', expected .dae, .stl or .obj");
+    throw FileError(file.string() + ": mesh format '" + extension + "', expected .dae, .stl or .obj");
   }
   std::error_code error;
   const auto size = fs::file_size(file, error);
@@ -122,8 +116,7 @@ TriangleMesh read_mesh_file(const fs::path& file) {
     for (unsigned i = 0; i < at.node->mNumMeshes; ++i) {
       const aiMesh& part = *scene->mMeshes[at.node->mMeshes[i]];
       if (part.mNumFaces > budget || part.mNumVertices > 3 * kMaxTriangles) {
-        throw FileError(file.string() + ": more than " + std::to_string(kMaxTriangles) +
-                        " triangles");
+        throw FileError(file.string() + ": more than " + std::to_string(kMaxTriangles) + " triangles");
       }
       budget -= part.mNumFaces;
       append(part, at.X_FN, file, mesh);

@@ -41,8 +41,8 @@ Eigen::Vector3d vertex(const TriangleMesh& mesh, std::uint32_t t, int corner) {
 }
 
 /// Whether a ray crosses the triangle (Moeller and Trumbore).
-bool crosses(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-             const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+bool crosses(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, const Eigen::Vector3d& a,
+             const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d ab = b - a, ac = c - a, p = direction.cross(ac);
   const double det = ab.dot(p);
   if (std::abs(det) < 1e-30) return false;
@@ -70,8 +70,8 @@ void weld(TriangleMesh& mesh, double tolerance_m) {
     const int dx = step(g.x()), dy = step(g.y()), dz = step(g.z());
     std::uint32_t found = UINT32_MAX;
     for (int corner = 0; corner < 8 && found == UINT32_MAX; ++corner) {
-      const auto at = grid.find({home.x + (corner & 1 ? dx : 0), home.y + (corner & 2 ? dy : 0),
-                                 home.z + (corner & 4 ? dz : 0)});
+      const auto at =
+          grid.find({home.x + (corner & 1 ? dx : 0), home.y + (corner & 2 ? dy : 0), home.z + (corner & 4 ? dz : 0)});
       if (at == grid.end()) continue;
       for (const std::uint32_t candidate : at->second) {
         if ((kept[candidate].cast<double>() - p).squaredNorm() <= tolerance2) {
@@ -200,21 +200,18 @@ MeshReport check_and_orient(TriangleMesh& mesh) {
     const Eigen::Vector3d about = vertex(mesh, members[id].front(), 0);
     double volume6 = 0.0;
     for (const std::uint32_t t : members[id]) {
-      volume6 += (vertex(mesh, t, 0) - about)
-                     .dot((vertex(mesh, t, 1) - about).cross(vertex(mesh, t, 2) - about));
+      volume6 += (vertex(mesh, t, 0) - about).dot((vertex(mesh, t, 1) - about).cross(vertex(mesh, t, 2) - about));
     }
     if (volume6 < 0.0) inside_out.push_back(id);
   }
   for (const std::uint32_t id : inside_out) {
     const std::uint32_t first = members[id].front();
-    const Eigen::Vector3d origin =
-        (vertex(mesh, first, 0) + vertex(mesh, first, 1) + vertex(mesh, first, 2)) / 3.0;
+    const Eigen::Vector3d origin = (vertex(mesh, first, 0) + vertex(mesh, first, 1) + vertex(mesh, first, 2)) / 3.0;
     const Eigen::Vector3d direction(0.5257311, 0.8131234, 0.2497853);  // along no model axis
     bool enclosed = false;
     for (std::uint32_t t = 0; t < count; ++t) {
       if (component[t] == id || open[component[t]] != 0) continue;
-      enclosed ^= crosses(origin, direction, vertex(mesh, t, 0), vertex(mesh, t, 1),
-                          vertex(mesh, t, 2));
+      enclosed ^= crosses(origin, direction, vertex(mesh, t, 0), vertex(mesh, t, 1), vertex(mesh, t, 2));
     }
     if (enclosed) continue;
     ++report.turned_components;
@@ -232,12 +229,11 @@ std::string MeshReport::text() const {
     return std::to_string(n) + " of " + std::to_string(components) + " components";
   };
   if (boundary_edges != 0) {
-    add("not closed: " + std::to_string(boundary_edges) + " boundary edges in " +
-        of_all(open_components) + ", its silhouette depends on face_culling");
+    add("not closed: " + std::to_string(boundary_edges) + " boundary edges in " + of_all(open_components) +
+        ", its silhouette depends on face_culling");
   }
   if (turned_triangles != 0) {
-    add("winding repaired: " + std::to_string(turned_triangles) +
-        " triangles were wound against their neighbours");
+    add("winding repaired: " + std::to_string(turned_triangles) + " triangles were wound against their neighbours");
   }
   if (turned_components != 0) {
     add("winding repaired: " + of_all(turned_components) + " were inside out");

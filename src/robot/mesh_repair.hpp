@@ -12,10 +12,10 @@ namespace bodyschema {
 struct MeshReport {
   std::size_t components = 0;
   std::size_t open_components = 0;
-  std::size_t boundary_edges = 0;       ///< edges with an odd number of triangles
-  std::size_t turned_triangles = 0;     ///< wound against their neighbours; turned round
-  std::size_t turned_components = 0;    ///< closed but inside out; turned round
-  std::size_t twisted_components = 0;   ///< no winding agrees everywhere (Moebius); left alone
+  std::size_t boundary_edges = 0;      ///< edges with an odd number of triangles
+  std::size_t turned_triangles = 0;    ///< wound against their neighbours; turned round
+  std::size_t turned_components = 0;   ///< closed but inside out; turned round
+  std::size_t twisted_components = 0;  ///< no winding agrees everywhere (Moebius); left alone
 
   [[nodiscard]] bool closed() const { return boundary_edges == 0; }
   [[nodiscard]] bool consistent_winding() const { return twisted_components == 0; }

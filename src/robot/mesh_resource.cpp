@@ -30,8 +30,8 @@ bool drop_prefix(std::string& text, const std::string& prefix) {
 
 }  // namespace
 
-fs::path resolve_mesh(const std::string& filename, const std::string& where,
-                      const fs::path& urdf_directory, const std::vector<fs::path>& search_roots) {
+fs::path resolve_mesh(const std::string& filename, const std::string& where, const fs::path& urdf_directory,
+                      const std::vector<fs::path>& search_roots) {
   std::vector<fs::path> roots;
   for (const auto& root : search_roots) roots.push_back(real(root));
   std::vector<fs::path> bases = roots;
@@ -44,8 +44,7 @@ fs::path resolve_mesh(const std::string& filename, const std::string& where,
     bases.insert(bases.begin(), roots.front());
   }
   if (package && bases.empty()) {
-    throw FileError(where + ": mesh '" + filename +
-                    "' needs an entry in mesh_search_roots: the folder that holds '" +
+    throw FileError(where + ": mesh '" + filename + "' needs an entry in mesh_search_roots: the folder that holds '" +
                     rest.substr(0, rest.find('/')) + "/'");
   }
 
@@ -53,8 +52,7 @@ fs::path resolve_mesh(const std::string& filename, const std::string& where,
   bool escaped = false;
   for (const auto& base : bases) {
     const fs::path candidate = real(base / rest);  // an absolute `rest` replaces base
-    if (std::none_of(roots.begin(), roots.end(),
-                     [&](const fs::path& root) { return lies_in(candidate, root); })) {
+    if (std::none_of(roots.begin(), roots.end(), [&](const fs::path& root) { return lies_in(candidate, root); })) {
       escaped = true;
       continue;
     }
@@ -63,8 +61,7 @@ fs::path resolve_mesh(const std::string& filename, const std::string& where,
     tried += (tried.empty() ? "" : ", ") + candidate.string();
   }
   if (tried.empty() && escaped) {
-    throw FileError(where + ": mesh '" + filename +
-                    "' leads outside the URDF's folder and mesh_search_roots");
+    throw FileError(where + ": mesh '" + filename + "' leads outside the URDF's folder and mesh_search_roots");
   }
   throw FileError(where + ": mesh '" + filename + "' not found; tried " + tried);
 }

@@ -18,8 +18,7 @@ TriangleMesh lathe(const std::vector<Eigen::Vector2d>& profile, double bottom_z,
     for (std::uint32_t s = 0; s < kSegments; ++s) {
       const double angle = 2.0 * kPi * s / kSegments;
       mesh.vertices.push_back(
-          Eigen::Vector3d(ring.x() * std::cos(angle), ring.x() * std::sin(angle), ring.y())
-              .cast<float>());
+          Eigen::Vector3d(ring.x() * std::cos(angle), ring.x() * std::sin(angle), ring.y()).cast<float>());
     }
   }
   const auto bottom = static_cast<std::uint32_t>(mesh.vertices.size());
@@ -45,8 +44,7 @@ TriangleMesh lathe(const std::vector<Eigen::Vector2d>& profile, double bottom_z,
 TriangleMesh box_mesh(const Eigen::Vector3d& size_m) {
   TriangleMesh mesh;
   for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d sign(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5,
-                               corner & 4 ? 0.5 : -0.5);
+    const Eigen::Vector3d sign(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5, corner & 4 ? 0.5 : -0.5);
     mesh.vertices.push_back(sign.cwiseProduct(size_m).cast<float>());
   }
   mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},

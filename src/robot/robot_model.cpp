@@ -19,7 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-KDL::Vector to_kdl(const urdf::Vector3& v) { return {v.x, v.y, v.z}; }
+KDL::Vector to_kdl(const urdf::Vector3& v) {
+  return {v.x, v.y, v.z};
+}
 KDL::Frame to_kdl(const urdf::Pose& X) {
   const auto& r = X.rotation;
   return {KDL::Rotation::Quaternion(r.x, r.y, r.z, r.w), to_kdl(X.position)};
@@ -44,8 +46,7 @@ KDL::RigidBodyInertia inertia_of(const urdf::Link& link) {
   // The URDF gives the tensor in a frame at the centre of mass; KDL wants it in the link frame.
   return to_kdl(in.origin) *
          KDL::RigidBodyInertia(in.mass, KDL::Vector::Zero(),
-                               KDL::RotationalInertia(in.ixx, in.iyy, in.izz, in.ixy, in.ixz,
-                                                      in.iyz));
+                               KDL::RotationalInertia(in.ixx, in.iyy, in.izz, in.ixy, in.ixz, in.iyz));
 }
 
 /// The joint with its axis in the parent link's frame, as KDL wants it, and the link it carries.
@@ -55,8 +56,7 @@ KDL::Segment segment_of(const urdf::Link& link) {
   KDL::Joint kdl_joint(joint.name, KDL::Joint::Fixed);
   if (is_movable(joint)) {
     kdl_joint = KDL::Joint(joint.name, X_PJ.p, X_PJ.M * to_kdl(joint.axis),
-                           joint.type == urdf::Joint::PRISMATIC ? KDL::Joint::TransAxis
-                                                                : KDL::Joint::RotAxis);
+                           joint.type == urdf::Joint::PRISMATIC ? KDL::Joint::TransAxis : KDL::Joint::RotAxis);
   }
   return KDL::Segment(link.name, kdl_joint, X_PJ, inertia_of(link));
 }
@@ -69,8 +69,7 @@ struct Mimic {
 
 /// Follows a chain of mimic joints to the one that is driven:
 /// q = m1 (m2 q_driver + o2) + o1.
-Mimic resolve_mimic(const urdf::ModelInterface& model, const urdf::Joint& joint,
-                    const std::string& file) {
+Mimic resolve_mimic(const urdf::ModelInterface& model, const urdf::Joint& joint, const std::string& file) {
   Mimic result{joint.name, 1.0, 0.0};
   std::set<std::string> seen;
   for (const urdf::Joint* at = &joint; at->mimic;) {
@@ -82,12 +81,11 @@ Mimic resolve_mimic(const urdf::ModelInterface& model, const urdf::Joint& joint,
     if (found == model.joints_.end()) {
       std::vector<std::string> names;
       for (const auto& [name, unused] : model.joints_) names.push_back(name);
-      throw FileError(file + ": joint '" + at->name + "' mimics unknown joint '" + next +
-                      "'; did you mean '" + nearest_name(next, names) + "'?");
+      throw FileError(file + ": joint '" + at->name + "' mimics unknown joint '" + next + "'; did you mean '" +
+                      nearest_name(next, names) + "'?");
     }
     if (!is_movable(*found->second)) {
-      throw FileError(file + ": joint '" + at->name + "' mimics '" + next +
-                      "', which does not move");
+      throw FileError(file + ": joint '" + at->name + "' mimics '" + next + "', which does not move");
     }
     result.offset += result.multiplier * at->mimic->offset;
     result.multiplier *= at->mimic->multiplier;
@@ -108,8 +106,7 @@ void build_tree(const UrdfTree& urdf_tree, const std::string& file, RobotModel::
       node.segment = segment_of(*link);
       node.parent = tree.node_of_link.at(link->getParent()->name);
     } else {
-      node.segment = KDL::Segment(link->name, KDL::Joint(KDL::Joint::Fixed),
-                                  KDL::Frame::Identity(), inertia_of(*link));
+      node.segment = KDL::Segment(link->name, KDL::Joint(KDL::Joint::Fixed), KDL::Frame::Identity(), inertia_of(*link));
     }
     tree.node_of_link.emplace(link->name, index);
     tree.nodes.push_back(std::move(node));
@@ -117,8 +114,7 @@ void build_tree(const UrdfTree& urdf_tree, const std::string& file, RobotModel::
     if (!link->parent_joint) continue;
     const urdf::Joint& joint = *link->parent_joint;
     if (joint.type == urdf::Joint::FLOATING || joint.type == urdf::Joint::PLANAR) {
-      impl.warnings.push_back("joint '" + joint.name +
-                              "' is floating or planar and is taken as fixed");
+      impl.warnings.push_back("joint '" + joint.name + "' is floating or planar and is taken as fixed");
     }
     if (!is_movable(joint) || joint.mimic) continue;
     JointInfo info;
@@ -173,8 +169,8 @@ bool all_positive(std::initializer_list<double> values) {
   return true;
 }
 
-TriangleMesh visual_mesh(const urdf::Visual& visual, const std::string& where,
-                         const fs::path& urdf_directory, const RobotModelOptions& options) {
+TriangleMesh visual_mesh(const urdf::Visual& visual, const std::string& where, const fs::path& urdf_directory,
+                         const RobotModelOptions& options) {
   if (!visual.geometry) throw FileError(where + ": a visual has no geometry");
   TriangleMesh mesh;
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();
@@ -183,11 +179,9 @@ TriangleMesh visual_mesh(const urdf::Visual& visual, const std::string& where,
       const auto& shape = static_cast<const urdf::Mesh&>(*visual.geometry);
       scale = {shape.scale.x, shape.scale.y, shape.scale.z};
       if (!scale.allFinite() || scale.cwiseAbs().minCoeff() < 1e-12) {
-        throw FileError(where + ": mesh '" + shape.filename +
-                        "': scale must be finite and not zero");
+        throw FileError(where + ": mesh '" + shape.filename + "': scale must be finite and not zero");
       }
-      mesh = read_mesh_file(resolve_mesh(shape.filename, where, urdf_directory,
-                                         options.mesh_search_roots));
+      mesh = read_mesh_file(resolve_mesh(shape.filename, where, urdf_directory, options.mesh_search_roots));
       break;
     }
     case urdf::Geometry::BOX: {
@@ -223,8 +217,8 @@ TriangleMesh visual_mesh(const urdf::Visual& visual, const std::string& where,
 }
 
 /// `budget`: triangles that all links to come may have together.
-LinkMesh link_mesh(const urdf::Link& link, const fs::path& file, const RobotModelOptions& options,
-                   std::size_t& budget, std::vector<std::string>& warnings) {
+LinkMesh link_mesh(const urdf::Link& link, const fs::path& file, const RobotModelOptions& options, std::size_t& budget,
+                   std::vector<std::string>& warnings) {
   const std::string where = file.string() + ": link '" + link.name + "'";
   if (link.visual_array.empty()) {
     throw FileError(where + " is to be rendered but has no visual");
@@ -251,8 +245,7 @@ LinkMesh link_mesh(const urdf::Link& link, const fs::path& file, const RobotMode
       warnings.push_back("link '" + link.name + "', mesh '" + part.name + "': " + text);
     }
     const auto first = static_cast<std::uint32_t>(result.mesh.vertices.size());
-    result.mesh.vertices.insert(result.mesh.vertices.end(), part.vertices.begin(),
-                                part.vertices.end());
+    result.mesh.vertices.insert(result.mesh.vertices.end(), part.vertices.begin(), part.vertices.end());
     for (const auto& t : part.triangles) {
       result.mesh.triangles.push_back({first + t[0], first + t[1], first + t[2]});
     }
@@ -279,9 +272,8 @@ std::shared_ptr<const RobotModel> RobotModel::load(const RobotModelOptions& opti
   for (const std::string& name : options.rendered_links) {
     const auto link = urdf_tree.model->getLink(name);
     if (!link) {
-      throw FileError(options.urdf.string() + ": no link '" + name +
-                      "' to render; did you mean '" + nearest_name(name, robot->link_names()) +
-                      "'?");
+      throw FileError(options.urdf.string() + ": no link '" + name + "' to render; did you mean '" +
+                      nearest_name(name, robot->link_names()) + "'?");
     }
     if (!rendered.insert(name).second) {
       throw FileError(options.urdf.string() + ": link '" + name + "' is to be rendered twice");
@@ -291,8 +283,12 @@ std::shared_ptr<const RobotModel> RobotModel::load(const RobotModelOptions& opti
   return robot;
 }
 
-const std::string& RobotModel::name() const { return impl_->name; }
-std::span<const JointInfo> RobotModel::joints() const { return impl_->joints; }
+const std::string& RobotModel::name() const {
+  return impl_->name;
+}
+std::span<const JointInfo> RobotModel::joints() const {
+  return impl_->joints;
+}
 Eigen::Index RobotModel::joint_count() const {
   return static_cast<Eigen::Index>(impl_->joints.size());
 }
@@ -307,8 +303,8 @@ Eigen::Index RobotModel::joint_index(const std::string& name) const {
   if (const auto index = find_joint(name)) return *index;
   std::vector<std::string> names;
   for (const auto& joint : impl_->joints) names.push_back(joint.name);
-  throw ConfigurationError("robot '" + impl_->name + "' has no joint '" + name +
-                           "' that can be set; did you mean '" + nearest_name(name, names) + "'?");
+  throw ConfigurationError("robot '" + impl_->name + "' has no joint '" + name + "' that can be set; did you mean '" +
+                           nearest_name(name, names) + "'?");
 }
 
 bool RobotModel::has_link(const std::string& name) const {
@@ -321,9 +317,17 @@ std::vector<std::string> RobotModel::link_names() const {
   return names;
 }
 
-const std::string& RobotModel::root_link() const { return impl_->root_link; }
-std::span<const LinkMesh> RobotModel::meshes() const { return impl_->meshes; }
-std::span<const std::string> RobotModel::warnings() const { return impl_->warnings; }
-bool RobotModel::has_masses() const { return impl_->has_masses; }
+const std::string& RobotModel::root_link() const {
+  return impl_->root_link;
+}
+std::span<const LinkMesh> RobotModel::meshes() const {
+  return impl_->meshes;
+}
+std::span<const std::string> RobotModel::warnings() const {
+  return impl_->warnings;
+}
+bool RobotModel::has_masses() const {
+  return impl_->has_masses;
+}
 
 }  // namespace bodyschema

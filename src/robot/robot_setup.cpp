@@ -9,11 +9,11 @@
 namespace bodyschema {
 namespace {
 
-void require(bool known, const std::string& key, const std::string& name,
-             const std::string& robot, const std::vector<std::string>& candidates) {
+void require(bool known, const std::string& key, const std::string& name, const std::string& robot,
+             const std::vector<std::string>& candidates) {
   if (known) return;
-  throw ConfigurationError("robot." + key + ": '" + name + "' is not in robot '" + robot +
-                           "'; did you mean '" + nearest_name(name, candidates) + "'?");
+  throw ConfigurationError("robot." + key + ": '" + name + "' is not in robot '" + robot + "'; did you mean '" +
+                           nearest_name(name, candidates) + "'?");
 }
 
 }  // namespace
@@ -25,9 +25,8 @@ RobotSetup RobotSetup::from(const Configuration& robot) {
     setup.model.mesh_search_roots = robot.paths("mesh_search_roots");
   }
   setup.model.rendered_links = robot.texts("rendered_links");
-  setup.culling = robot.choice_or("face_culling", "none", {"none", "back"}) == "back"
-                      ? FaceCulling::kBack
-                      : FaceCulling::kNone;
+  setup.culling =
+      robot.choice_or("face_culling", "none", {"none", "back"}) == "back" ? FaceCulling::kBack : FaceCulling::kNone;
   setup.hand_link = robot.text("hand_link");
   setup.fingertip_links = robot.texts_or("fingertip_links", {});
   setup.estimated_joints = robot.texts("estimated_joints");

@@ -75,8 +75,7 @@ bool finite(const urdf::Vector3& v) {
 }
 bool finite(const urdf::Pose& pose) {
   const auto& r = pose.rotation;
-  return finite(pose.position) && std::isfinite(r.x) && std::isfinite(r.y) &&
-         std::isfinite(r.z) && std::isfinite(r.w);
+  return finite(pose.position) && std::isfinite(r.x) && std::isfinite(r.y) && std::isfinite(r.z) && std::isfinite(r.w);
 }
 
 void check_joint(const fs::path& file, const urdf::Joint& joint) {
@@ -84,8 +83,7 @@ void check_joint(const fs::path& file, const urdf::Joint& joint) {
     throw FileError(file.string() + ": joint '" + joint.name + "': " + what);
   };
   if (!finite(joint.parent_to_joint_origin_transform)) fail("origin is not a finite number");
-  const bool movable = joint.type == urdf::Joint::REVOLUTE ||
-                       joint.type == urdf::Joint::CONTINUOUS ||
+  const bool movable = joint.type == urdf::Joint::REVOLUTE || joint.type == urdf::Joint::CONTINUOUS ||
                        joint.type == urdf::Joint::PRISMATIC;
   if (movable) {
     if (!finite(joint.axis)) fail("axis is not a finite number");
@@ -94,12 +92,10 @@ void check_joint(const fs::path& file, const urdf::Joint& joint) {
   }
   if (joint.limits && !(joint.limits->lower <= joint.limits->upper)) {
     std::ostringstream text;
-    text << "limits [" << joint.limits->lower << ", " << joint.limits->upper
-         << "], expected lower <= upper";
+    text << "limits [" << joint.limits->lower << ", " << joint.limits->upper << "], expected lower <= upper";
     fail(text.str());
   }
-  if (joint.mimic && !(std::isfinite(joint.mimic->multiplier) &&
-                       std::isfinite(joint.mimic->offset))) {
+  if (joint.mimic && !(std::isfinite(joint.mimic->multiplier) && std::isfinite(joint.mimic->offset))) {
     fail("mimic multiplier or offset is not a finite number");
   }
 }
@@ -140,9 +136,8 @@ void check_tree(const fs::path& file, std::string_view text) {
     if (!child.empty()) {
       const auto [at, fresh] = above.emplace(child, Above{joint, parent});
       if (!fresh) {
-        throw FileError(file.string() + ": link '" + child + "' is the child of joints '" +
-                        at->second.joint + "' and '" + joint +
-                        "'; a URDF must be a tree without cycles");
+        throw FileError(file.string() + ": link '" + child + "' is the child of joints '" + at->second.joint +
+                        "' and '" + joint + "'; a URDF must be a tree without cycles");
       }
     }
     parent.clear();

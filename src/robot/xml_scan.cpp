@@ -8,9 +8,15 @@ namespace {
 
 constexpr std::string_view kSpace = " \t\r\n";
 
-bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool begins_name(char c) { return is_letter(c) || c == '_' || static_cast<unsigned char>(c) >= 0x80; }
+bool is_letter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+}
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+bool begins_name(char c) {
+  return is_letter(c) || c == '_' || static_cast<unsigned char>(c) >= 0x80;
+}
 
 std::string_view without_blanks(std::string_view text) {
   text.remove_prefix(std::min(text.find_first_not_of(kSpace), text.size()));
@@ -52,8 +58,8 @@ std::string swallowed_markup(std::string_view text) {
       const bool hexadecimal = text.substr(i + 2).starts_with('x');
       const std::size_t first = i + (hexadecimal ? 3 : 2);
       std::size_t end = first;
-      while (end < text.size() && (hexadecimal ? std::isxdigit(static_cast<unsigned char>(text[end])) != 0
-                                               : is_digit(text[end]))) {
+      while (end < text.size() &&
+             (hexadecimal ? std::isxdigit(static_cast<unsigned char>(text[end])) != 0 : is_digit(text[end]))) {
         ++end;
       }
       if (end == first || !text.substr(end).starts_with(';')) {

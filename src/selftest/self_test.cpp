@@ -45,8 +45,7 @@ double seconds_since(Clock::time_point begin) {
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0.0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
   return values[values.size() / 2];
 }
 
@@ -58,8 +57,7 @@ class SelfTest {
   CheckLevel run() {
     check("version", [this] { return versions(); });
     const bool have_files = check("files", [this] { return files(); }) != CheckLevel::kFail;
-    const bool have_robot =
-        have_files && check("robot", [this] { return robot(); }) != CheckLevel::kFail;
+    const bool have_robot = have_files && check("robot", [this] { return robot(); }) != CheckLevel::kFail;
     check("opengl", [this] { return opengl(); });
     check("engine", [this] { return engine(); });
     if (have_robot) check("reach", [this] { return reach(); });
@@ -88,12 +86,10 @@ class SelfTest {
   Finding versions() const {
     utsname system{};
     uname(&system);
-    return {
-        CheckLevel::kOk,
-        fmt::format("bodyschema {}, LCM {}.{}.{}, Eigen {}.{}.{}, {} {} on {} with {} processors",
-                    options_.version, LCM_MAJOR_VERSION, LCM_MINOR_VERSION, LCM_MICRO_VERSION,
-                    EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION, system.sysname,
-                    system.release, system.machine, std::thread::hardware_concurrency())};
+    return {CheckLevel::kOk, fmt::format("bodyschema {}, LCM {}.{}.{}, Eigen {}.{}.{}, {} {} on {} with {} processors",
+                                         options_.version, LCM_MAJOR_VERSION, LCM_MINOR_VERSION, LCM_MICRO_VERSION,
+                                         EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION, system.sysname,
+                                         system.release, system.machine, std::thread::hardware_concurrency())};
   }
 
   static Finding files() {
@@ -101,39 +97,34 @@ class SelfTest {
     std::error_code ignored;
     if (!std::filesystem::exists(directory / "config", ignored) ||
         !std::filesystem::exists(directory / "meshes", ignored)) {
-      return {CheckLevel::kFail, fmt::format("configurations and robots are not {}; install the "
-                                             "package again, or set BODYSCHEMA_SHARE "
-                                             "to the folder that holds config/ and meshes/",
-                                             directory.empty() ? "installed beside this program"
-                                                               : "in " + directory.string())};
+      return {CheckLevel::kFail,
+              fmt::format("configurations and robots are not {}; install the "
+                          "package again, or set BODYSCHEMA_SHARE "
+                          "to the folder that holds config/ and meshes/",
+                          directory.empty() ? "installed beside this program" : "in " + directory.string())};
     }
     return {CheckLevel::kOk, "configurations and robots are read from " + directory.string()};
   }
 
   Finding robot() {
-    configuration_ = std::make_unique<Configuration>(
-        Configuration::load(data_directory() / options_.reach_config));
+    configuration_ = std::make_unique<Configuration>(Configuration::load(data_directory() / options_.reach_config));
     const auto setup = RobotSetup::from(configuration_->section("robot"));
     const auto model = setup.load();
     std::size_t triangles = 0;
-    for (const auto& part : model->meshes())
-      triangles += part.mesh.triangles.size();
+    for (const auto& part : model->meshes()) triangles += part.mesh.triangles.size();
     if (!model->warnings().empty()) return {CheckLevel::kWarn, model->warnings().front()};
     return {CheckLevel::kOk,
-            fmt::format("{}: {} joints, {} parts with {} triangles, from {}", model->name(),
-                        model->joints().size(), model->meshes().size(), triangles,
-                        setup.model.urdf.lexically_normal().string())};
+            fmt::format("{}: {} joints, {} parts with {} triangles, from {}", model->name(), model->joints().size(),
+                        model->meshes().size(), triangles, setup.model.urdf.lexically_normal().string())};
   }
 
   static Finding opengl() {
     try {
       const auto context = gl::Context::create("auto");
       return {CheckLevel::kOk,
-              context->description() +
-                  (context->is_software() ? ", drawn by the processor" : ", drawn by the GPU")};
+              context->description() + (context->is_software() ? ", drawn by the processor" : ", drawn by the GPU")};
     } catch (const gl::ContextError& e) {
-      return {CheckLevel::kWarn,
-              std::string("none, silhouettes are computed without it: ") + e.what()};
+      return {CheckLevel::kWarn, std::string("none, silhouettes are computed without it: ") + e.what()};
     }
   }
 
@@ -163,8 +154,7 @@ class SelfTest {
     for (std::size_t k = 0; k < joints.size(); ++k) {
       plan.offsets_deg[joints[k]] = kHiddenOffsets_deg[k % kHiddenOffsets_deg.size()];
     }
-    simulator::Simulator simulator(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(),
-                                   settings, plan);
+    simulator::Simulator simulator(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(), settings, plan);
 
     ProgressBar bar("reach", static_cast<std::uint64_t>(simulator.frame_count()));
     std::vector<JointSample> history;
@@ -181,8 +171,8 @@ class SelfTest {
       frame_ms.push_back(pipeline.segmentation_ms() + estimate.times.total_ms);
     }
     if (after_mm.size() < kLastFrames) {
-      return {CheckLevel::kFail, fmt::format("only {} of {} frames gave an estimate",
-                                             after_mm.size(), options_.frames)};
+      return {CheckLevel::kFail,
+              fmt::format("only {} of {} frames gave an estimate", after_mm.size(), options_.frames)};
     }
     const std::vector<double> last(after_mm.end() - kLastFrames, after_mm.end());
     const double before = median(before_mm);
@@ -193,12 +183,10 @@ class SelfTest {
         "after correction; {:.0f} ms a frame, {:.1f} s in all",
         before, after, per_frame, seconds_since(begin));
     if (!(after < kBound_mm)) {
-      return {CheckLevel::kFail,
-              fmt::format("{}; at most {:.0f} mm was expected", found, kBound_mm)};
+      return {CheckLevel::kFail, fmt::format("{}; at most {:.0f} mm was expected", found, kBound_mm)};
     }
     if (per_frame > kCameraPeriod_ms) {
-      return {CheckLevel::kWarn,
-              found + "; cameras of 30 Hz are too fast for this machine, frames will be left out"};
+      return {CheckLevel::kWarn, found + "; cameras of 30 Hz are too fast for this machine, frames will be left out"};
     }
     return {CheckLevel::kOk, found};
   }
@@ -207,18 +195,16 @@ class SelfTest {
     const Configuration configuration = Configuration::load(find_data_file(options_.own_config));
     Pipeline pipeline(configuration);
     configuration.reject_unknown_keys();
-    return {CheckLevel::kOk,
-            fmt::format("{}: robot {}, offsets of {} joints, {} cameras",
-                        options_.own_config.string(), pipeline.robot().name(),
-                        pipeline.setup().estimated_joints.size(), pipeline.rig().cameras.size())};
+    return {CheckLevel::kOk, fmt::format("{}: robot {}, offsets of {} joints, {} cameras", options_.own_config.string(),
+                                         pipeline.robot().name(), pipeline.setup().estimated_joints.size(),
+                                         pipeline.rig().cameras.size())};
   }
 
   Finding network() const {
     const auto complaints = check_network(options_.lcm_url);
     if (complaints.empty()) {
       return {CheckLevel::kOk,
-              fmt::format("{}: there is a route, and room for pictures in the receive buffer",
-                          options_.lcm_url)};
+              fmt::format("{}: there is a route, and room for pictures in the receive buffer", options_.lcm_url)};
     }
     return {CheckLevel::kWarn, fmt::format("{}", fmt::join(complaints, "; "))};
   }
@@ -231,8 +217,7 @@ class SelfTest {
     constexpr const char* kChannel = "BODYSCHEMA_SELFTEST";
     int good = 0;
     std::vector<std::uint8_t> message(kStereoPair_bytes);
-    for (std::size_t i = 0; i < message.size(); ++i)
-      message[i] = static_cast<std::uint8_t>(i * 2654435761u >> 24);
+    for (std::size_t i = 0; i < message.size(); ++i) message[i] = static_cast<std::uint8_t>(i * 2654435761u >> 24);
     link.subscribe(kChannel, kLoopbackMessages, [&](const std::string&, Bytes bytes, std::int64_t) {
       good += std::equal(bytes.begin(), bytes.end(), message.begin(), message.end()) ? 1 : 0;
     });
@@ -241,23 +226,18 @@ class SelfTest {
       const int had = good;
       const auto sent = Clock::now();
       link.publish(kChannel, 0, message);
-      while (good == had && seconds_since(sent) < 0.1)
-        link.handle(10);
+      while (good == had && seconds_since(sent) < 0.1) link.handle(10);
       if (good > had) worst_ms = std::max(worst_ms, 1e3 * seconds_since(sent));
     }
-    const std::string came_back = fmt::format("{} of {} messages of {} KiB came back", good,
-                                              kLoopbackMessages, kStereoPair_bytes / 1024);
-    if (good == 0)
-      return {CheckLevel::kFail,
-              came_back + "; does a firewall stop UDP multicast on this machine?"};
+    const std::string came_back =
+        fmt::format("{} of {} messages of {} KiB came back", good, kLoopbackMessages, kStereoPair_bytes / 1024);
+    if (good == 0) return {CheckLevel::kFail, came_back + "; does a firewall stop UDP multicast on this machine?"};
     if (good < kLoopbackMessages) {
-      return {CheckLevel::kWarn,
-              came_back +
-                  "; the receive buffer is too small or the machine too busy; as root: "
-                  "sysctl -w net.core.rmem_max=8388608"};
+      return {CheckLevel::kWarn, came_back +
+                                     "; the receive buffer is too small or the machine too busy; as root: "
+                                     "sysctl -w net.core.rmem_max=8388608"};
     }
-    return {CheckLevel::kOk,
-            fmt::format("{}, each within {:.0f} ms", came_back, std::max(1.0, worst_ms))};
+    return {CheckLevel::kOk, fmt::format("{}, each within {:.0f} ms", came_back, std::max(1.0, worst_ms))};
   }
 
   const SelfTestOptions& options_;
@@ -270,18 +250,14 @@ class SelfTest {
 
 const char* to_string(CheckLevel level) {
   switch (level) {
-    case CheckLevel::kOk:
-      return "OK";
-    case CheckLevel::kWarn:
-      return "WARN";
-    case CheckLevel::kFail:
-      return "FAIL";
+    case CheckLevel::kOk: return "OK";
+    case CheckLevel::kWarn: return "WARN";
+    case CheckLevel::kFail: return "FAIL";
   }
   return "FAIL";
 }
 
-CheckLevel run_self_test(const SelfTestOptions& options,
-                         const std::function<void(const CheckResult&)>& report) {
+CheckLevel run_self_test(const SelfTestOptions& options, const std::function<void(const CheckResult&)>& report) {
   return SelfTest(options, report).run();
 }
 

@@ -115,10 +115,8 @@ void try_to_create(const std::filesystem::path& file) {
 /// Everything that belongs to one load of the configuration. Takes in messages once its receiver is started.
 struct Session {
   Session(std::unique_ptr<Pipeline> loaded, const std::string& lcm_url, Recorder* recorder)
-      : pipeline(std::move(loaded)),
-        queue(static_cast<std::size_t>(pipeline->bus().queue_frames)),
-        link(lcm_url, pipeline->bus().one_source_silence_s),
-        receiver(link, pipeline->make_stream(), queue, recorder),
+      : pipeline(std::move(loaded)), queue(static_cast<std::size_t>(pipeline->bus().queue_frames)),
+        link(lcm_url, pipeline->bus().one_source_silence_s), receiver(link, pipeline->make_stream(), queue, recorder),
         picture_since_us(pipeline->rig().cameras.size(), -1) {}
 
   std::unique_ptr<Pipeline> pipeline;
@@ -140,9 +138,7 @@ struct Session {
 class Daemon {
  public:
   Daemon(const std::function<Configuration()>& load_configuration, const DaemonOptions& options)
-      : load_configuration_(load_configuration),
-        options_(options),
-        lcm_url_(with_receive_buffer(options.lcm_url)),
+      : load_configuration_(load_configuration), options_(options), lcm_url_(with_receive_buffer(options.lcm_url)),
         all_stages_(options.timings ? kTimingsWindow : 1) {}
   /// After an error: what loads must not outlive what it loads from.
   ~Daemon() {
@@ -162,8 +158,8 @@ class Daemon {
       spdlog::info("live page: {}", page_->url());
     }
     start_session(std::move(pipeline));
-    spdlog::info("waiting for encoders and pictures on {} and {} ({})",
-                 channels().joint_state, channels().cameras, options_.lcm_url);
+    spdlog::info("waiting for encoders and pictures on {} and {} ({})", channels().joint_state, channels().cameras,
+                 options_.lcm_url);
     {
       const std::jthread reporter([this](const std::stop_token& stop) { report_every_second(stop); });
       loop(signals);
@@ -178,8 +174,8 @@ class Daemon {
     finish_files();
     const auto facts = received();
     spdlog::info("stopped after {} estimates; {} pictures came in, {} were dropped, {} frames shed, {} left",
-                 progress_.estimated, facts.bus.synchroniser.images,
-                 facts.bus.synchroniser.total_dropped(), progress_.shed, progress_.left);
+                 progress_.estimated, facts.bus.synchroniser.images, facts.bus.synchroniser.total_dropped(),
+                 progress_.shed, progress_.left);
     if (options_.timings) std::fputs(all_stages_.table().c_str(), stdout);
     if (loading()) {  // which cannot be broken off: all else is done, so the process ends under it
       spdlog::default_logger()->flush();
@@ -257,9 +253,14 @@ class Daemon {
 
   [[nodiscard]] Identity identity() const {
     const Pipeline& pipeline = *session_->pipeline;
-    return {options_.version, engine_, pipeline.model_hash(), pipeline.configuration_hash(),
-            channels().cameras, channels().joint_state,
-            static_cast<int>(pipeline.options().filter.particles), pipeline.rig().cameras.size()};
+    return {options_.version,
+            engine_,
+            pipeline.model_hash(),
+            pipeline.configuration_hash(),
+            channels().cameras,
+            channels().joint_state,
+            static_cast<int>(pipeline.options().filter.particles),
+            pipeline.rig().cameras.size()};
   }
 
   static std::vector<std::string> camera_names(const Pipeline& pipeline) {
@@ -337,10 +338,14 @@ class Daemon {
 
     const StageTimes& t = estimate.times;
     const double latency_ms = ms_between(arrived.arrival_us, published);
-    const StageDurations::Frame stages = {
-        ms_between(arrived.arrival_us, begin), pipeline.segmentation_ms(), t.kinematics_ms, t.scoring_ms,
-        t.filter_ms, t.refinement_ms,
-        ms_between(begin, published) - pipeline.segmentation_ms() - t.total_ms, latency_ms};
+    const StageDurations::Frame stages = {ms_between(arrived.arrival_us, begin),
+                                          pipeline.segmentation_ms(),
+                                          t.kinematics_ms,
+                                          t.scoring_ms,
+                                          t.filter_ms,
+                                          t.refinement_ms,
+                                          ms_between(begin, published) - pipeline.segmentation_ms() - t.total_ms,
+                                          latency_ms};
     if (options_.timings) all_stages_.add(stages);
     const std::lock_guard lock(progress_mutex_);
     progress_.estimate = estimate;
@@ -386,8 +391,11 @@ class Daemon {
     Estimator& estimator = session_->pipeline->estimator();
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
       if (!observation.cameras[c]) continue;
-      pictures.push_back({c, {}, estimator.predicted_silhouette(observation, c, false),
-                          estimator.predicted_silhouette(observation, c, true), is_frozen(progress_.cameras[c])});
+      pictures.push_back({c,
+                          {},
+                          estimator.predicted_silhouette(observation, c, false),
+                          estimator.predicted_silhouette(observation, c, true),
+                          is_frozen(progress_.cameras[c])});
       pictures.back().image = std::move(observation.cameras[c]->image);
     }
     page_->set_pictures(std::move(pictures));
@@ -487,8 +495,8 @@ class Daemon {
     auto next = std::chrono::steady_clock::now() + kStatusPeriod;
     int reports = 0;
     while (!stop.stop_requested()) {
-      std::this_thread::sleep_for(std::min<std::chrono::steady_clock::duration>(
-          kPoll, next - std::chrono::steady_clock::now()));
+      std::this_thread::sleep_for(
+          std::min<std::chrono::steady_clock::duration>(kPoll, next - std::chrono::steady_clock::now()));
       if (std::chrono::steady_clock::now() < next) continue;
       // After a pause of the whole process one report is due, not one for each second missed.
       next = std::max(next + kStatusPeriod, std::chrono::steady_clock::now());
@@ -523,8 +531,8 @@ class Daemon {
     notifier_.status(std::string(to_string(level)) + ": " + status.sentence);
     if (level != logged_level_) {
       logged_level_ = level;
-      spdlog::log(level == HealthLevel::kOk ? spdlog::level::info : spdlog::level::warn, "{}: {}",
-                  to_string(level), status.sentence);
+      spdlog::log(level == HealthLevel::kOk ? spdlog::level::info : spdlog::level::warn, "{}: {}", to_string(level),
+                  status.sentence);
     }
   }
 

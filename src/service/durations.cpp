@@ -27,12 +27,11 @@ void StageDurations::add(const Frame& frame_ms) {
 }
 
 std::string StageDurations::table() const {
-  std::string text = fmt::format("{:<14} {:>10} {:>10} {:>10}   over {} frames\n", "stage, ms",
-                                 "median", "p99", "max", stages_.front().size());
+  std::string text = fmt::format("{:<14} {:>10} {:>10} {:>10}   over {} frames\n", "stage, ms", "median", "p99", "max",
+                                 stages_.front().size());
   for (std::size_t i = 0; i < stages_.size(); ++i) {
-    text += fmt::format("{:<14} {:>10.2f} {:>10.2f} {:>10.2f}\n", kNames[i],
-                        stages_[i].quantile_ms(0.5), stages_[i].quantile_ms(0.99),
-                        stages_[i].quantile_ms(1.0));
+    text += fmt::format("{:<14} {:>10.2f} {:>10.2f} {:>10.2f}\n", kNames[i], stages_[i].quantile_ms(0.5),
+                        stages_[i].quantile_ms(0.99), stages_[i].quantile_ms(1.0));
   }
   return text;
 }

@@ -19,7 +19,7 @@ constexpr double kDark = 4.0;                // mean brightness below: no light
 constexpr double kLateEncoders_ms = 60.0;
 
 std::string age(double ms) {
-  return ms < 10'000.0 ? fmt::format("{:.1f} s", 1e-3 * ms)
+  return ms < 10'000.0    ? fmt::format("{:.1f} s", 1e-3 * ms)
          : ms < 120'000.0 ? fmt::format("{:.0f} s", 1e-3 * ms)
                           : fmt::format("{:.0f} min", ms / 60'000.0);
 }
@@ -104,8 +104,9 @@ std::optional<std::string> dropped(const HealthFacts& f) {
     case DropReason::kOverload: return pictures + "they come faster than they are worked on";
     case DropReason::kOutOfOrder:
     case DropReason::kDuplicate:
-      return fmt::format("{} pictures came twice or out of order in the last second: is there a second publisher on {}?",
-                         *most, f.cameras_channel);
+      return fmt::format(
+          "{} pictures came twice or out of order in the last second: is there a second publisher on {}?", *most,
+          f.cameras_channel);
   }
   return std::nullopt;
 }
@@ -138,8 +139,9 @@ std::optional<std::string> error(const HealthFacts& f) {
                        f.estimate.stalled_joint, degrees(f.estimate.stalled_motion_rad));
   }
   if (f.estimate.cameras_swapped) {
-    return std::string("the left and right pictures are swapped: each shows what the other eye sees; nothing is learned "
-                       "from them");
+    return std::string(
+        "the left and right pictures are swapped: each shows what the other eye sees; nothing is learned "
+        "from them");
   }
   if (f.estimate.state == EstimatorState::kDiverged) {
     return fmt::format("diverged: the best prediction does not fit the pictures (likelihood {:.2f}); searching again",
@@ -176,9 +178,10 @@ std::string turned_away(const HealthFacts& f) {
     turned_rad = std::max(turned_rad, camera.background_turned_rad);
   }
   if (turned_rad <= 0.0) return "";
-  return fmt::format("the head has turned by {:.1f} deg from where the background was learned, masks are wrong: set "
-                     "vision.method: statistics",
-                     degrees(turned_rad));
+  return fmt::format(
+      "the head has turned by {:.1f} deg from where the background was learned, masks are wrong: set "
+      "vision.method: statistics",
+      degrees(turned_rad));
 }
 
 std::optional<std::string> warning(const HealthFacts& f) {

@@ -73,14 +73,10 @@ double age_s(std::int64_t now_us, std::int64_t then_us) {
 }
 
 Json to_json(const Moment& m, std::int64_t now_us) {
-  return {{"sequence", m.sequence},
-          {"age_s", age_s(now_us, m.at_us)},
-          {"state", m.state},
-          {"offset_deg", m.offset_deg},
-          {"sd_deg", m.sd_deg},
-          {"contour_rms_px", m.contour_rms_px},
-          {"likelihood", m.likelihood},
-          {"hand_sd_mm", m.hand_sd_mm}};
+  return {{"sequence", m.sequence},     {"age_s", age_s(now_us, m.at_us)},
+          {"state", m.state},           {"offset_deg", m.offset_deg},
+          {"sd_deg", m.sd_deg},         {"contour_rms_px", m.contour_rms_px},
+          {"likelihood", m.likelihood}, {"hand_sd_mm", m.hand_sd_mm}};
 }
 
 Json to_json(const offsets_status_t& status) {
@@ -172,7 +168,9 @@ struct LivePage::Impl {
     }
     Json& pictures = json["cameras"] = Json::array();
     for (const Shown& camera : now_shown.cameras) {
-      pictures.push_back({{"name", camera.name}, {"sequence", camera.sequence}, {"age_s", age_s(now, camera.at_us)},
+      pictures.push_back({{"name", camera.name},
+                          {"sequence", camera.sequence},
+                          {"age_s", age_s(now, camera.at_us)},
                           {"frozen", camera.picture && camera.picture->frozen}});
     }
     json["status_age_s"] = age_s(now, now_shown.status_us);
@@ -207,8 +205,12 @@ LivePage::LivePage(int port, std::vector<std::string> camera_names) : impl_(std:
 
 LivePage::~LivePage() = default;
 
-int LivePage::port() const { return impl_->server->port(); }
-std::string LivePage::url() const { return "http://localhost:" + std::to_string(port()) + "/"; }
+int LivePage::port() const {
+  return impl_->server->port();
+}
+std::string LivePage::url() const {
+  return "http://localhost:" + std::to_string(port()) + "/";
+}
 
 void LivePage::start_anew(std::vector<std::string> camera_names) {
   const std::lock_guard lock(impl_->mutex);
@@ -277,12 +279,18 @@ LivePage::LivePage(int, std::vector<std::string>) {
   throw DeviceError("this program was built without the live page (Chart.js was missing)");
 }
 LivePage::~LivePage() = default;
-int LivePage::port() const { return 0; }
-std::string LivePage::url() const { return {}; }
+int LivePage::port() const {
+  return 0;
+}
+std::string LivePage::url() const {
+  return {};
+}
 void LivePage::start_anew(std::vector<std::string>) {}
 void LivePage::add(const Estimate&) {}
 void LivePage::set_status(const offsets_status_t&) {}
-bool LivePage::wants_pictures(bool) const { return false; }
+bool LivePage::wants_pictures(bool) const {
+  return false;
+}
 void LivePage::set_pictures(std::vector<CameraPicture>) {}
 
 }  // namespace bodyschema

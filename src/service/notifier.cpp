@@ -21,8 +21,8 @@ std::string environment(const char* name) {
 }  // namespace
 
 Notifier::Notifier() : address_(environment("NOTIFY_SOCKET")) {
-  const bool usable = (address_.starts_with('/') || address_.starts_with('@')) &&
-                      address_.size() < sizeof(sockaddr_un::sun_path);
+  const bool usable =
+      (address_.starts_with('/') || address_.starts_with('@')) && address_.size() < sizeof(sockaddr_un::sun_path);
   if (!usable) return;
   socket_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const std::string pid = environment("WATCHDOG_PID");
@@ -43,13 +43,14 @@ void Notifier::send(const std::string& text) const {
   if (address_.front() == '@') to.sun_path[0] = '\0';  // a name in the abstract name space
   const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + address_.size());
   // A manager that does not listen must not stop the robot: whatever goes wrong here is ignored.
-  while (sendto(socket_, text.data(), text.size(), MSG_NOSIGNAL,
-                reinterpret_cast<const sockaddr*>(&to), length) < 0 &&
+  while (sendto(socket_, text.data(), text.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&to), length) < 0 &&
          errno == EINTR) {
   }
 }
 
-void Notifier::ready() { send("READY=1"); }
+void Notifier::ready() {
+  send("READY=1");
+}
 
 void Notifier::status(const std::string& sentence) {
   if (sentence == last_status_) return;
@@ -57,9 +58,13 @@ void Notifier::status(const std::string& sentence) {
   send("STATUS=" + sentence);
 }
 
-void Notifier::reloading() { send("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(monotonic_us())); }
+void Notifier::reloading() {
+  send("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(monotonic_us()));
+}
 
-void Notifier::stopping() { send("STOPPING=1\nSTATUS=stopping"); }
+void Notifier::stopping() {
+  send("STOPPING=1\nSTATUS=stopping");
+}
 
 void Notifier::alive() {
   if (watchdog_us_ <= 0) return;

@@ -26,7 +26,7 @@ constexpr std::size_t kHeadBytes = 8192;
 constexpr std::int64_t kHeadTime_us = 2'000'000;
 constexpr std::int64_t kAnswerTime_us = 10'000'000;
 constexpr std::int64_t kNoDescriptors_us = 200'000;  // between two attempts when the process has none left
-constexpr int kNice = 19;  // the least important, whatever the service itself was given
+constexpr int kNice = 19;                            // the least important, whatever the service itself was given
 
 /// The page's own files and this origin's answers, nothing else; no other site may show or read them.
 constexpr std::string_view kHeaders =
@@ -116,8 +116,7 @@ PageServer::Descriptor& PageServer::Descriptor::operator=(Descriptor&& other) no
 }
 
 PageServer::PageServer(int port, Handler handler)
-    : handler_(std::move(handler)),
-      listener_(socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)),
+    : handler_(std::move(handler)), listener_(socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)),
       stop_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   const int yes = 1;
   setsockopt(listener_.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
@@ -129,8 +128,7 @@ PageServer::PageServer(int port, Handler handler)
   if (bind(listener_.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0 ||
       listen(listener_.get(), kConnections) != 0 ||
       getsockname(listener_.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0) {
-    throw DeviceError("the live page cannot have port " + std::to_string(port) +
-                      " on localhost; is it in use?");
+    throw DeviceError("the live page cannot have port " + std::to_string(port) + " on localhost; is it in use?");
   }
   port_ = ntohs(address.sin_port);
   connections_.reserve(kConnections);
@@ -149,8 +147,7 @@ void PageServer::serve() {
     const std::int64_t now = monotonic_us();
     const bool accepting = accept_again_us_ <= now;
     std::int64_t next_us = accepting ? now + kAnswerTime_us : accept_again_us_;
-    polled.assign({{stop_.get(), POLLIN, 0},
-                   {listener_.get(), static_cast<short>(accepting ? POLLIN : 0), 0}});
+    polled.assign({{stop_.get(), POLLIN, 0}, {listener_.get(), static_cast<short>(accepting ? POLLIN : 0), 0}});
     for (const Connection& c : connections_) {
       polled.push_back({c.socket.get(), static_cast<short>(c.answer.empty() ? POLLIN : POLLOUT), 0});
       next_us = std::min(next_us, c.until_us);

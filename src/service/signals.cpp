@@ -10,7 +10,9 @@ std::atomic<bool> stop{false};
 std::atomic<bool> reload{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "handlers may only touch lock-free flags");
 
-void handle(int signal) { (signal == SIGHUP ? reload : stop) = true; }
+void handle(int signal) {
+  (signal == SIGHUP ? reload : stop) = true;
+}
 }  // namespace
 
 Signals::Signals() {
@@ -29,7 +31,11 @@ Signals::~Signals() {
   for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &previous_[i], nullptr);
 }
 
-bool Signals::stop_requested() const { return stop; }
-bool Signals::take_reload_request() const { return reload.exchange(false); }
+bool Signals::stop_requested() const {
+  return stop;
+}
+bool Signals::take_reload_request() const {
+  return reload.exchange(false);
+}
 
 }  // namespace bodyschema

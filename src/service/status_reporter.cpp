@@ -45,8 +45,7 @@ void combine(BusStatistics& into, const BusStatistics& other, Operation op) {
   s.joint_messages = op(s.joint_messages, t.joint_messages);
   s.joint_messages_duplicate = op(s.joint_messages_duplicate, t.joint_messages_duplicate);
   s.joint_messages_out_of_order = op(s.joint_messages_out_of_order, t.joint_messages_out_of_order);
-  s.joint_messages_without_known_joint =
-      op(s.joint_messages_without_known_joint, t.joint_messages_without_known_joint);
+  s.joint_messages_without_known_joint = op(s.joint_messages_without_known_joint, t.joint_messages_without_known_joint);
   s.images = op(s.images, t.images);
   s.images_used = op(s.images_used, t.images_used);
   s.observations = op(s.observations, t.observations);
@@ -111,8 +110,7 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
   m.state = to_string(progress.estimate.state);
 
   const SynchroniserStatistics& s = bus.synchroniser;
-  const std::uint64_t lost_before_queue =
-      instants(s.total_dropped() + bus.images_malformed, identity_.camera_count);
+  const std::uint64_t lost_before_queue = instants(s.total_dropped() + bus.images_malformed, identity_.camera_count);
   m.frames_in = static_cast<std::int64_t>(s.observations + lost_before_queue);
   m.frames_estimated = static_cast<std::int64_t>(progress.estimated);
   m.frames_dropped = static_cast<std::int64_t>(progress.shed + progress.left + progress.failed + lost_before_queue);

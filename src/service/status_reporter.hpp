@@ -24,23 +24,23 @@ struct Progress {
   std::int64_t busy_since_us = -1;  ///< monotonic_us() when the present frame was begun; -1: idle
   std::int64_t last_estimate_us = -1;
   Estimate estimate;
-  std::vector<CameraFacts> cameras;               ///< ages are filled in by the reader ...
-  std::vector<std::int64_t> camera_seen_us;       ///< ... from these; -1: never
+  std::vector<CameraFacts> cameras;          ///< ages are filled in by the reader ...
+  std::vector<std::int64_t> camera_seen_us;  ///< ... from these; -1: never
   DurationHistogram latency;
   RecentDurations latency_last_second{256};
   StageDurations stages{300};
   std::string reload_failure;
   std::string engine_change;  ///< as in HealthFacts
   std::uint64_t publishing_failures = 0;
-  std::uint64_t failed = 0;        ///< frames that could not be worked on
-  std::string frame_failure;       ///< why, of the last
-  std::string estimates_failure;   ///< as in HealthFacts
+  std::uint64_t failed = 0;       ///< frames that could not be worked on
+  std::string frame_failure;      ///< why, of the last
+  std::string estimates_failure;  ///< as in HealthFacts
 };
 
 /// What does not change between two loads of a configuration.
 struct Identity {
   std::string version;
-  std::string engine;       ///< Estimator::engine_description()
+  std::string engine;  ///< Estimator::engine_description()
   std::string model_hash;
   std::string config_hash;
   std::string cameras_channel;

@@ -20,7 +20,7 @@ using contour::View;
 // Invocations of a workgroup of the compute pass: one vector of llvmpipe's, four warps of a GPU's.
 constexpr int kLocalSoftware = 8;
 constexpr int kLocalGpu = 128;
-constexpr int kSharedWords = 7168;   // 28 KiB of the 32 KiB every driver gives
+constexpr int kSharedWords = 7168;  // 28 KiB of the 32 KiB every driver gives
 constexpr int kMaxCameras = 32;
 
 // A GL buffer that grows and never shrinks.
@@ -37,21 +37,18 @@ class Buffer {
     gl_.BindBuffer(GL_SHADER_STORAGE_BUFFER, id_);
     if (bytes <= capacity_) return;
     capacity_ = bytes;
-    gl_.BufferData(GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(bytes), nullptr,
-                   GL_DYNAMIC_DRAW);
+    gl_.BufferData(GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(bytes), nullptr, GL_DYNAMIC_DRAW);
   }
   template <typename T>
   void write(std::span<const T> data) {
     reserve(std::max<std::size_t>(data.size_bytes(), 16));
     if (data.empty()) return;
-    gl_.BufferSubData(GL_SHADER_STORAGE_BUFFER, 0, static_cast<GLsizeiptr>(data.size_bytes()),
-                      data.data());
+    gl_.BufferSubData(GL_SHADER_STORAGE_BUFFER, 0, static_cast<GLsizeiptr>(data.size_bytes()), data.data());
   }
   template <typename T>
   void read(std::span<T> data) const {
     gl_.BindBuffer(GL_SHADER_STORAGE_BUFFER, id_);
-    gl_.GetBufferSubData(GL_SHADER_STORAGE_BUFFER, 0, static_cast<GLsizeiptr>(data.size_bytes()),
-                         data.data());
+    gl_.GetBufferSubData(GL_SHADER_STORAGE_BUFFER, 0, static_cast<GLsizeiptr>(data.size_bytes()), data.data());
   }
 
  private:
@@ -89,9 +86,7 @@ enum TextureUnit : GLuint { kAtlasUnit, kMasksUnit, kPlacementsUnit, kPlanesUnit
 // A buffer seen through a texture.
 class BufferTexture {
  public:
-  BufferTexture(const gl::Functions& gl, GLenum format) : gl_(gl), format_(format) {
-    gl_.GenTextures(1, &id_);
-  }
+  BufferTexture(const gl::Functions& gl, GLenum format) : gl_(gl), format_(format) { gl_.GenTextures(1, &id_); }
   ~BufferTexture() { gl_.DeleteTextures(1, &id_); }
   BufferTexture(const BufferTexture&) = delete;
   BufferTexture& operator=(const BufferTexture&) = delete;
@@ -215,13 +210,11 @@ class AtlasScorer final : public SilhouetteScorer {
  private:
   struct Objects {
     Objects(const gl::Functions& functions, bool software)
-        : gl(functions), placements(gl), windows(gl), jobs(gl), masks(gl), counts(gl), rendered(gl),
-          planes(gl), ends(gl), edge_ends(gl), vertices(gl), indices(gl),
-          masks_texture(gl, GL_RG32UI), placements_texture(gl, GL_RGBA32F),
-          planes_texture(gl, GL_RGBA32F), ends_texture(gl, GL_RGBA32F),
+        : gl(functions), placements(gl), windows(gl), jobs(gl), masks(gl), counts(gl), rendered(gl), planes(gl),
+          ends(gl), edge_ends(gl), vertices(gl), indices(gl), masks_texture(gl, GL_RG32UI),
+          placements_texture(gl, GL_RGBA32F), planes_texture(gl, GL_RGBA32F), ends_texture(gl, GL_RGBA32F),
           raster(gl, "atlas raster",
-                 {{GL_VERTEX_SHADER, atlas::kRasterVertex},
-                  {GL_FRAGMENT_SHADER, atlas::kRasterFragment}}),
+                 {{GL_VERTEX_SHADER, atlas::kRasterVertex}, {GL_FRAGMENT_SHADER, atlas::kRasterFragment}}),
           reduce(gl, "atlas reduce", {{GL_COMPUTE_SHADER, atlas::kReduce}}),
           contour(gl, "atlas contour", {{GL_COMPUTE_SHADER, contour_source(software)}}) {
       gl.GenVertexArrays(1, &vertex_array);
@@ -236,9 +229,8 @@ class AtlasScorer final : public SilhouetteScorer {
     Objects& operator=(const Objects&) = delete;
 
     static std::string contour_source(bool software) {
-      return "#version 430 core\n#define kLocal " +
-             std::to_string(software ? kLocalSoftware : kLocalGpu) + "\n#define kSharedWords " +
-             std::to_string(kSharedWords) + "\n" + atlas::kContour;
+      return "#version 430 core\n#define kLocal " + std::to_string(software ? kLocalSoftware : kLocalGpu) +
+             "\n#define kSharedWords " + std::to_string(kSharedWords) + "\n" + atlas::kContour;
     }
 
     const gl::Functions& gl;
@@ -269,8 +261,8 @@ class AtlasScorer final : public SilhouetteScorer {
       const int needed = std::max((camera.intrinsics.width + 31) / 32 * 32, camera.intrinsics.height);
       if (needed > max_side_) {
         throw gl::ContextError("a picture of " + std::to_string(camera.intrinsics.width) + "x" +
-                               std::to_string(camera.intrinsics.height) +
-                               " px exceeds the framebuffer limit of " + std::to_string(max_side_));
+                               std::to_string(camera.intrinsics.height) + " px exceeds the framebuffer limit of " +
+                               std::to_string(max_side_));
       }
     }
   }
@@ -358,8 +350,7 @@ class AtlasScorer final : public SilhouetteScorer {
     gl_->masks.write<MaskPair>(mask_words_);
     for (const gl::Program* program : {&gl_->reduce, &gl_->contour}) {
       program->use();
-      gl.Uniform2iv(program->uniform("cameras"), static_cast<GLsizei>(cameras_.size()),
-                    &layout[0].words_per_row);
+      gl.Uniform2iv(program->uniform("cameras"), static_cast<GLsizei>(cameras_.size()), &layout[0].words_per_row);
     }
     masks_changed_ = false;
   }
@@ -459,8 +450,13 @@ class AtlasScorer final : public SilhouetteScorer {
       const int strips = (tile.crop.width() + strip - 1) / strip;
       const int columns = ((tile.crop.width() + strips - 1) / strips + 3) / 4 * 4;
       for (int u = tile.crop.u_begin; u < tile.crop.u_end; u += columns) {
-        jobs_.push_back({static_cast<std::int32_t>(t), u, tile.crop.v_begin, camera,
-                         std::min(columns, tile.crop.u_end - u), tile.crop.height(), {0, 0}});
+        jobs_.push_back({static_cast<std::int32_t>(t),
+                         u,
+                         tile.crop.v_begin,
+                         camera,
+                         std::min(columns, tile.crop.u_end - u),
+                         tile.crop.height(),
+                         {0, 0}});
       }
     }
     if (!jobs_.empty()) {
@@ -516,9 +512,13 @@ class AtlasScorer final : public SilhouetteScorer {
       const auto place = static_cast<int>(i % per_pass);
       windows_[i] = {place % columns * width, place / columns * height, crop.u_begin, crop.v_begin};
       reduce_windows_[t] = windows_[i];
-      jobs_.push_back({static_cast<std::int32_t>(t), crop.u_begin, crop.v_begin,
-                       static_cast<std::int32_t>(tiles_[t].image % cameras_.size()), crop.width(),
-                       crop.height(), {0, 0}});
+      jobs_.push_back({static_cast<std::int32_t>(t),
+                       crop.u_begin,
+                       crop.v_begin,
+                       static_cast<std::int32_t>(tiles_[t].image % cameras_.size()),
+                       crop.width(),
+                       crop.height(),
+                       {0, 0}});
     }
     gl_->jobs.write<Job>(jobs_);
     gl_->jobs.bind(2);
@@ -541,8 +541,7 @@ class AtlasScorer final : public SilhouetteScorer {
       gl.Uniform1i(gl_->raster.uniform("parts"), static_cast<GLint>(parts));
       gl.Uniform1i(gl_->raster.uniform("first_tile"), static_cast<GLint>(first));
       gl.Uniform1f(gl_->raster.uniform("near_m"), kNearPlane_m);
-      gl.Uniform2f(gl_->raster.uniform("tile_size"), static_cast<float>(width),
-                   static_cast<float>(height));
+      gl.Uniform2f(gl_->raster.uniform("tile_size"), static_cast<float>(width), static_cast<float>(height));
       gl.Uniform2f(gl_->raster.uniform("atlas_size"), static_cast<float>(columns * width),
                    static_cast<float>(rows * height));
       gl.ClearColor(0.0f, 0.0f, 0.0f, 0.0f);
@@ -572,10 +571,9 @@ class AtlasScorer final : public SilhouetteScorer {
     } else {
       gl.Disable(GL_CULL_FACE);
     }
-    gl.DrawElementsInstanced(
-        GL_TRIANGLES, count, GL_UNSIGNED_INT,
-        reinterpret_cast<const void*>(static_cast<std::uintptr_t>(first) * sizeof(std::uint32_t)),
-        static_cast<GLsizei>(instances));
+    gl.DrawElementsInstanced(GL_TRIANGLES, count, GL_UNSIGNED_INT,
+                             reinterpret_cast<const void*>(static_cast<std::uintptr_t>(first) * sizeof(std::uint32_t)),
+                             static_cast<GLsizei>(instances));
   }
 
   // Grows the atlas by doubling, so that a wandering crop does not make a new one each frame.
@@ -654,8 +652,7 @@ class AtlasScorer final : public SilhouetteScorer {
 
 std::unique_ptr<SilhouetteScorer> make_atlas_scorer(const SilhouetteModel& model,
                                                     std::span<const PinholeIntrinsics> cameras,
-                                                    std::unique_ptr<gl::Context> context,
-                                                    const AtlasOptions& options) {
+                                                    std::unique_ptr<gl::Context> context, const AtlasOptions& options) {
   contour::check(model, cameras);
   return std::make_unique<AtlasScorer>(model, cameras, std::move(context), options);
 }

@@ -20,8 +20,8 @@ enum class AtlasPass {
 
 struct AtlasOptions {
   AtlasPass pass = AtlasPass::kCompute;
-  int max_side_px = 8192;   ///< of the framebuffer; less where the driver's limits are lower
-  int max_tiles = 4096;     ///< in flight at once; more particles take several passes
+  int max_side_px = 8192;  ///< of the framebuffer; less where the driver's limits are lower
+  int max_tiles = 4096;    ///< in flight at once; more particles take several passes
 };
 
 /// The GL engine: every particle and camera has a tile of one atlas, cropped to where the model can

@@ -36,11 +36,11 @@ struct alignas(32) EdgeEnds {
 struct EdgeRun {
   const BlockBounds* bounds = nullptr;  ///< ceil(block_count / 8) entries
   const EdgeBlock* blocks = nullptr;
-  const EdgeEnds* ends = nullptr;       ///< 8 per block
+  const EdgeEnds* ends = nullptr;  ///< 8 per block
   std::int32_t block_count = 0;
   std::int32_t edge_count = 0;
-  std::int32_t weight = 1;              ///< what a crossing of such an edge counts
-  bool always = false;                  ///< on the contour wherever the camera is (open edges)
+  std::int32_t weight = 1;  ///< what a crossing of such an edge counts
+  bool always = false;      ///< on the contour wherever the camera is (open edges)
 };
 
 /// Winding numbers in the making: deltas[row * stride + column] is the change of the winding number
@@ -62,7 +62,7 @@ struct PixelBounds {
 struct MaskWords {
   const std::uint64_t* observed = nullptr;  ///< already restricted to valid pixels
   const std::uint64_t* valid = nullptr;
-  std::uint64_t* rendered = nullptr;        ///< out, may be null
+  std::uint64_t* rendered = nullptr;  ///< out, may be null
   std::int32_t words_per_row = 0;
 };
 
@@ -79,8 +79,8 @@ struct Kernel {
   /// Projects contour edges with the 3x4 matrix P (row-major, centred part frame to homogeneous
   /// pixels) and adds their column crossings. `found` may be read and written up to the next
   /// multiple of eight. All points must lie in front of the camera.
-  void (*accumulate)(const EdgeRun& run, std::uint32_t* found, std::int32_t count,
-                     const float P[12], const DeltaImage& image, PixelBounds& bounds);
+  void (*accumulate)(const EdgeRun& run, std::uint32_t* found, std::int32_t count, const float P[12],
+                     const DeltaImage& image, PixelBounds& bounds);
 
   /// Sums deltas down the columns, turns winding numbers into bits, counts them and leaves the
   /// deltas zero.

@@ -18,17 +18,39 @@ namespace {
 struct Floats {
   __m256 v;
 };
-inline Floats load(const float* p) { return {_mm256_load_ps(p)}; }
-inline Floats splat(float x) { return {_mm256_set1_ps(x)}; }
-inline Floats operator+(Floats a, Floats b) { return {_mm256_add_ps(a.v, b.v)}; }
-inline Floats operator-(Floats a, Floats b) { return {_mm256_sub_ps(a.v, b.v)}; }
-inline Floats operator*(Floats a, Floats b) { return {_mm256_mul_ps(a.v, b.v)}; }
-inline Floats operator/(Floats a, Floats b) { return {_mm256_div_ps(a.v, b.v)}; }
-inline Floats fma(Floats a, Floats b, Floats c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
-inline Floats min(Floats a, Floats b) { return {_mm256_min_ps(a.v, b.v)}; }
-inline Floats max(Floats a, Floats b) { return {_mm256_max_ps(a.v, b.v)}; }
-inline Floats abs(Floats a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.v)}; }
-inline Floats ceil(Floats a) { return {_mm256_ceil_ps(a.v)}; }
+inline Floats load(const float* p) {
+  return {_mm256_load_ps(p)};
+}
+inline Floats splat(float x) {
+  return {_mm256_set1_ps(x)};
+}
+inline Floats operator+(Floats a, Floats b) {
+  return {_mm256_add_ps(a.v, b.v)};
+}
+inline Floats operator-(Floats a, Floats b) {
+  return {_mm256_sub_ps(a.v, b.v)};
+}
+inline Floats operator*(Floats a, Floats b) {
+  return {_mm256_mul_ps(a.v, b.v)};
+}
+inline Floats operator/(Floats a, Floats b) {
+  return {_mm256_div_ps(a.v, b.v)};
+}
+inline Floats fma(Floats a, Floats b, Floats c) {
+  return {_mm256_fmadd_ps(a.v, b.v, c.v)};
+}
+inline Floats min(Floats a, Floats b) {
+  return {_mm256_min_ps(a.v, b.v)};
+}
+inline Floats max(Floats a, Floats b) {
+  return {_mm256_max_ps(a.v, b.v)};
+}
+inline Floats abs(Floats a) {
+  return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.v)};
+}
+inline Floats ceil(Floats a) {
+  return {_mm256_ceil_ps(a.v)};
+}
 inline unsigned greater(Floats a, Floats b) {
   return static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(a.v, b.v, _CMP_GT_OQ)));
 }
@@ -41,20 +63,22 @@ inline void order(Floats& u0, Floats& v0, Floats& u1, Floats& v1) {
   v0.v = _mm256_blendv_ps(v, v1.v, swap);
   v1.v = _mm256_blendv_ps(v1.v, v, swap);
 }
-inline void store(float* p, Floats a) { _mm256_store_ps(p, a.v); }
+inline void store(float* p, Floats a) {
+  _mm256_store_ps(p, a.v);
+}
 // row * stride + column, for whole numbers.
 inline void store_offsets(std::int32_t* p, Floats row, std::int32_t stride, Floats column) {
   const __m256i begin = _mm256_mullo_epi32(_mm256_cvttps_epi32(row.v), _mm256_set1_epi32(stride));
-  _mm256_store_si256(reinterpret_cast<__m256i*>(p),
-                     _mm256_add_epi32(begin, _mm256_cvttps_epi32(column.v)));
+  _mm256_store_si256(reinterpret_cast<__m256i*>(p), _mm256_add_epi32(begin, _mm256_cvttps_epi32(column.v)));
 }
 // Lanes with the sign bit where the low bit of `found` differs from u0 > u1.
 inline Floats directions(const std::uint32_t* found, Floats u0, Floats u1) {
   const __m256i v = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(found));
-  return {_mm256_xor_ps(_mm256_castsi256_ps(_mm256_slli_epi32(v, 31)),
-                        _mm256_cmp_ps(u0.v, u1.v, _CMP_GT_OQ))};
+  return {_mm256_xor_ps(_mm256_castsi256_ps(_mm256_slli_epi32(v, 31)), _mm256_cmp_ps(u0.v, u1.v, _CMP_GT_OQ))};
 }
-inline unsigned signs(Floats a) { return static_cast<unsigned>(_mm256_movemask_ps(a.v)); }
+inline unsigned signs(Floats a) {
+  return static_cast<unsigned>(_mm256_movemask_ps(a.v));
+}
 // For every set of lanes, their numbers in a row, a byte each.
 struct LaneTable {
   std::uint64_t lanes[256];
@@ -72,11 +96,8 @@ constexpr LaneTable kLaneTable;
 struct Packing {
   __m256i order;
   explicit Packing(unsigned set)
-      : order(_mm256_cvtepu8_epi32(
-            _mm_cvtsi64_si128(static_cast<long long>(kLaneTable.lanes[set])))) {}
-  void store(float* p, Floats a) const {
-    _mm256_storeu_ps(p, _mm256_permutevar8x32_ps(a.v, order));
-  }
+      : order(_mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kLaneTable.lanes[set])))) {}
+  void store(float* p, Floats a) const { _mm256_storeu_ps(p, _mm256_permutevar8x32_ps(a.v, order)); }
   void store(std::uint32_t* p, __m256i a) const {
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(p), _mm256_permutevar8x32_epi32(a, order));
   }
@@ -85,17 +106,14 @@ struct Packing {
 inline void append(unsigned edges, unsigned left_front, std::uint32_t first, std::uint32_t*& out) {
   const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
   const __m256i front =
-      _mm256_and_si256(_mm256_srlv_epi32(_mm256_set1_epi32(static_cast<int>(left_front)), lane),
-                       _mm256_set1_epi32(1));
-  const __m256i number =
-      _mm256_add_epi32(lane, _mm256_set1_epi32(static_cast<int>(first)));
+      _mm256_and_si256(_mm256_srlv_epi32(_mm256_set1_epi32(static_cast<int>(left_front)), lane), _mm256_set1_epi32(1));
+  const __m256i number = _mm256_add_epi32(lane, _mm256_set1_epi32(static_cast<int>(first)));
   const __m256i entry = _mm256_or_si256(_mm256_slli_epi32(number, 1), front);
   Packing(edges).store(out, entry);
   out += __builtin_popcount(edges);
 }
 // Rows of eight edges (from, to, unused) to columns.
-inline void gather_ends(const EdgeEnds* ends, const std::uint32_t* found, Floats from[3],
-                        Floats to[3]) {
+inline void gather_ends(const EdgeEnds* ends, const std::uint32_t* found, Floats from[3], Floats to[3]) {
   __m256 r[8];
   for (int k = 0; k < 8; ++k) {
     r[k] = _mm256_load_ps(ends[found[k] >> 1].from);
@@ -125,12 +143,24 @@ inline Floats lanewise(Operation operation) {
   for (int k = 0; k < kLanes; ++k) r.v[k] = operation(k);
   return r;
 }
-inline Floats load(const float* p) { return lanewise([&](int k) { return p[k]; }); }
-inline Floats splat(float x) { return lanewise([&](int) { return x; }); }
-inline Floats operator+(Floats a, Floats b) { return lanewise([&](int k) { return a.v[k] + b.v[k]; }); }
-inline Floats operator-(Floats a, Floats b) { return lanewise([&](int k) { return a.v[k] - b.v[k]; }); }
-inline Floats operator*(Floats a, Floats b) { return lanewise([&](int k) { return a.v[k] * b.v[k]; }); }
-inline Floats operator/(Floats a, Floats b) { return lanewise([&](int k) { return a.v[k] / b.v[k]; }); }
+inline Floats load(const float* p) {
+  return lanewise([&](int k) { return p[k]; });
+}
+inline Floats splat(float x) {
+  return lanewise([&](int) { return x; });
+}
+inline Floats operator+(Floats a, Floats b) {
+  return lanewise([&](int k) { return a.v[k] + b.v[k]; });
+}
+inline Floats operator-(Floats a, Floats b) {
+  return lanewise([&](int k) { return a.v[k] - b.v[k]; });
+}
+inline Floats operator*(Floats a, Floats b) {
+  return lanewise([&](int k) { return a.v[k] * b.v[k]; });
+}
+inline Floats operator/(Floats a, Floats b) {
+  return lanewise([&](int k) { return a.v[k] / b.v[k]; });
+}
 inline Floats fma(Floats a, Floats b, Floats c) {
   return lanewise([&](int k) { return a.v[k] * b.v[k] + c.v[k]; });
 }
@@ -176,9 +206,7 @@ inline void store_offsets(std::int32_t* p, Floats row, std::int32_t stride, Floa
   }
 }
 inline Floats directions(const std::uint32_t* found, Floats u0, Floats u1) {
-  return lanewise([&](int k) {
-    return ((found[k] & 1u) != 0) != (u0.v[k] > u1.v[k]) ? -1.0f : 1.0f;
-  });
+  return lanewise([&](int k) { return ((found[k] & 1u) != 0) != (u0.v[k] > u1.v[k]) ? -1.0f : 1.0f; });
 }
 inline unsigned signs(Floats a) {
   unsigned bits = 0;
@@ -199,8 +227,7 @@ inline void append(unsigned edges, unsigned left_front, std::uint32_t first, std
     edges &= edges - 1;
   }
 }
-inline void gather_ends(const EdgeEnds* ends, const std::uint32_t* found, Floats from[3],
-                        Floats to[3]) {
+inline void gather_ends(const EdgeEnds* ends, const std::uint32_t* found, Floats from[3], Floats to[3]) {
   for (int k = 0; k < kLanes; ++k) {
     const EdgeEnds& edge = ends[found[k] >> 1];
     for (int axis = 0; axis < 3; ++axis) {
@@ -216,7 +243,9 @@ inline void gather_ends(const EdgeEnds* ends, const std::uint32_t* found, Floats
 struct Windings {
   __m256i a, b;
 };
-inline Windings zero_windings() { return {_mm256_setzero_si256(), _mm256_setzero_si256()}; }
+inline Windings zero_windings() {
+  return {_mm256_setzero_si256(), _mm256_setzero_si256()};
+}
 inline void add_and_clear(Windings& w, std::uint8_t* p) {
   auto* q = reinterpret_cast<__m256i*>(p);
   w.a = _mm256_add_epi8(w.a, _mm256_load_si256(q));
@@ -248,8 +277,7 @@ inline void add_and_clear(Windings& w, std::uint8_t* p) {
 inline std::uint64_t non_zero(const Windings& w) {
   std::uint64_t zeros = 0;
   for (int k = 0; k < 4; ++k) {
-    const auto bits = static_cast<unsigned>(
-        _mm_movemask_epi8(_mm_cmpeq_epi8(w.v[k], _mm_setzero_si128())));
+    const auto bits = static_cast<unsigned>(_mm_movemask_epi8(_mm_cmpeq_epi8(w.v[k], _mm_setzero_si128())));
     zeros |= static_cast<std::uint64_t>(bits) << (16 * k);
   }
   return ~zeros;
@@ -258,7 +286,9 @@ inline std::uint64_t non_zero(const Windings& w) {
 struct Windings {
   std::uint8_t v[64];
 };
-inline Windings zero_windings() { return {}; }
+inline Windings zero_windings() {
+  return {};
+}
 inline void add_and_clear(Windings& w, std::uint8_t* p) {
   for (int k = 0; k < 64; ++k) {
     w.v[k] = static_cast<std::uint8_t>(w.v[k] + p[k]);
@@ -272,8 +302,7 @@ inline std::uint64_t non_zero(const Windings& w) {
 }
 #endif
 
-inline Floats side(const float* nx, const float* ny, const float* nz, const float* d, Floats cx,
-                   Floats cy, Floats cz) {
+inline Floats side(const float* nx, const float* ny, const float* nz, const float* d, Floats cx, Floats cy, Floats cz) {
   return fma(load(nz), cz, fma(load(ny), cy, fma(load(nx), cx, splat(0.0f) - load(d))));
 }
 
@@ -285,11 +314,10 @@ std::int32_t find(const EdgeRun& run, const float c[3], std::uint32_t* out) {
   if (run.always) {
     for (std::int32_t b = 0; b < run.block_count; ++b) {
       const EdgeBlock& block = run.blocks[b];
-      const unsigned front = greater(
-          side(block.left_nx, block.left_ny, block.left_nz, block.left_d, cx, cy, cz), splat(0.0f));
+      const unsigned front =
+          greater(side(block.left_nx, block.left_ny, block.left_nz, block.left_d, cx, cy, cz), splat(0.0f));
       const std::int32_t left = run.edge_count - b * kLanes;
-      append(left >= kLanes ? 0xFFu : (1u << left) - 1u, front,
-             static_cast<std::uint32_t>(b * kLanes), out);
+      append(left >= kLanes ? 0xFFu : (1u << left) - 1u, front, static_cast<std::uint32_t>(b * kLanes), out);
     }
     return static_cast<std::int32_t>(out - begin);
   }
@@ -311,11 +339,10 @@ std::int32_t find(const EdgeRun& run, const float c[3], std::uint32_t* out) {
     for (const std::uint32_t* entry = open; entry != open_end; ++entry) {
       const std::uint32_t b = *entry >> 1;
       const EdgeBlock& block = run.blocks[b];
-      const unsigned left = greater(
-          side(block.left_nx, block.left_ny, block.left_nz, block.left_d, cx, cy, cz), splat(0.0f));
+      const unsigned left =
+          greater(side(block.left_nx, block.left_ny, block.left_nz, block.left_d, cx, cy, cz), splat(0.0f));
       const unsigned right =
-          greater(side(block.right_nx, block.right_ny, block.right_nz, block.right_d, cx, cy, cz),
-                  splat(0.0f));
+          greater(side(block.right_nx, block.right_ny, block.right_nz, block.right_d, cx, cy, cz), splat(0.0f));
       append(left ^ right, left, b * kLanes, out);
     }
   }
@@ -326,7 +353,9 @@ inline Floats row_times(const float P[4], const Floats p[3]) {
   return fma(splat(P[2]), p[2], fma(splat(P[1]), p[1], fma(splat(P[0]), p[0], splat(P[3]))));
 }
 
-inline Floats clamp(Floats a, float high) { return min(max(a, splat(0.0f)), splat(high)); }
+inline Floats clamp(Floats a, float high) {
+  return min(max(a, splat(0.0f)), splat(high));
+}
 
 // Projected edges that cross the centre of a column, left end first.
 constexpr std::int32_t kPacked = 256;
@@ -338,8 +367,7 @@ struct PackedEdges {
   alignas(32) float direction[kPacked + kLanes];
   std::int32_t count = 0;
 
-  void put(Packing packing, Floats left_u, Floats left_v, Floats right_u, Floats right_v,
-           Floats directed) {
+  void put(Packing packing, Floats left_u, Floats left_v, Floats right_u, Floats right_v, Floats directed) {
     packing.store(u0 + count, left_u);
     packing.store(v0 + count, left_v);
     packing.store(u1 + count, right_u);
@@ -352,8 +380,7 @@ struct PackedEdges {
 inline void scatter(PackedEdges& edges, std::int32_t weight, const DeltaImage& image) {
   const auto width = static_cast<float>(image.width);
   const auto height = static_cast<float>(image.height);
-  const std::uint8_t step[2] = {static_cast<std::uint8_t>(-weight),
-                                static_cast<std::uint8_t>(weight)};
+  const std::uint8_t step[2] = {static_cast<std::uint8_t>(-weight), static_cast<std::uint8_t>(weight)};
   const std::int32_t count = edges.count;
   edges.put(Packing(0xFFu), splat(0.0f), splat(0.0f), splat(0.0f), splat(0.0f), splat(0.0f));
   for (std::int32_t first = 0; first < count; first += kLanes) {
@@ -410,8 +437,7 @@ void accumulate(const EdgeRun& run, std::uint32_t* found, std::int32_t count, co
     v_max = max(v_max, max(v0, v1));
     // Most edges of a fine mesh are shorter than a pixel and cross no centre: they end here.
     const std::int32_t lanes = count - first < kLanes ? count - first : kLanes;
-    const unsigned crossing = greater(ceil(clamp(u1, width)), ceil(clamp(u0, width))) &
-                              (0xFFu >> (kLanes - lanes));
+    const unsigned crossing = greater(ceil(clamp(u1, width)), ceil(clamp(u0, width))) & (0xFFu >> (kLanes - lanes));
     packed.put(Packing(crossing), u0, v0, u1, v1, directed);
     packed.count += __builtin_popcount(crossing);
     if (packed.count > kPacked - kLanes) scatter(packed, run.weight, image);
@@ -447,8 +473,8 @@ Counts resolve(const DeltaImage& image, const PixelBounds& bounds, const MaskWor
   const std::int32_t last_row = clamped(bounds.v_max + 1.0f, 0, image.height);
   for (std::int32_t word = first_word; word <= last_word; ++word) {
     Windings windings = zero_windings();
-    std::uint8_t* delta = image.deltas + static_cast<std::ptrdiff_t>(first_row) * image.stride +
-                          static_cast<std::ptrdiff_t>(word) * 64;
+    std::uint8_t* delta =
+        image.deltas + static_cast<std::ptrdiff_t>(first_row) * image.stride + static_cast<std::ptrdiff_t>(word) * 64;
     std::ptrdiff_t at = static_cast<std::ptrdiff_t>(first_row) * masks.words_per_row + word;
     for (std::int32_t row = first_row; row <= last_row; ++row) {
       add_and_clear(windings, delta);
@@ -456,8 +482,7 @@ Counts resolve(const DeltaImage& image, const PixelBounds& bounds, const MaskWor
       if (row == image.height) break;  // crossings below the picture
       const std::uint64_t bits = non_zero(windings);
       counts.predicted += static_cast<std::uint32_t>(__builtin_popcountll(bits & masks.valid[at]));
-      counts.intersection +=
-          static_cast<std::uint32_t>(__builtin_popcountll(bits & masks.observed[at]));
+      counts.intersection += static_cast<std::uint32_t>(__builtin_popcountll(bits & masks.observed[at]));
       if (masks.rendered != nullptr) masks.rendered[at] = bits;
       at += masks.words_per_row;
     }

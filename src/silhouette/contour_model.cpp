@@ -28,8 +28,7 @@ struct Plane {
 };
 
 Plane plane_through(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
-  const Eigen::Vector3d normal =
-      (b - a).cast<double>().cross((c - a).cast<double>());
+  const Eigen::Vector3d normal = (b - a).cast<double>().cross((c - a).cast<double>());
   const double length = normal.norm();
   if (!(length > 0.0)) return {};  // no area: it faces nobody
   const Eigen::Vector3d n = normal / length;
@@ -47,7 +46,9 @@ void cluster(std::span<RunEdge> edges) {
   if (edges.size() <= kLanes) return;
   const auto feature = [](const RunEdge& edge, int axis) {
     switch (axis) {
-      case 0: case 1: case 2: return 0.5f * (edge.left.n[axis] + edge.right.n[axis]);
+      case 0:
+      case 1:
+      case 2: return 0.5f * (edge.left.n[axis] + edge.right.n[axis]);
       case 3: return 0.5f * (edge.left.d + edge.right.d) / kTypicalDistance_m;
       default: return (edge.left.n - edge.right.n).norm();
     }
@@ -70,9 +71,7 @@ void cluster(std::span<RunEdge> edges) {
   const std::size_t blocks = (edges.size() + kLanes - 1) / kLanes;
   const std::size_t middle = blocks / 2 * kLanes;
   std::nth_element(edges.begin(), edges.begin() + static_cast<std::ptrdiff_t>(middle), edges.end(),
-                   [&](const RunEdge& a, const RunEdge& b) {
-                     return feature(a, widest) < feature(b, widest);
-                   });
+                   [&](const RunEdge& a, const RunEdge& b) { return feature(a, widest) < feature(b, widest); });
   cluster(edges.first(middle));
   cluster(edges.subspan(middle));
 }
@@ -140,8 +139,7 @@ void append_run(Part& part, std::span<const RunEdge> edges, int weight, bool alw
 void append_runs(Part& part, std::vector<RunEdge> edges, int weight, bool always) {
   cluster(edges);
   for (std::size_t first = 0; first < edges.size(); first += kRunEdges) {
-    append_run(part, std::span(edges).subspan(first, std::min(kRunEdges, edges.size() - first)),
-               weight, always);
+    append_run(part, std::span(edges).subspan(first, std::min(kRunEdges, edges.size() - first)), weight, always);
   }
 }
 
@@ -183,13 +181,12 @@ Part prepare(const TriangleMesh& mesh, FaceCulling culling) {
   for (const auto& edge : topology.edges) {
     const bool closed = topology.component_closed[topology.component[edge.left]];
     (closed || cull ? single : twice)
-        .push_back({planes[edge.left], planes[edge.right], part.vertices[edge.from],
-                          part.vertices[edge.to]});
+        .push_back({planes[edge.left], planes[edge.right], part.vertices[edge.from], part.vertices[edge.to]});
   }
   for (const auto& edge : topology.open_edges) {
     (cull ? single : open)
-        .push_back({planes[edge.triangle], Plane{Eigen::Vector3f::Zero(), 1.0f},
-                          part.vertices[edge.from], part.vertices[edge.to]});
+        .push_back({planes[edge.triangle], Plane{Eigen::Vector3f::Zero(), 1.0f}, part.vertices[edge.from],
+                    part.vertices[edge.to]});
   }
   append_runs(part, std::move(single), 1, false);
   append_runs(part, std::move(twice), 2, false);
@@ -224,24 +221,23 @@ void check(const SilhouetteModel& model, std::span<const PinholeIntrinsics> came
     }
     for (const auto& t : mesh.triangles) {
       if (std::max({t[0], t[1], t[2]}) >= mesh.vertices.size()) {
-        throw FileError(who + " has a triangle with vertex " + std::to_string(std::max({t[0], t[1], t[2]})) +
-                        " of " + std::to_string(mesh.vertices.size()));
+        throw FileError(who + " has a triangle with vertex " + std::to_string(std::max({t[0], t[1], t[2]})) + " of " +
+                        std::to_string(mesh.vertices.size()));
       }
     }
   }
   if (cameras.empty() || cameras.size() > 32) {
-    throw std::invalid_argument("silhouettes need 1 to 32 cameras, got " +
-                                std::to_string(cameras.size()));
+    throw std::invalid_argument("silhouettes need 1 to 32 cameras, got " + std::to_string(cameras.size()));
   }
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     const auto& k = cameras[c];
     const std::string who = "camera " + std::to_string(c);
     if (k.width < 1 || k.height < 1 || k.width > 8192 || k.height > 8192) {
-      throw std::invalid_argument(who + " has size " + std::to_string(k.width) + "x" +
-                                  std::to_string(k.height) + ", expected 1 to 8192 px a side");
+      throw std::invalid_argument(who + " has size " + std::to_string(k.width) + "x" + std::to_string(k.height) +
+                                  ", expected 1 to 8192 px a side");
     }
-    if (!(k.fx > 0.0) || !(k.fy > 0.0) || !std::isfinite(k.fx) || !std::isfinite(k.fy) ||
-        !std::isfinite(k.cx) || !std::isfinite(k.cy)) {
+    if (!(k.fx > 0.0) || !(k.fy > 0.0) || !std::isfinite(k.fx) || !std::isfinite(k.fy) || !std::isfinite(k.cx) ||
+        !std::isfinite(k.cy)) {
       throw std::invalid_argument(who + " needs positive fx and fy and finite cx and cy");
     }
   }
@@ -261,8 +257,8 @@ Camera::Camera(const PinholeIntrinsics& k) : intrinsics(k) {
   const auto unit = [](double x, double y, double z) {
     return Eigen::Vector3d(x, y, z).normalized().cast<float>().eval();
   };
-  sides = {unit(k.fx, 0.0, k.cx + 1.0), unit(-k.fx, 0.0, k.width - k.cx),
-           unit(0.0, k.fy, k.cy + 1.0), unit(0.0, -k.fy, k.height - k.cy)};
+  sides = {unit(k.fx, 0.0, k.cx + 1.0), unit(-k.fx, 0.0, k.width - k.cx), unit(0.0, k.fy, k.cy + 1.0),
+           unit(0.0, -k.fy, k.height - k.cy)};
 }
 
 PlacedPart place(const Part& part, const Camera& camera, const Eigen::Isometry3f& X_CB) {
@@ -278,8 +274,8 @@ PlacedPart place(const Part& part, const Camera& camera, const Eigen::Isometry3f
   Eigen::Map<Eigen::Vector3f> camera_B(placed.camera_B);
   camera_B = -(A.inverse() * p);
   // Written so that a NaN anywhere leaves the part out.
-  const bool sane = p.cwiseAbs().maxCoeff() < kFarthest_m && radius < kFarthest_m &&
-                    camera_B.cwiseAbs().maxCoeff() < kFarthest_m;
+  const bool sane =
+      p.cwiseAbs().maxCoeff() < kFarthest_m && radius < kFarthest_m && camera_B.cwiseAbs().maxCoeff() < kFarthest_m;
   if (!sane || !(p.z() + radius > kNearPlane_m)) return placed;
   for (const auto& side : camera.sides) {
     if (side.dot(p) < -radius) return placed;

@@ -19,8 +19,8 @@ void check(const SilhouetteModel& model, std::span<const PinholeIntrinsics> came
 
 /// One part made ready for contour extraction. All coordinates are relative to `centre`.
 struct Part {
-  Eigen::Vector3f centre;  ///< part frame, metres
-  float radius = 0.0f;     ///< of the sphere around centre that holds every vertex
+  Eigen::Vector3f centre;       ///< part frame, metres
+  float radius = 0.0f;          ///< of the sphere around centre that holds every vertex
   Eigen::Vector3f half_extent;  ///< of the box around centre, metres
   std::vector<Eigen::Vector3f> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
@@ -67,10 +67,10 @@ struct Camera {
 /// Pose of a part in a camera, in the terms the kernels want.
 struct PlacedPart {
   View view = View::kInvisible;
-  Eigen::Matrix3f R_CB;          ///< a rotation, or nearly one (see SilhouetteScorer::score)
-  Eigen::Vector3f p_CB;          ///< of the part's centre
+  Eigen::Matrix3f R_CB;           ///< a rotation, or nearly one (see SilhouetteScorer::score)
+  Eigen::Vector3f p_CB;           ///< of the part's centre
   float camera_B[3] = {0, 0, 0};  ///< camera centre, centred part frame
-  float P[12] = {0};             ///< centred part frame to homogeneous pixels
+  float P[12] = {0};              ///< centred part frame to homogeneous pixels
 };
 
 PlacedPart place(const Part& part, const Camera& camera, const Eigen::Isometry3f& X_CB);
@@ -78,8 +78,8 @@ PlacedPart place(const Part& part, const Camera& camera, const Eigen::Isometry3f
 /// A straight piece of outline in the picture, between two points in camera coordinates.
 struct Segment {
   Eigen::Vector3f from_C, to_C;
-  int weight = 0;       ///< change of the winding number where it is crossed, running left to right
-  bool real = true;     ///< false where the near plane made it
+  int weight = 0;    ///< change of the winding number where it is crossed, running left to right
+  bool real = true;  ///< false where the near plane made it
 };
 
 /// The outlines of all drawn triangles of a part that the near plane cuts, one by one: slow, exact

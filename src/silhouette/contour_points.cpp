@@ -39,8 +39,8 @@ struct Crossing {
 // leaves or reaches zero. A segment is sampled by the family of lines it is steeper to.
 struct ContourExtractor::Impl {
   Impl(const SilhouetteModel& silhouette_model, std::span<const PinholeIntrinsics> intrinsics)
-      : model(silhouette_model), kernel(contour::best_kernel()),
-        found(model.max_edges() + contour::kLanes), vertices(model.max_vertices()) {
+      : model(silhouette_model), kernel(contour::best_kernel()), found(model.max_edges() + contour::kLanes),
+        vertices(model.max_vertices()) {
     for (const auto& k : intrinsics) cameras.emplace_back(k);
   }
 
@@ -58,8 +58,7 @@ struct ContourExtractor::Impl {
     segments.clear();
     const auto add = [&](const contour::Segment& s, std::uint32_t part) {
       segments.push_back({camera.intrinsics.project(s.from_C.cast<double>()),
-                          camera.intrinsics.project(s.to_C.cast<double>()), s.from_C, s.to_C,
-                          s.weight, part, s.real});
+                          camera.intrinsics.project(s.to_C.cast<double>()), s.from_C, s.to_C, s.weight, part, s.real});
     };
     for (std::uint32_t p = 0; p < model.parts().size(); ++p) {
       const contour::Part& part = model.parts()[p];
@@ -143,18 +142,17 @@ struct ContourExtractor::Impl {
     for (const Crossing& c : crossings) by_line[line_ends[static_cast<std::size_t>(c.line)]++] = c;
     std::size_t begin = 0;
     for (std::size_t line = 0; line < lines; ++line) {
-      std::sort(by_line.begin() + static_cast<std::ptrdiff_t>(begin),
-                by_line.begin() + static_cast<std::ptrdiff_t>(line_ends[line]),
-                [](const Crossing& x, const Crossing& y) {
-                  return x.at != y.at ? x.at < y.at : x.segment < y.segment;
-                });
+      std::sort(
+          by_line.begin() + static_cast<std::ptrdiff_t>(begin),
+          by_line.begin() + static_cast<std::ptrdiff_t>(line_ends[line]),
+          [](const Crossing& x, const Crossing& y) { return x.at != y.at ? x.at < y.at : x.segment < y.segment; });
       begin = line_ends[line];
     }
     crossings.swap(by_line);
   }
 
-  void emit(const Crossing& crossing, int axis, double outward, const PinholeIntrinsics& k,
-            double spacing, double margin) {
+  void emit(const Crossing& crossing, int axis, double outward, const PinholeIntrinsics& k, double spacing,
+            double margin) {
     const OutlineSegment& segment = segments[crossing.segment];
     if (!segment.real) return;
     const Eigen::Vector2d along = segment.to - segment.from;
@@ -166,8 +164,8 @@ struct ContourExtractor::Impl {
     Eigen::Vector2d pixel;
     pixel[axis] = crossing.line * spacing;
     pixel[other] = crossing.at;
-    if (!(pixel.x() >= margin - 0.5 && pixel.x() <= k.width - 0.5 - margin &&
-          pixel.y() >= margin - 0.5 && pixel.y() <= k.height - 0.5 - margin)) {
+    if (!(pixel.x() >= margin - 0.5 && pixel.x() <= k.width - 0.5 - margin && pixel.y() >= margin - 0.5 &&
+          pixel.y() <= k.height - 0.5 - margin)) {
       return;
     }
     Eigen::Vector2d normal(-along.y(), along.x());
@@ -185,8 +183,7 @@ struct ContourExtractor::Impl {
   }
 };
 
-ContourExtractor::ContourExtractor(const SilhouetteModel& model,
-                                   std::span<const PinholeIntrinsics> cameras) {
+ContourExtractor::ContourExtractor(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras) {
   contour::check(model, cameras);
   impl_ = std::make_unique<Impl>(model, cameras);
 }
@@ -194,9 +191,8 @@ ContourExtractor::ContourExtractor(const SilhouetteModel& model,
 ContourExtractor::~ContourExtractor() = default;
 ContourExtractor::ContourExtractor(ContourExtractor&&) noexcept = default;
 
-std::span<const ContourPoint> ContourExtractor::extract(std::span<const Eigen::Isometry3f> X_CB,
-                                                        std::size_t camera, float spacing_px,
-                                                        float margin_px) {
+std::span<const ContourPoint> ContourExtractor::extract(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera,
+                                                        float spacing_px, float margin_px) {
   Impl& impl = *impl_;
   const contour::Camera& view = impl.cameras.at(camera);
   const double spacing = spacing_px >= 0.25f ? static_cast<double>(spacing_px) : 0.25;

@@ -29,15 +29,15 @@ struct Scratch {
   struct Free {
     void operator()(std::uint8_t* p) const { ::operator delete[](p, std::align_val_t{64}); }
   };
-  std::unique_ptr<std::uint8_t[], Free> deltas;  // of kBatch pictures
-  std::array<contour::PlacedPart, kBatch> placed; // of one part
+  std::unique_ptr<std::uint8_t[], Free> deltas;    // of kBatch pictures
+  std::array<contour::PlacedPart, kBatch> placed;  // of one part
   std::vector<std::uint32_t> found;
   std::vector<Eigen::Vector3f> points;
 };
 
 // Column crossings of a segment of a part that the near plane cuts.
-void accumulate_segment(const contour::Segment& segment, const PinholeIntrinsics& k,
-                        const DeltaImage& image, PixelBounds& bounds) {
+void accumulate_segment(const contour::Segment& segment, const PinholeIntrinsics& k, const DeltaImage& image,
+                        PixelBounds& bounds) {
   Eigen::Vector2d a = k.project(segment.from_C.cast<double>());
   Eigen::Vector2d b = k.project(segment.to_C.cast<double>());
   int weight = segment.weight;
@@ -50,8 +50,8 @@ void accumulate_segment(const contour::Segment& segment, const PinholeIntrinsics
   const double slope = (b.y() - a.y()) / (b.x() - a.x());
   for (double u = first; u < end; u += 1.0) {
     const double v = std::clamp<double>(a.y() + (u - a.x()) * slope, 0.0, image.height);
-    std::uint8_t& delta = image.deltas[static_cast<std::ptrdiff_t>(std::ceil(v)) * image.stride +
-                                       static_cast<std::ptrdiff_t>(u)];
+    std::uint8_t& delta =
+        image.deltas[static_cast<std::ptrdiff_t>(std::ceil(v)) * image.stride + static_cast<std::ptrdiff_t>(u)];
     delta = static_cast<std::uint8_t>(delta + weight);
   }
   if (first < end) {  // a cut part may cover anything: no use in tight bounds
@@ -61,13 +61,12 @@ void accumulate_segment(const contour::Segment& segment, const PinholeIntrinsics
 
 class ContourScorer final : public SilhouetteScorer {
  public:
-  ContourScorer(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras,
-                int threads)
+  ContourScorer(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras, int threads)
       : model_(model), masks_(cameras), kernel_(contour::best_kernel()), pool_(threads) {
     for (const auto& intrinsics : cameras) {
       cameras_.emplace_back(intrinsics);
-      delta_bytes_ = std::max(delta_bytes_, static_cast<std::size_t>(stride(intrinsics)) *
-                                                static_cast<std::size_t>(intrinsics.height + 1));
+      delta_bytes_ = std::max(
+          delta_bytes_, static_cast<std::size_t>(stride(intrinsics)) * static_cast<std::size_t>(intrinsics.height + 1));
     }
     scratch_.resize(static_cast<std::size_t>(pool_.threads()));
     for (auto& scratch : scratch_) {
@@ -77,9 +76,7 @@ class ContourScorer final : public SilhouetteScorer {
     }
   }
 
-  void set_observation(std::span<const ObservedSilhouette> observed) override {
-    masks_.set(observed);
-  }
+  void set_observation(std::span<const ObservedSilhouette> observed) override { masks_.set(observed); }
 
   void score(std::span<const Eigen::Isometry3f> X_CB, std::span<SilhouetteCounts> counts,
              std::uint32_t camera_mask) override {
@@ -92,8 +89,7 @@ class ContourScorer final : public SilhouetteScorer {
       const auto flush = [&] {
         draw(scratch, std::span(batch).first(size));
         for (const Picture& picture : std::span(batch).first(size)) {
-          *picture.out = {picture.counts.intersection, picture.counts.predicted,
-                          masks_.count(picture.camera)};
+          *picture.out = {picture.counts.intersection, picture.counts.predicted, masks_.count(picture.camera)};
         }
         size = 0;
       };
@@ -150,9 +146,8 @@ class ContourScorer final : public SilhouetteScorer {
         placed[i] = contour::place(part, camera, pictures[i].X_CB[p]);
         if (placed[i].view == View::kCut) {
           contour::for_each_cut_segment(
-              part, model_.culling(), placed[i], scratch.points, [&](const contour::Segment& s) {
-                accumulate_segment(s, camera.intrinsics, images[i], bounds[i]);
-              });
+              part, model_.culling(), placed[i], scratch.points,
+              [&](const contour::Segment& s) { accumulate_segment(s, camera.intrinsics, images[i], bounds[i]); });
         }
       }
       for (const auto& run : part.runs) {
@@ -168,8 +163,7 @@ class ContourScorer final : public SilhouetteScorer {
       const BinaryMask& observed = masks_.observed(camera);
       pictures[i].counts = kernel_.resolve(
           images[i], bounds[i],
-          MaskWords{observed.row(0), masks_.valid(camera).row(0), pictures[i].rendered,
-                    observed.words_per_row()});
+          MaskWords{observed.row(0), masks_.valid(camera).row(0), pictures[i].rendered, observed.words_per_row()});
     }
   }
 
@@ -185,8 +179,7 @@ class ContourScorer final : public SilhouetteScorer {
 }  // namespace
 
 std::unique_ptr<SilhouetteScorer> make_contour_scorer(const SilhouetteModel& model,
-                                                      std::span<const PinholeIntrinsics> cameras,
-                                                      int threads) {
+                                                      std::span<const PinholeIntrinsics> cameras, int threads) {
   contour::check(model, cameras);
   if (threads < 0 || threads > 1024) {
     throw std::invalid_argument("silhouette threads: " + std::to_string(threads) +

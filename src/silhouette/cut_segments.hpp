@@ -13,8 +13,7 @@ void for_each_cut_segment(const Part& part, FaceCulling culling, const PlacedPar
     scratch[i] = placed.R_CB * part.vertices[i] + placed.p_CB;
   }
   for (const auto& triangle : part.triangles) {
-    const Eigen::Vector3f* corner[3] = {&scratch[triangle[0]], &scratch[triangle[1]],
-                                        &scratch[triangle[2]]};
+    const Eigen::Vector3f* corner[3] = {&scratch[triangle[0]], &scratch[triangle[1]], &scratch[triangle[2]]};
     // The camera is the origin: it sees the front when it lies on the normal's side.
     const Eigen::Vector3f normal = (*corner[1] - *corner[0]).cross(*corner[2] - *corner[0]);
     const bool front = normal.dot(*corner[0]) < 0.0f;

@@ -15,7 +15,6 @@ namespace bodyschema {
 /// tests of whole programs.
 std::unique_ptr<SilhouetteScorer> with_contour_to_fall_back_on(std::unique_ptr<SilhouetteScorer> first,
                                                                const SilhouetteModel& model,
-                                                               std::span<const PinholeIntrinsics> cameras,
-                                                               int threads);
+                                                               std::span<const PinholeIntrinsics> cameras, int threads);
 
 }  // namespace bodyschema

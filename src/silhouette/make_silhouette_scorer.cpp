@@ -10,8 +10,7 @@ namespace bodyschema {
 
 std::unique_ptr<SilhouetteScorer> make_silhouette_scorer(const SilhouetteModel& model,
                                                          std::span<const PinholeIntrinsics> cameras,
-                                                         const SilhouetteOptions& options,
-                                                         std::string* reason) {
+                                                         const SilhouetteOptions& options, std::string* reason) {
   const auto because = [&](std::string why) {
     if (reason != nullptr) *reason = std::move(why);
   };
@@ -28,8 +27,7 @@ std::unique_ptr<SilhouetteScorer> make_silhouette_scorer(const SilhouetteModel& 
     return atlas(gl::Context::create(options.gl_platform));
   }
   if (options.engine != "auto") {
-    throw std::invalid_argument("silhouette engine '" + options.engine +
-                                "', expected auto, contour or atlas");
+    throw std::invalid_argument("silhouette engine '" + options.engine + "', expected auto, contour or atlas");
   }
   try {
     auto context = gl::Context::create(options.gl_platform);

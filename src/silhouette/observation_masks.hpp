@@ -29,8 +29,8 @@ class ObservationMasks {
   /// changed then.
   void set(std::span<const ObservedSilhouette> observations) {
     if (observations.size() != observed_.size()) {
-      throw std::invalid_argument("observation of " + std::to_string(observations.size()) +
-                                  " cameras, expected " + std::to_string(observed_.size()));
+      throw std::invalid_argument("observation of " + std::to_string(observations.size()) + " cameras, expected " +
+                                  std::to_string(observed_.size()));
     }
     for (std::size_t c = 0; c < observations.size(); ++c) {
       check("mask", observations[c].mask, c);
@@ -61,11 +61,9 @@ class ObservationMasks {
   void check(const char* what, const BinaryMask& mask, std::size_t camera) const {
     const BinaryMask& expected = observed_[camera];
     if (mask.width() != expected.width() || mask.height() != expected.height()) {
-      throw std::invalid_argument("camera " + std::to_string(camera) + ": observed " + what +
-                                  " is " + std::to_string(mask.width()) + "x" +
-                                  std::to_string(mask.height()) + ", expected " +
-                                  std::to_string(expected.width()) + "x" +
-                                  std::to_string(expected.height()));
+      throw std::invalid_argument("camera " + std::to_string(camera) + ": observed " + what + " is " +
+                                  std::to_string(mask.width()) + "x" + std::to_string(mask.height()) + ", expected " +
+                                  std::to_string(expected.width()) + "x" + std::to_string(expected.height()));
     }
   }
 

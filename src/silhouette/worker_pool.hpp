@@ -27,11 +27,9 @@ class WorkerPool {
   /// done. worker is 0 .. threads()-1 and never runs two pieces at once. The body must not throw.
   template <typename Body>
   void run(std::size_t count, std::size_t grain, Body& body) {
-    run_job(
-        [](void* context, int worker, std::size_t begin, std::size_t end) noexcept {
-          (*static_cast<Body*>(context))(worker, begin, end);
-        },
-        &body, count, grain);
+    run_job([](void* context, int worker, std::size_t begin,
+               std::size_t end) noexcept { (*static_cast<Body*>(context))(worker, begin, end); },
+            &body, count, grain);
   }
 
  private:

@@ -78,7 +78,8 @@ struct Shape {
       case Fill::kPlain: break;
       case Fill::kStripes: mix = std::sin(x / pitch * 6.2831853f) > 0.0f ? 1.0f : 0.0f; break;
       case Fill::kChecks:
-        mix = (static_cast<int>(std::floor(x / pitch)) + static_cast<int>(std::floor(y / pitch))) % 2 == 0 ? 1.0f : 0.0f;
+        mix =
+            (static_cast<int>(std::floor(x / pitch)) + static_cast<int>(std::floor(y / pitch))) % 2 == 0 ? 1.0f : 0.0f;
         break;
       case Fill::kSpeckle: mix = value_noise(x / pitch * 3.0f, y / pitch * 3.0f, salt); break;
       case Fill::kGradient: mix = 0.5f + 0.5f * ay; break;
@@ -186,7 +187,8 @@ Background Background::clutter(const std::vector<Eigen::Vector3f>& near_colours,
       if (!any_before) continue;
       if (!before) x0 = y0 = -1.0f, x1 = y1 = 1.0f;
       const auto texel = [](float x) {
-        return std::clamp(static_cast<int>(std::floor((std::clamp(x, -1.5f, 1.5f) + 1.0f) * 0.5f * kFaceSize)), -1, kFaceSize);
+        return std::clamp(static_cast<int>(std::floor((std::clamp(x, -1.5f, 1.5f) + 1.0f) * 0.5f * kFaceSize)), -1,
+                          kFaceSize);
       };
       const int column0 = std::max(0, texel(x0) - 1), column1 = std::min(kFaceSize - 1, texel(x1) + 1);
       const int row0 = std::max(0, texel(y0) - 1), row1 = std::min(kFaceSize - 1, texel(y1) + 1);
@@ -219,9 +221,9 @@ Eigen::Vector3f Background::look_up(const Eigen::Vector3f& direction) const {
   const int row = std::clamp(static_cast<int>(std::floor(y)), 0, kFaceSize - 2);
   const float ax = std::clamp(x - static_cast<float>(column), 0.0f, 1.0f);
   const float ay = std::clamp(y - static_cast<float>(row), 0.0f, 1.0f);
-  const float* texel = faces_.data() +
-                       (face_index * kFaceSize * kFaceSize + static_cast<std::size_t>(row) * kFaceSize +
-                        static_cast<std::size_t>(column)) * 3;
+  const float* texel = faces_.data() + (face_index * kFaceSize * kFaceSize + static_cast<std::size_t>(row) * kFaceSize +
+                                        static_cast<std::size_t>(column)) *
+                                           3;
   using Colour = Eigen::Map<const Eigen::Vector3f>;
   return (1 - ay) * ((1 - ax) * Colour(texel) + ax * Colour(texel + 3)) +
          ay * ((1 - ax) * Colour(texel + 3 * kFaceSize) + ax * Colour(texel + 3 * kFaceSize + 3));

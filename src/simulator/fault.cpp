@@ -170,16 +170,34 @@ FaultSite::FaultSite(std::shared_ptr<const RobotModel> robot, const RobotSetup& 
 }
 
 const std::vector<FaultKind>& fault_kinds() {
-  static const std::vector<FaultKind> kinds = {
-      faults::joint_offset(),    faults::compliance(),      faults::payload(),
-      faults::backlash(),        faults::encoder_gain(),    faults::eccentricity(),
-      faults::joint_coupling(),  faults::latency(),         faults::camera_skew(),
-      faults::link_length(),     faults::axis_tilt(),       faults::axis_shift(),      faults::head_offset(),
-      faults::vergence(),        faults::baseline(),        faults::focal_length(),
-      faults::principal_point(), faults::distortion(),      faults::silhouette_bias(),
-      faults::mesh_scale(),      faults::finger_posture(),  faults::drift(),
-      faults::slip(),            faults::wobble(),          faults::velocity_lag(),
-      faults::acceleration_lag(), faults::local_kink(),     faults::random_walk()};
+  static const std::vector<FaultKind> kinds = {faults::joint_offset(),
+                                               faults::compliance(),
+                                               faults::payload(),
+                                               faults::backlash(),
+                                               faults::encoder_gain(),
+                                               faults::eccentricity(),
+                                               faults::joint_coupling(),
+                                               faults::latency(),
+                                               faults::camera_skew(),
+                                               faults::link_length(),
+                                               faults::axis_tilt(),
+                                               faults::axis_shift(),
+                                               faults::head_offset(),
+                                               faults::vergence(),
+                                               faults::baseline(),
+                                               faults::focal_length(),
+                                               faults::principal_point(),
+                                               faults::distortion(),
+                                               faults::silhouette_bias(),
+                                               faults::mesh_scale(),
+                                               faults::finger_posture(),
+                                               faults::drift(),
+                                               faults::slip(),
+                                               faults::wobble(),
+                                               faults::velocity_lag(),
+                                               faults::acceleration_lag(),
+                                               faults::local_kink(),
+                                               faults::random_walk()};
   return kinds;
 }
 

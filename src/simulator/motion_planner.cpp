@@ -17,9 +17,9 @@ constexpr int kPathSamples = 16;
 
 }  // namespace
 
-MotionPlanner::MotionPlanner(std::shared_ptr<const RobotModel> model, const RobotSetup& setup,
-                             const StereoRig& rig, MotionSettings settings, std::uint64_t seed,
-                             bool head_moves, const std::vector<std::string>& frozen)
+MotionPlanner::MotionPlanner(std::shared_ptr<const RobotModel> model, const RobotSetup& setup, const StereoRig& rig,
+                             MotionSettings settings, std::uint64_t seed, bool head_moves,
+                             const std::vector<std::string>& frozen)
     : model_(std::move(model)), rig_(rig), settings_(std::move(settings)), random_(seed, "motion"),
       head_moves_(head_moves), tips_(setup.fingertip_links.size()) {
   base_ = setup.default_joints(*model_);
@@ -92,7 +92,9 @@ std::optional<MotionPlanner::Range> MotionPlanner::seen_distances() {
   return Range{distances[distances.size() / 20], distances[distances.size() / 2]};
 }
 
-void MotionPlanner::compute(const Eigen::VectorXd& q) { kinematics_->compute(q, X_W_); }
+void MotionPlanner::compute(const Eigen::VectorXd& q) {
+  kinematics_->compute(q, X_W_);
+}
 
 MotionPlanner::View MotionPlanner::view(const Eigen::VectorXd& q) {
   compute(q);
@@ -175,7 +177,8 @@ bool MotionPlanner::solve(const Eigen::Vector3d& centre_W, Eigen::VectorXd& q) {
     for (Eigen::Index k = 0; k < count; ++k) {
       const auto joint = arm_[static_cast<std::size_t>(k)];
       const auto& info = model_->joints()[static_cast<std::size_t>(joint)];
-      const double room = std::isfinite(info.upper_rad - info.lower_rad) ? 0.03 * (info.upper_rad - info.lower_rad) : 0.0;
+      const double room =
+          std::isfinite(info.upper_rad - info.lower_rad) ? 0.03 * (info.upper_rad - info.lower_rad) : 0.0;
       q[joint] = std::clamp(q[joint] + std::clamp(dq[k], -0.4, 0.4), info.lower_rad + room, info.upper_rad - room);
     }
   }
@@ -204,8 +207,8 @@ Eigen::VectorXd MotionPlanner::move_head(Eigen::VectorXd q) {
     q[joint] = base_[joint];
     if (!head_moves_) continue;
     const auto& info = model_->joints()[static_cast<std::size_t>(joint)];
-    q[joint] = std::clamp(q[joint] + radians(settings_.head_motion_deg) * random_.uniform(-1.0, 1.0),
-                          info.lower_rad, info.upper_rad);
+    q[joint] = std::clamp(q[joint] + radians(settings_.head_motion_deg) * random_.uniform(-1.0, 1.0), info.lower_rad,
+                          info.upper_rad);
   }
   return q;
 }
@@ -224,8 +227,8 @@ double MotionPlanner::share_in_view(const Eigen::VectorXd& from, const Eigen::Ve
 
 /// A point such that a hand around it fits into all pictures; the arguments choose within the room
 /// that leaves, 0 left or top, 1 right or bottom.
-Eigen::Vector3d MotionPlanner::random_target(const Eigen::VectorXd& q, double u_low, double u_high,
-                                             double v_low, double v_high) {
+Eigen::Vector3d MotionPlanner::random_target(const Eigen::VectorXd& q, double u_low, double u_high, double v_low,
+                                             double v_high) {
   const auto& k = rig_.cameras.front().intrinsics;
   const double span = settings_.distance_max_m - settings_.distance_min_m;
   const double distance = settings_.distance_min_m + span * random_.uniform(0.08, 0.95);
@@ -264,11 +267,13 @@ Trajectory MotionPlanner::reach(double duration_s) {
     return std::string(text);
   };
   const auto seen = seen_distances();
-  throw DataError("no reach found with the hand in view of all cameras at simulator.motion.distance_min_m to "
-                  "distance_max_m, " + metres(settings_.distance_min_m, settings_.distance_max_m) + "; " +
-                  (seen ? "this robot's hand is best seen at " + metres(seen->min_m, seen->max_m)
-                        : std::string("hardly any posture shows this robot's hand")) +
-                  "; where the head looks is simulator.motion.posture_deg");
+  throw DataError(
+      "no reach found with the hand in view of all cameras at simulator.motion.distance_min_m to "
+      "distance_max_m, " +
+      metres(settings_.distance_min_m, settings_.distance_max_m) + "; " +
+      (seen ? "this robot's hand is best seen at " + metres(seen->min_m, seen->max_m)
+            : std::string("hardly any posture shows this robot's hand")) +
+      "; where the head looks is simulator.motion.posture_deg");
 }
 
 Eigen::VectorXd MotionPlanner::visible_posture() {

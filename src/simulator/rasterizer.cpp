@@ -65,8 +65,7 @@ Rasterizer::Rasterizer(std::vector<PaintedPart> parts, int width, int height, in
   colour_.assign(3 * pixels, 0.0f);
 }
 
-Rasterizer::Corner Rasterizer::project(const Eigen::Vector3f& p_C, float shade,
-                                       const CameraModel& camera) const {
+Rasterizer::Corner Rasterizer::project(const Eigen::Vector3f& p_C, float shade, const CameraModel& camera) const {
   // Brown-Conrady on the normalised coordinates, then pixels, then samples: sample s of a row sits
   // at pixel coordinate (s + 0.5) / samples - 0.5.
   const float w = 1.0f / p_C.z();
@@ -88,8 +87,7 @@ Rasterizer::Corner Rasterizer::project(const Eigen::Vector3f& p_C, float shade,
           (static_cast<float>(k.fy) * y + static_cast<float>(k.cy) + 0.5f) * n - 0.5f, w, shade};
 }
 
-void Rasterizer::draw_triangle(const Corner& a, const Corner& b, const Corner& c, bool cull,
-                               std::uint32_t part) {
+void Rasterizer::draw_triangle(const Corner& a, const Corner& b, const Corner& c, bool cull, std::uint32_t part) {
   // Image y runs down, so counter-clockwise outside faces have negative area here.
   const float area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
   if (!(std::abs(area) > 1e-9f) || !std::isfinite(area)) return;
@@ -122,8 +120,7 @@ void Rasterizer::draw_triangle(const Corner& a, const Corner& b, const Corner& c
     const Corner& top = (p.y < q.y || (p.y == q.y && p.x < q.x)) ? p : q;
     const Corner& bottom = &top == &p ? q : p;
     if (top.y == bottom.y) return;
-    edges[static_cast<std::size_t>(count++)] = {top.y, bottom.y, top.x,
-                                                (bottom.x - top.x) / (bottom.y - top.y)};
+    edges[static_cast<std::size_t>(count++)] = {top.y, bottom.y, top.x, (bottom.x - top.x) / (bottom.y - top.y)};
   };
   add(a, b);
   add(b, c);
@@ -188,8 +185,8 @@ void Rasterizer::clear() {
   box_ = {};
 }
 
-void Rasterizer::draw(std::span<const Eigen::Isometry3f> X_CB, const CameraModel& camera,
-                      const Lighting& light, float dilation_px) {
+void Rasterizer::draw(std::span<const Eigen::Isometry3f> X_CB, const CameraModel& camera, const Lighting& light,
+                      float dilation_px) {
   if (X_CB.size() != parts_.size()) throw std::invalid_argument("Rasterizer: one pose per part");
   clear();
   for (std::size_t p = 0; p < parts_.size(); ++p) {
@@ -212,8 +209,8 @@ void Rasterizer::draw(std::span<const Eigen::Isometry3f> X_CB, const CameraModel
       const auto shade = [&](std::size_t k) {
         return light.ambient + light.diffuse * std::max(0.0f, normals[3 * f + k].dot(to_lamp_B));
       };
-      if (all_in_front || (points_C_[t[0]].z() >= kNear_m && points_C_[t[1]].z() >= kNear_m &&
-                           points_C_[t[2]].z() >= kNear_m)) {
+      if (all_in_front ||
+          (points_C_[t[0]].z() >= kNear_m && points_C_[t[1]].z() >= kNear_m && points_C_[t[2]].z() >= kNear_m)) {
         // Most triangles face away or fall between samples: out before anything is worked out.
         const Corner& a = projected_[t[0]];
         const Corner& b = projected_[t[1]];
@@ -223,8 +220,8 @@ void Rasterizer::draw(std::span<const Eigen::Isometry3f> X_CB, const CameraModel
             std::ceil(std::min({a.y, b.y, c.y})) > std::floor(std::max({a.y, b.y, c.y}))) {
           continue;
         }
-        draw_triangle({a.x, a.y, a.w, shade(0)}, {b.x, b.y, b.w, shade(1)}, {c.x, c.y, c.w, shade(2)},
-                      part.cull_back, static_cast<std::uint32_t>(p));
+        draw_triangle({a.x, a.y, a.w, shade(0)}, {b.x, b.y, b.w, shade(1)}, {c.x, c.y, c.w, shade(2)}, part.cull_back,
+                      static_cast<std::uint32_t>(p));
         continue;
       }
       // Cut at the near plane (Sutherland-Hodgman): three or four corners remain.
@@ -280,8 +277,7 @@ void Rasterizer::dilate(float dilation_px) {
     int last = -1;
     const auto visit = [&](int y) {
       if ((inverse_depth_[sample(x, y)] > 0.0f) == grow) last = y;
-      const auto cell = static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) +
-                        static_cast<std::size_t>(x);
+      const auto cell = static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(x);
       if (last >= 0) {
         const auto d = static_cast<float>((y - last) * (y - last));
         if (d < distance_[cell]) {
@@ -311,8 +307,8 @@ void Rasterizer::dilate(float dilation_px) {
       for (int dx = -reach; dx <= reach; ++dx) {
         const int xx = x + dx;
         if (xx < 0 || xx >= columns) continue;
-        const auto cell = static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) +
-                          static_cast<std::size_t>(xx);
+        const auto cell =
+            static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(xx);
         const float d = distance_[cell] + static_cast<float>(dx * dx);
         if (d < best) {
           best = d;
@@ -321,8 +317,8 @@ void Rasterizer::dilate(float dilation_px) {
       }
       const float share = std::clamp(radius + to_outline + 0.5f - std::sqrt(best), 0.0f, 1.0f);
       if (share <= 0.0f || best_x < 0) continue;
-      const auto cell = static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) +
-                        static_cast<std::size_t>(best_x);
+      const auto cell =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(best_x);
       changes_.push_back({to, sample(best_x, nearest_[cell]), grow ? share : 1.0f - share});
     }
   }
@@ -363,8 +359,7 @@ void Rasterizer::resolve() {
           }
         }
       }
-      const auto pixel = static_cast<std::size_t>(v) * static_cast<std::size_t>(width_) +
-                         static_cast<std::size_t>(u);
+      const auto pixel = static_cast<std::size_t>(v) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(u);
       coverage_[pixel] = covered * share;
       for (int k = 0; k < 3; ++k) colour_[3 * pixel + static_cast<std::size_t>(k)] = sum[k];
     }
@@ -379,8 +374,9 @@ BinaryMask Rasterizer::mask() const {
       if (samples_ % 2 == 1) {
         covered = part_at(u, v) >= 0;
       } else {
-        covered = coverage_[static_cast<std::size_t>(v) * static_cast<std::size_t>(width_) +
-                            static_cast<std::size_t>(u)] >= 0.5f;
+        covered =
+            coverage_[static_cast<std::size_t>(v) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(u)] >=
+            0.5f;
       }
       if (covered) mask.set(u, v);
     }
@@ -391,8 +387,7 @@ BinaryMask Rasterizer::mask() const {
 int Rasterizer::part_at(int u, int v) const {
   const int s = u * samples_ + samples_ / 2;
   const int t = v * samples_ + samples_ / 2;
-  const auto i = static_cast<std::size_t>(t) * static_cast<std::size_t>(sample_width_) +
-                 static_cast<std::size_t>(s);
+  const auto i = static_cast<std::size_t>(t) * static_cast<std::size_t>(sample_width_) + static_cast<std::size_t>(s);
   const bool covered = inverse_depth_[i] > 0.0f && (changes_.empty() || weight_[i] >= 0.5f);
   return covered ? static_cast<int>(part_[i]) : -1;
 }

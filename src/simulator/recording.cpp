@@ -24,7 +24,9 @@ Image to_gray(const Image& rgb) {
   return gray;
 }
 
-double rounded(double value, double per_unit) { return std::round(value * per_unit) / per_unit; }
+double rounded(double value, double per_unit) {
+  return std::round(value * per_unit) / per_unit;
+}
 
 Json rows(const Pose& pose) {
   Json matrix = Json::array();
@@ -132,8 +134,14 @@ TruthWriter::TruthWriter(std::filesystem::path file, const Simulator& simulator,
   for (const auto& camera : robot.body().cameras) {
     const auto& k = camera.intrinsics;
     camera_names_.push_back(camera.name);
-    cameras.push_back({{"name", camera.name}, {"width", k.width}, {"height", k.height}, {"fx", k.fx}, {"fy", k.fy},
-                       {"cx", k.cx}, {"cy", k.cy}, {"distortion", camera.distortion}});
+    cameras.push_back({{"name", camera.name},
+                       {"width", k.width},
+                       {"height", k.height},
+                       {"fx", k.fx},
+                       {"fy", k.fy},
+                       {"cx", k.cx},
+                       {"cy", k.cy},
+                       {"distortion", camera.distortion}});
   }
   const FaultSite& site = robot.site();
   // Open at the end: frames are added as they come.
@@ -144,8 +152,7 @@ TruthWriter::TruthWriter(std::filesystem::path file, const Simulator& simulator,
           << "\"seed\": " << plan.seed << ",\n\"offsets_deg\": " << offsets.dump() << ",\n\"faults\": " << faults.dump()
           << ",\n\"true_cameras\": " << cameras.dump() << ",\n\"motion_begin_utime\": "
           << simulator.settings().start_utime + microseconds(site.begin_s) + utime_shift
-          << ",\n\"motion_end_utime\": "
-          << simulator.settings().start_utime + microseconds(site.end_s) + utime_shift
+          << ",\n\"motion_end_utime\": " << simulator.settings().start_utime + microseconds(site.end_s) + utime_shift
           << ",\n\"fingers\": " << Json(setup.fingertip_links).dump() << ",\n\"frames\": [\n";
 }
 

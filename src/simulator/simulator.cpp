@@ -40,9 +40,7 @@ Schedule schedule(const std::shared_ptr<const RobotModel>& model, const RobotSet
   int motion_frames = 0;
   const auto motion = [&]() -> Trajectory {
     switch (plan.motion) {
-      case Motion::kReach:
-        motion_frames = plan.frames;
-        return planner.reach(std::max(1, plan.frames - 1) * period);
+      case Motion::kReach: motion_frames = plan.frames; return planner.reach(std::max(1, plan.frames - 1) * period);
       case Motion::kOneWay:
         motion_frames = static_cast<int>(std::lround(plan.seconds * settings.camera_rate_hz));
         return planner.reach(plan.seconds);
@@ -150,7 +148,7 @@ struct Simulator::Impl {
     std::unique_ptr<ImageSensor> sensor;
     std::vector<Pose> X_W;
     std::vector<Eigen::Isometry3f> X_CB;
-    std::vector<float> room;   // as painted last
+    std::vector<float> room;  // as painted last
     Pose room_X_WC;
     bool has_room = false;
     std::vector<float> light;
@@ -316,9 +314,9 @@ struct Simulator::Impl {
       }
       const auto window = static_cast<std::size_t>(std::max(1.0, std::round(kVelocityWindow_s * rate)));
       while (recent.size() > window) recent.pop_front();
-      sample.qdot = recent.empty() ? Eigen::VectorXd::Zero(sample.q.size()).eval()
-                                   : ((sample.q - recent.front().q) /
-                                      seconds(sample.utime - recent.front().utime)).eval();
+      sample.qdot = recent.empty()
+                        ? Eigen::VectorXd::Zero(sample.q.size()).eval()
+                        : ((sample.q - recent.front().q) / seconds(sample.utime - recent.front().utime)).eval();
       recent.push_back(sample);
       samples.push_back(std::move(sample));
       ++next_sample;
@@ -379,18 +377,29 @@ std::optional<SimulatedFrame> Simulator::next() {
   return frame;
 }
 
-int Simulator::frame_count() const { return static_cast<int>(impl_->when.slots.size()); }
+int Simulator::frame_count() const {
+  return static_cast<int>(impl_->when.slots.size());
+}
 
 int Simulator::first_motion_frame() const {
   const auto& slots = impl_->when.slots;
-  const auto found = std::find_if(slots.begin(), slots.end(), [](const auto& slot) { return slot.phase == Phase::kMotion; });
+  const auto found =
+      std::find_if(slots.begin(), slots.end(), [](const auto& slot) { return slot.phase == Phase::kMotion; });
   return static_cast<int>(found - slots.begin());
 }
 
-const TrueRobot& Simulator::robot() const { return *impl_->robot; }
-const SimulationPlan& Simulator::plan() const { return impl_->plan; }
-const SimulatorSettings& Simulator::settings() const { return impl_->settings; }
-const RobotModel& Simulator::model() const { return *impl_->model; }
+const TrueRobot& Simulator::robot() const {
+  return *impl_->robot;
+}
+const SimulationPlan& Simulator::plan() const {
+  return impl_->plan;
+}
+const SimulatorSettings& Simulator::settings() const {
+  return impl_->settings;
+}
+const RobotModel& Simulator::model() const {
+  return *impl_->model;
+}
 
 std::vector<std::string> Simulator::joint_names() const {
   std::vector<std::string> names;
@@ -398,7 +407,9 @@ std::vector<std::string> Simulator::joint_names() const {
   return names;
 }
 
-double Simulator::duration_s() const { return impl_->when.slots.empty() ? 0.0 : impl_->when.slots.back().t_s; }
+double Simulator::duration_s() const {
+  return impl_->when.slots.empty() ? 0.0 : impl_->when.slots.back().t_s;
+}
 
 Image Simulator::room(std::size_t camera) const {
   const Impl& s = *impl_;

@@ -51,7 +51,8 @@ SimulatorSettings SimulatorSettings::from(const Configuration& simulator) {
   auto& m = s.motion;
   m.distance_min_m = motion.number_or("distance_min_m", m.distance_min_m, 0.0, 10.0);
   m.distance_max_m = motion.number_or("distance_max_m", m.distance_max_m, 0.0, 10.0);
-  if (m.distance_max_m > 0.0 && m.distance_max_m <= m.distance_min_m) motion.fail("distance_max_m", "more than distance_min_m");
+  if (m.distance_max_m > 0.0 && m.distance_max_m <= m.distance_min_m)
+    motion.fail("distance_max_m", "more than distance_min_m");
   m.border_px = motion.number_or("border_px", m.border_px, -500.0, 500.0);
   m.hand_radius_m = motion.number_or("hand_radius_m", m.hand_radius_m, 0.0, 0.3);
   const auto posture = motion.section("posture_deg");

@@ -14,8 +14,8 @@ constexpr double kMargin_s = 1.5;
 class TorquesOfGravity final : public JointTorques {
  public:
   TorquesOfGravity(const FaultSite& site, double payload_kg)
-      : gravity_W_(site.gravity_W), payload_kg_(payload_kg), torques_(site.model),
-        hand_(site.model, {site.hand_link}), payload_torque_(Eigen::VectorXd::Zero(site.model->joint_count())) {}
+      : gravity_W_(site.gravity_W), payload_kg_(payload_kg), torques_(site.model), hand_(site.model, {site.hand_link}),
+        payload_torque_(Eigen::VectorXd::Zero(site.model->joint_count())) {}
 
   const Eigen::VectorXd& total(const Eigen::VectorXd& q) override {
     total_ = torques_.compute(q, gravity_W_);
@@ -103,8 +103,7 @@ void TrueKinematics::compute(const Eigen::VectorXd& q, std::span<Pose> X_WB) {
   for (auto m = misplacements_.rbegin(); m != misplacements_.rend(); ++m) {
     const auto axis = nominal_->joint_axis(m->change.joint);
     const Eigen::Matrix3d& R_WP = X_W_[m->parent].linear();
-    const Eigen::Vector3d tilt_W =
-        R_WP * (m->change.tilt_1_rad * m->tilt_1_P + m->change.tilt_2_rad * m->tilt_2_P);
+    const Eigen::Vector3d tilt_W = R_WP * (m->change.tilt_1_rad * m->tilt_1_P + m->change.tilt_2_rad * m->tilt_2_P);
     Pose D = Pose::Identity();
     if (const double angle = tilt_W.norm(); angle > 0.0) {
       const Eigen::AngleAxisd tilt(angle, tilt_W / angle);
@@ -127,8 +126,7 @@ Pose TrueKinematics::camera(std::size_t index, const Pose& X_WLink) const {
   return X_WC;
 }
 
-TrueRobot::TrueRobot(FaultSite site, const StereoRig& rig, Trajectory trajectory,
-                     const std::vector<FaultSpec>& specs)
+TrueRobot::TrueRobot(FaultSite site, const StereoRig& rig, Trajectory trajectory, const std::vector<FaultSpec>& specs)
     : site_(std::move(site)), trajectory_(std::move(trajectory)) {
   body_.cameras = rig.cameras;
   body_.camera_shift_C.assign(rig.cameras.size(), Eigen::Vector3d::Zero());

@@ -38,8 +38,8 @@ float background_change(const BackgroundModel& background, int u, int v) {
   const auto channels = static_cast<std::size_t>(background.channels);
   const auto at = [&](int a, int b) {
     return background.mean.data() +
-           (static_cast<std::size_t>(b) * static_cast<std::size_t>(background.width) +
-            static_cast<std::size_t>(a)) * channels;
+           (static_cast<std::size_t>(b) * static_cast<std::size_t>(background.width) + static_cast<std::size_t>(a)) *
+               channels;
   };
   const float* here = at(u, v);
   float largest = 0.0f;
@@ -72,8 +72,7 @@ void for_each_set(const BinaryMask& mask, const PixelBox& box, Function&& functi
 
 }  // namespace
 
-void CoverageEstimator::collect_band(const Image& image, const BinaryMask& detected,
-                                     const BinaryMask& sure) {
+void CoverageEstimator::collect_band(const Image& image, const BinaryMask& detected, const BinaryMask& sure) {
   outer_ = detected;
   morphology_.dilate(outer_);
   weak_ = sure;
@@ -107,14 +106,12 @@ void CoverageEstimator::collect_band(const Image& image, const BinaryMask& detec
   });
 }
 
-void CoverageEstimator::average_nearby(const Image& image, const BinaryMask& sure,
-                                       BandPixel& pixel) const {
+void CoverageEstimator::average_nearby(const Image& image, const BinaryMask& sure, BandPixel& pixel) const {
   const auto channels = static_cast<std::size_t>(image.channels);
   std::array<int, 3> sum{};
   int weights = 0;
   for (int v = std::max(pixel.v - kRadius, box_.v0); v <= std::min(pixel.v + kRadius, box_.v1); ++v) {
-    for (int u = std::max(pixel.u - kRadius, box_.u0); u <= std::min(pixel.u + kRadius, box_.u1);
-         ++u) {
+    for (int u = std::max(pixel.u - kRadius, box_.u0); u <= std::min(pixel.u + kRadius, box_.u1); ++u) {
       if (!sure.at(u, v)) continue;
       const int weight = core_.at(u, v) ? kCoreWeight : (weak_.at(u, v) ? kInsideWeight : kAnyWeight);
       const auto* colour = image.pixel(u, v);
@@ -129,13 +126,12 @@ void CoverageEstimator::average_nearby(const Image& image, const BinaryMask& sur
   pixel.robot_known = true;
 }
 
-void CoverageEstimator::project(const Image& image, const BackgroundModel& background,
-                                float least_contrast_sigma) {
+void CoverageEstimator::project(const Image& image, const BackgroundModel& background, float least_contrast_sigma) {
   const auto channels = static_cast<std::size_t>(image.channels);
   for (auto& pixel : band_) {
     if (!pixel.robot_known) continue;
-    const auto i = static_cast<std::size_t>(pixel.v) * static_cast<std::size_t>(image.width) +
-                   static_cast<std::size_t>(pixel.u);
+    const auto i =
+        static_cast<std::size_t>(pixel.v) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(pixel.u);
     const auto* colour = image.pixel(pixel.u, pixel.v);
     float difference = 0.0f;  // |I - B|^2
     float contrast = 0.0f;    // |F - B|^2
@@ -178,8 +174,8 @@ void CoverageEstimator::smooth() {
   }
 }
 
-void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& background,
-                                    const BinaryMask& sure, bool rough) {
+void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& background, const BinaryMask& sure,
+                                    bool rough) {
   const auto channels = static_cast<std::size_t>(image.channels);
   const auto s = static_cast<std::ptrdiff_t>(stride_);
   const auto width = static_cast<float>(image.width - 1);
@@ -194,8 +190,7 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
     const float fv = v - static_cast<float>(iv);
     const auto local = static_cast<std::size_t>(iv - box_.v0 + 1) * static_cast<std::size_t>(stride_) +
                        static_cast<std::size_t>(iu - box_.u0 + 1);
-    const float w00 = (1.0f - fu) * (1.0f - fv), w10 = fu * (1.0f - fv), w01 = (1.0f - fu) * fv,
-                w11 = fu * fv;
+    const float w00 = (1.0f - fu) * (1.0f - fv), w10 = fu * (1.0f - fv), w01 = (1.0f - fu) * fv, w11 = fu * fv;
     const auto* share = smooth_.data() + local;
     const float inside = w00 * share[0] + w10 * share[1] + w01 * share[s] + w11 * share[s + 1];
     if (inside < kInside) return false;
@@ -211,8 +206,7 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
     if (steepness < kLeastSlope) continue;
     const float nu = pixel.slope_u / steepness;
     const float nv = pixel.slope_v / steepness;
-    const float depth = std::clamp((pixel.smooth - 0.5f) * 2.5f, -kReach, kReach) -
-                        (rough ? kRoughMargin : 0.0f);
+    const float depth = std::clamp((pixel.smooth - 0.5f) * 2.5f, -kReach, kReach) - (rough ? kRoughMargin : 0.0f);
     const auto u = static_cast<float>(pixel.u) + nu * depth;
     const auto v = static_cast<float>(pixel.v) + nv * depth;
 
@@ -238,10 +232,10 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
       if (!pixel.robot_known) average_nearby(image, sure, pixel);
       continue;
     }
-    const auto i = static_cast<std::size_t>(pixel.v) * static_cast<std::size_t>(image.width) +
-                   static_cast<std::size_t>(pixel.u);
-    static const float kGain = (std::sqrt(kNearDepth) - std::sqrt(kEdgeDepth)) /
-                               (std::sqrt(kFarDepth) - std::sqrt(kNearDepth));
+    const auto i =
+        static_cast<std::size_t>(pixel.v) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(pixel.u);
+    static const float kGain =
+        (std::sqrt(kNearDepth) - std::sqrt(kEdgeDepth)) / (std::sqrt(kFarDepth) - std::sqrt(kNearDepth));
     float change = 0.0f;
     float contrast = 0.0f;
     std::array<float, 3> step{};
@@ -262,9 +256,8 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
   }
 }
 
-void CoverageEstimator::estimate(const Image& image, const BackgroundModel& background,
-                                 const BinaryMask& detected, const BinaryMask& sure,
-                                 float least_contrast_sigma, BinaryMask& mask,
+void CoverageEstimator::estimate(const Image& image, const BackgroundModel& background, const BinaryMask& detected,
+                                 const BinaryMask& sure, float least_contrast_sigma, BinaryMask& mask,
                                  BinaryMask& uncertain, std::vector<std::uint8_t>& coverage) {
   const auto pixels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   coverage.assign(pixels, 0);

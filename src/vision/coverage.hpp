@@ -27,17 +27,17 @@ class CoverageEstimator {
   /// @param uncertain out: pixels of the outline that cannot be judged
   /// @param coverage  out: 0 to 255, row order
   void estimate(const Image& image, const BackgroundModel& background, const BinaryMask& detected,
-                const BinaryMask& sure, float least_contrast_sigma, BinaryMask& mask,
-                BinaryMask& uncertain, std::vector<std::uint8_t>& coverage);
+                const BinaryMask& sure, float least_contrast_sigma, BinaryMask& mask, BinaryMask& uncertain,
+                std::vector<std::uint8_t>& coverage);
 
  private:
   struct BandPixel {
-    int u, v;                  ///< in the picture
-    std::size_t local;         ///< in the padded window
+    int u, v;                    ///< in the picture
+    std::size_t local;           ///< in the padded window
     std::array<float, 3> robot;  ///< F
-    float share = 0.0f;        ///< a, not clamped
-    float smooth = 0.0f;       ///< a, smoothed over 3x3 pixels
-    float slope_u = 0.0f;      ///< of a, towards the background
+    float share = 0.0f;          ///< a, not clamped
+    float smooth = 0.0f;         ///< a, smoothed over 3x3 pixels
+    float slope_u = 0.0f;        ///< of a, towards the background
     float slope_v = 0.0f;
     bool robot_known = false;  ///< F has been found; only pixels near the outline need it
     bool contrast = false;     ///< F and B differ enough
@@ -45,13 +45,12 @@ class CoverageEstimator {
   void collect_band(const Image& image, const BinaryMask& detected, const BinaryMask& sure);
   void smooth();
   /// Finds F for pixels near the outline. `rough`: the outline may lie too far out.
-  void look_inside(const Image& image, const BackgroundModel& background, const BinaryMask& sure,
-                   bool rough);
+  void look_inside(const Image& image, const BackgroundModel& background, const BinaryMask& sure, bool rough);
   void average_nearby(const Image& image, const BinaryMask& sure, BandPixel& pixel) const;
   void project(const Image& image, const BackgroundModel& background, float least_contrast_sigma);
 
   PixelBox box_;
-  int stride_ = 0;             ///< of the window, which has one pixel of padding
+  int stride_ = 0;  ///< of the window, which has one pixel of padding
   MaskMorphology morphology_;
   BinaryMask inner_, outer_, core_, weak_;
   std::vector<BandPixel> band_;

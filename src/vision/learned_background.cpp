@@ -80,7 +80,9 @@ double FrameSelection::change(const Image& a, const Image& b) const {
   return all == 0 ? 0.0 : static_cast<double>(changed) / static_cast<double>(all);
 }
 
-void FrameSelection::clear() { *this = FrameSelection(); }
+void FrameSelection::clear() {
+  *this = FrameSelection();
+}
 
 void FrameSelection::add(const Image& frame) {
   if (!previous_.empty() && early_noise_.size() < 9) {
@@ -105,8 +107,7 @@ void FrameSelection::add(const Image& frame) {
   step_ = step_ == 0.0 ? 0.01 : 1.5 * step_;
 }
 
-LearnedBackground::LearnedBackground(const VisionSetup& setup, int width, int height)
-    : setup_(setup) {
+LearnedBackground::LearnedBackground(const VisionSetup& setup, int width, int height) : setup_(setup) {
   model_.width = width;
   model_.height = height;
 }
@@ -133,8 +134,7 @@ void LearnedBackground::set_precision(std::size_t i) {
 }
 
 template <int kChannels>
-void LearnedBackground::cluster_row(std::span<const Image> frames, int v,
-                                    std::vector<Candidates>& candidates) const {
+void LearnedBackground::cluster_row(std::span<const Image> frames, int v, std::vector<Candidates>& candidates) const {
   struct Cluster {
     std::array<float, kChannels> mean{};
     std::uint64_t seen = 0;
@@ -173,8 +173,8 @@ void LearnedBackground::cluster_row(std::span<const Image> frames, int v,
     std::partial_sort(clusters.begin(), clusters.begin() + static_cast<std::ptrdiff_t>(kept),
                       clusters.begin() + static_cast<std::ptrdiff_t>(used),
                       [](const Cluster& a, const Cluster& b) { return a.count > b.count; });
-    auto& out = candidates[static_cast<std::size_t>(v) * static_cast<std::size_t>(model_.width) +
-                           static_cast<std::size_t>(u)];
+    auto& out =
+        candidates[static_cast<std::size_t>(v) * static_cast<std::size_t>(model_.width) + static_cast<std::size_t>(u)];
     for (std::size_t k = 0; k < kept; ++k) {
       out[k].seen = clusters[k].seen;
       for (std::size_t c = 0; c < kChannels; ++c) out[k].mean[c] = clusters[k].mean[c];
@@ -187,8 +187,7 @@ void LearnedBackground::choose(std::size_t frame_count, const std::vector<Candid
   const int width = model_.width;
   const int height = model_.height;
   const auto at = [&](int u, int v) {
-    return static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
-           static_cast<std::size_t>(u);
+    return static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
   };
   // Plain majorities first, where many pixels agree: a small patch of them is more likely a part of
   // the robot that never moved out of the way, such as a forearm at the border of the picture.
@@ -251,13 +250,11 @@ void LearnedBackground::choose(std::size_t frame_count, const std::vector<Candid
 }
 
 template <int kChannels>
-void LearnedBackground::average_row(std::span<const Image> frames, int v,
-                                    const std::vector<Candidates>& candidates,
+void LearnedBackground::average_row(std::span<const Image> frames, int v, const std::vector<Candidates>& candidates,
                                     const std::vector<std::uint8_t>& choice) {
   const float gate = gate_squared(kChannels) * model_.noise_sd * model_.noise_sd;
   for (int u = 0; u < model_.width; ++u) {
-    const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(model_.width) +
-                   static_cast<std::size_t>(u);
+    const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(model_.width) + static_cast<std::size_t>(u);
     support_[i] = 0;
     if (choice[i] >= kCandidates) continue;
     const auto& middle = candidates[i][choice[i]].mean;
@@ -283,8 +280,7 @@ void LearnedBackground::average_row(std::span<const Image> frames, int v,
       model_.mean[i * kChannels + c] = middle[c] + mean_shift;
       shift += mean_shift * mean_shift;
     }
-    variance_[i] =
-        count > 1.0f ? std::max(squares - count * shift, 0.0f) / (kChannels * (count - 1.0f)) : 0.0f;
+    variance_[i] = count > 1.0f ? std::max(squares - count * shift, 0.0f) / (kChannels * (count - 1.0f)) : 0.0f;
     // Fewer than one frame in twenty is a passing robot rather than the background.
     const bool enough = count >= 0.05f * static_cast<float>(frames.size());
     support_[i] = enough ? static_cast<std::uint16_t>(count) : 0;
@@ -304,8 +300,7 @@ void LearnedBackground::learn(std::span<const Image> frames, float noise_sd) {
   }
   choose(frames.size(), candidates, choice);
   for (int v = 0; v < model_.height; ++v) {
-    gray ? average_row<1>(frames, v, candidates, choice)
-         : average_row<3>(frames, v, candidates, choice);
+    gray ? average_row<1>(frames, v, candidates, choice) : average_row<3>(frames, v, candidates, choice);
   }
   if (setup_.noise_levels <= 0.0 && frames.size() > 4) {
     // The spread around the learned colours is a better witness than two frames were.
@@ -373,7 +368,8 @@ void LearnedBackground::update_row(const Image& frame, int v, const BinaryMask* 
         --rival_support_[i];
       }
       if (rival_support_[i] > support_[i]) {
-        for (std::size_t c = 0; c < kChannels; ++c) std::swap(rival_[i * kChannels + c], model_.mean[i * kChannels + c]);
+        for (std::size_t c = 0; c < kChannels; ++c)
+          std::swap(rival_[i * kChannels + c], model_.mean[i * kChannels + c]);
         std::swap(rival_support_[i], support_[i]);
         variance_[i] = noise;
       }
@@ -408,12 +404,10 @@ void LearnedBackground::update(const Image& frame, const BinaryMask* robot, bool
     model_.channels == 1 ? update_row<1>(frame, v, robot) : update_row<3>(frame, v, robot);
   }
   // Follow the noise once a good part of a picture has been compared.
-  if (setup_.noise_levels <= 0.0 &&
-      innovation_count_ > 0.25 * static_cast<double>(model_.pixels())) {
+  if (setup_.noise_levels <= 0.0 && innovation_count_ > 0.25 * static_cast<double>(model_.pixels())) {
     const double variance = innovation_sum_ / innovation_count_;
     const double old = static_cast<double>(model_.noise_sd) * static_cast<double>(model_.noise_sd);
-    model_.noise_sd =
-        std::max(static_cast<float>(std::sqrt(0.8 * old + 0.2 * variance)), kLeastNoiseSd);
+    model_.noise_sd = std::max(static_cast<float>(std::sqrt(0.8 * old + 0.2 * variance)), kLeastNoiseSd);
     innovation_sum_ = innovation_count_ = 0.0;
   }
 }

@@ -39,8 +39,8 @@ class FrameSelection {
   float noise_sd_ = 0.0f;
   std::vector<float> early_noise_;  // first estimates; their median counts
   Image previous_;
-  double step_ = 0.0;               // change from one kept frame to the next
-  std::size_t still_frames_ = 0;    // kept although nothing had changed
+  double step_ = 0.0;             // change from one kept frame to the next
+  std::size_t still_frames_ = 0;  // kept although nothing had changed
 };
 
 /// The background of a still camera, learned per pixel: the most frequent colour, within the noise.
@@ -88,13 +88,13 @@ class LearnedBackground {
   VisionSetup setup_;
   BackgroundModel model_;
   int frames_seen_ = 0;
-  Image first_;                        // until the second frame gives the noise
-  std::vector<std::uint16_t> support_; // sightings of the background
-  std::vector<float> variance_;        // of one channel around the background
+  Image first_;                         // until the second frame gives the noise
+  std::vector<std::uint16_t> support_;  // sightings of the background
+  std::vector<float> variance_;         // of one channel around the background
   std::vector<float> rival_;            // another colour, channels interleaved
   std::vector<std::uint16_t> rival_support_;
   int upkeep_row_ = 0;
-  double innovation_sum_ = 0.0;        // of one frame's inliers, for the noise
+  double innovation_sum_ = 0.0;  // of one frame's inliers, for the noise
   double innovation_count_ = 0.0;
 };
 

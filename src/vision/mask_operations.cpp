@@ -32,8 +32,7 @@ void MaskMorphology::step(BinaryMask& mask) {
   const int height = mask.height();
   if (words == 0 || height == 0) return;
   const int last_bit = (mask.width() - 1) & 63;
-  const std::uint64_t padding =
-      last_bit == 63 ? 0 : ~((std::uint64_t{1} << (last_bit + 1)) - 1);
+  const std::uint64_t padding = last_bit == 63 ? 0 : ~((std::uint64_t{1} << (last_bit + 1)) - 1);
   // Erosion is dilation of the complement; rows are widened one by one into a three-row window so
   // that the picture can be overwritten in place.
   const auto stride = static_cast<std::size_t>(words);
@@ -60,8 +59,7 @@ void MaskMorphology::step(BinaryMask& mask) {
     if (v + 1 < height) widen(v + 1);
     const auto* above = rows_.data() + static_cast<std::size_t>(std::max(v - 1, 0) % 3) * stride;
     const auto* here = rows_.data() + static_cast<std::size_t>(v % 3) * stride;
-    const auto* below =
-        rows_.data() + static_cast<std::size_t>(std::min(v + 1, height - 1) % 3) * stride;
+    const auto* below = rows_.data() + static_cast<std::size_t>(std::min(v + 1, height - 1) % 3) * stride;
     auto* out = mask.row(v);
     for (int w = 0; w < words; ++w) {
       const std::uint64_t wide = above[w] | here[w] | below[w];
@@ -139,8 +137,7 @@ void assign(BinaryMask& mask, int v, int begin, int end, bool value) {
   for (int u = begin; u < end;) {
     const int stop = std::min((u | 63) + 1, end);
     const int n = stop - u;
-    const std::uint64_t bits =
-        (n == 64 ? ~std::uint64_t{0} : ((std::uint64_t{1} << n) - 1)) << (u & 63);
+    const std::uint64_t bits = (n == 64 ? ~std::uint64_t{0} : ((std::uint64_t{1} << n) - 1)) << (u & 63);
     if (value) {
       row[u >> 6] |= bits;
     } else {

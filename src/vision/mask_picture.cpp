@@ -32,8 +32,7 @@ void write(const std::filesystem::path& file, const cv::Mat& picture) {
 
 }  // namespace
 
-void write_mask_png(const std::filesystem::path& file, const BinaryMask& mask,
-                    const BinaryMask& valid) {
+void write_mask_png(const std::filesystem::path& file, const BinaryMask& mask, const BinaryMask& valid) {
   if (mask.empty()) throw FileError(file.string() + ": there is no mask to write");
   cv::Mat picture(mask.height(), mask.width(), CV_8UC1);
   for (int v = 0; v < mask.height(); ++v) {
@@ -47,20 +46,18 @@ void write_mask_png(const std::filesystem::path& file, const BinaryMask& mask,
 
 void write_coverage_png(const std::filesystem::path& file, int width, int height,
                         const std::vector<std::uint8_t>& coverage) {
-  if (coverage.empty() || coverage.size() != static_cast<std::size_t>(width) *
-                                                 static_cast<std::size_t>(height)) {
+  if (coverage.empty() || coverage.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
     throw FileError(file.string() + ": there is no coverage of this size to write");
   }
   cv::Mat picture(height, width, CV_8UC1);
   for (int v = 0; v < height; ++v) {
-    std::copy_n(coverage.data() + static_cast<std::ptrdiff_t>(v) * width, width,
-                picture.ptr<std::uint8_t>(v));
+    std::copy_n(coverage.data() + static_cast<std::ptrdiff_t>(v) * width, width, picture.ptr<std::uint8_t>(v));
   }
   write(file, picture);
 }
 
-void write_overlay_png(const std::filesystem::path& file, const Image& image,
-                       const BinaryMask& mask, const BinaryMask& valid) {
+void write_overlay_png(const std::filesystem::path& file, const Image& image, const BinaryMask& mask,
+                       const BinaryMask& valid) {
   if (image.empty() || mask.width() != image.width || mask.height() != image.height) {
     throw FileError(file.string() + ": picture and mask differ in size");
   }
@@ -74,9 +71,8 @@ void write_overlay_png(const std::filesystem::path& file, const Image& image,
         out[2] = static_cast<std::uint8_t>((out[2] + 255) / 2);
       }
       if (!mask.at(u, v)) continue;
-      const bool inner = u > 0 && v > 0 && u + 1 < image.width && v + 1 < image.height &&
-                         mask.at(u - 1, v) && mask.at(u + 1, v) && mask.at(u, v - 1) &&
-                         mask.at(u, v + 1);
+      const bool inner = u > 0 && v > 0 && u + 1 < image.width && v + 1 < image.height && mask.at(u - 1, v) &&
+                         mask.at(u + 1, v) && mask.at(u, v - 1) && mask.at(u, v + 1);
       if (!inner) out = cv::Vec3b(0, 255, 0);
     }
   }

@@ -31,8 +31,8 @@ float noise_of(const Image& image) {
   for (int v = 1; v + 1 < image.height; v += 2) {
     for (int u = 1; u + 1 < image.width; u += 2) {
       const auto* p = image.pixel(u, v);
-      const int sum = p[-row - step] - 2 * p[-row] + p[-row + step] - 2 * p[-step] + 4 * p[0] -
-                      2 * p[step] + p[row - step] - 2 * p[row] + p[row + step];
+      const int sum = p[-row - step] - 2 * p[-row] + p[-row + step] - 2 * p[-step] + 4 * p[0] - 2 * p[step] +
+                      p[row - step] - 2 * p[row] + p[row + step];
       // The weights' norm is 6: in whole levels of one pixel's noise, finer by that much.
       ++histogram[static_cast<std::size_t>(std::min(std::abs(sum), 255))];
     }
@@ -46,8 +46,7 @@ std::size_t RegionStatistics::bin(const Image& image, std::size_t pixel) {
   // Gray pictures use their levels in full in one channel's place.
   if (image.channels == 1) return p[0];
   return (static_cast<std::size_t>(p[0] >> kShift) << (2 * kBits)) |
-         (static_cast<std::size_t>(p[1] >> kShift) << kBits) |
-         static_cast<std::size_t>(p[2] >> kShift);
+         (static_cast<std::size_t>(p[1] >> kShift) << kBits) | static_cast<std::size_t>(p[2] >> kShift);
 }
 
 float RegionStatistics::collect(const Image& image, const BinaryMask& where, const PixelBox& box,
@@ -71,8 +70,7 @@ float RegionStatistics::collect(const Image& image, const BinaryMask& where, con
 void RegionStatistics::measure_depth(const BinaryMask& predicted, int reach) {
   const auto width = static_cast<std::size_t>(predicted.width());
   const auto far = static_cast<std::int8_t>(reach + 1);
-  depth_.assign(width * static_cast<std::size_t>(predicted.height()),
-                static_cast<std::int8_t>(-far));
+  depth_.assign(width * static_cast<std::size_t>(predicted.height()), static_cast<std::int8_t>(-far));
   const auto add = [&](const BinaryMask& mask) {
     for (int v = box_.v0; v <= box_.v1; ++v) {
       const auto* row = mask.row(v);
@@ -112,8 +110,8 @@ void RegionStatistics::decide(const Image& image, int reach, BinaryMask& robot) 
   // A colour that neither side has shown says nothing.
   constexpr float kFloor = 1e-4f;
   for (std::size_t i = 0; i < kBins; ++i) {
-    const float odds = (robot_histogram_[i] * robot_scale + kFloor) /
-                       (background_histogram_[i] * background_scale + kFloor);
+    const float odds =
+        (robot_histogram_[i] * robot_scale + kFloor) / (background_histogram_[i] * background_scale + kFloor);
     evidence_[i] = std::clamp(std::log(odds), -kMostEvidence, kMostEvidence);
   }
 
@@ -134,13 +132,10 @@ void RegionStatistics::decide(const Image& image, int reach, BinaryMask& robot) 
   sum_row(box_.v0);
   for (int v = box_.v0; v <= box_.v1; ++v) {
     if (v < box_.v1) sum_row(v + 1);
-    const float* above =
-        row_sums_.data() + static_cast<std::size_t>(std::max(v - 1, box_.v0) % 3) * columns;
+    const float* above = row_sums_.data() + static_cast<std::size_t>(std::max(v - 1, box_.v0) % 3) * columns;
     const float* here = row_sums_.data() + static_cast<std::size_t>(v % 3) * columns;
-    const float* below =
-        row_sums_.data() + static_cast<std::size_t>(std::min(v + 1, box_.v1) % 3) * columns;
-    const auto* depth = depth_.data() + static_cast<std::size_t>(v) * width +
-                        static_cast<std::size_t>(box_.u0);
+    const float* below = row_sums_.data() + static_cast<std::size_t>(std::min(v + 1, box_.v1) % 3) * columns;
+    const auto* depth = depth_.data() + static_cast<std::size_t>(v) * width + static_cast<std::size_t>(box_.u0);
     for (std::size_t u = 0; u < columns; ++u) {
       const int d = depth[u];
       const float odds = (above[u] + here[u] + below[u]) / 9.0f + kPriorSlope * static_cast<float>(d);
@@ -150,8 +145,7 @@ void RegionStatistics::decide(const Image& image, int reach, BinaryMask& robot) 
   }
 }
 
-void RegionStatistics::average_background(const Image& image, const BinaryMask& robot,
-                                          BackgroundModel& local) {
+void RegionStatistics::average_background(const Image& image, const BinaryMask& robot, BackgroundModel& local) {
   const auto channels = static_cast<std::size_t>(image.channels);
   const auto columns = static_cast<std::size_t>(box_.width());
   const auto rows = static_cast<std::size_t>(box_.height());
@@ -191,8 +185,8 @@ void RegionStatistics::average_background(const Image& image, const BinaryMask& 
   for (int v = box_.v0; v <= box_.v1; ++v) {
     add_row(v + kLocalRadius, 1);
     for (std::size_t u = 0; u < columns; ++u) {
-      const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) +
-                     static_cast<std::size_t>(box_.u0) + u;
+      const auto i =
+          static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(box_.u0) + u;
       const auto weight = static_cast<float>(columns_[(channels + 1) * columns + u]);
       if (weight < 1.0f) continue;
       float squares = static_cast<float>(columns_[channels * columns + u]) / weight;
@@ -202,18 +196,16 @@ void RegionStatistics::average_background(const Image& image, const BinaryMask& 
         squares -= mean * mean;
       }
       // A varied background is no more certain than it is varied.
-      local.precision[i] = 1.0f / (std::max(squares, 0.0f) / static_cast<float>(channels) +
-                                   local.noise_sd * local.noise_sd);
+      local.precision[i] =
+          1.0f / (std::max(squares, 0.0f) / static_cast<float>(channels) + local.noise_sd * local.noise_sd);
     }
     add_row(v - kLocalRadius, -1);
   }
 }
 
-void RegionStatistics::separate(const Image& image, const BinaryMask& predicted,
-                                const VisionSetup& setup, BinaryMask& robot,
-                                BackgroundModel& local) {
-  if (local.width != image.width || local.height != image.height ||
-      local.channels != image.channels) {
+void RegionStatistics::separate(const Image& image, const BinaryMask& predicted, const VisionSetup& setup,
+                                BinaryMask& robot, BackgroundModel& local) {
+  if (local.width != image.width || local.height != image.height || local.channels != image.channels) {
     local = BackgroundModel(image.width, image.height, image.channels);
   }
   std::fill(local.precision.begin(), local.precision.end(), 0.0f);

@@ -23,8 +23,8 @@ class RegionStatistics {
   /// @param robot      out: pixels taken for robot
   /// @param local      out: mean colour of the background next to the robot, known within reach of
   ///   its outline only
-  void separate(const Image& image, const BinaryMask& predicted, const VisionSetup& setup,
-                BinaryMask& robot, BackgroundModel& local);
+  void separate(const Image& image, const BinaryMask& predicted, const VisionSetup& setup, BinaryMask& robot,
+                BackgroundModel& local);
 
  private:
   static constexpr int kBits = 4;  // per channel
@@ -32,8 +32,7 @@ class RegionStatistics {
   using Histogram = std::vector<float>;
 
   [[nodiscard]] static std::size_t bin(const Image& image, std::size_t pixel);
-  static float collect(const Image& image, const BinaryMask& where, const PixelBox& box,
-                       Histogram& histogram);
+  static float collect(const Image& image, const BinaryMask& where, const PixelBox& box, Histogram& histogram);
   void measure_depth(const BinaryMask& predicted, int reach);
   void decide(const Image& image, int reach, BinaryMask& robot);
   void average_background(const Image& image, const BinaryMask& robot, BackgroundModel& local);
@@ -42,8 +41,8 @@ class RegionStatistics {
   MaskMorphology morphology_;
   BinaryMask inside_, outside_, work_;
   Histogram robot_histogram_, remembered_, background_histogram_;
-  std::vector<float> evidence_;        ///< log odds by colour
-  std::vector<std::int8_t> depth_;     ///< steps inside (positive) or outside the prediction
+  std::vector<float> evidence_;     ///< log odds by colour
+  std::vector<std::int8_t> depth_;  ///< steps inside (positive) or outside the prediction
   std::vector<float> row_sums_, odds_;
   std::array<std::vector<int>, 5> sums_;
   std::vector<int> columns_;

@@ -52,8 +52,7 @@ void pack_bits(const std::uint8_t* bytes, std::size_t count, std::uint64_t* word
   }
 }
 
-BackgroundModel load_background(const VisionSetup& setup, const std::string& camera, int width,
-                                int height) {
+BackgroundModel load_background(const VisionSetup& setup, const std::string& camera, int width, int height) {
   const auto found = setup.background_pictures.find(camera);
   if (found == setup.background_pictures.end()) {
     throw ConfigurationError("vision.background_pictures: no picture for camera '" + camera + "'");
@@ -85,8 +84,8 @@ BackgroundModel load_background(const VisionSetup& setup, const std::string& cam
 
 struct Segmenter::Impl {
   Impl(const VisionSetup& s, std::string name, int w, int h)
-      : setup(s), camera(std::move(name)), width(w), height(h), single_colour(s, w, h),
-        learned(s, w, h), detected(w, h), sure(w, h), uncertain(w, h), robot(w, h),
+      : setup(s), camera(std::move(name)), width(w), height(h), single_colour(s, w, h), learned(s, w, h),
+        detected(w, h), sure(w, h), uncertain(w, h), robot(w, h),
         hits((static_cast<std::size_t>(w) + 63) / 64 * 64, 0) {}
 
   void check(const Image& image);
@@ -127,19 +126,17 @@ struct Segmenter::Impl {
 };
 
 void Segmenter::Impl::check(const Image& image) {
-  const auto expected = static_cast<std::size_t>(image.width) *
-                        static_cast<std::size_t>(image.height) *
+  const auto expected = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height) *
                         static_cast<std::size_t>(std::max(image.channels, 0));
-  if (image.empty() || image.width != width || image.height != height ||
-      (image.channels != 1 && image.channels != 3) || image.data.size() != expected) {
-    throw DataError("camera '" + camera + "': picture of " +
-                    size_text(image.width, image.height, image.channels) + " with " +
-                    std::to_string(image.data.size()) + " bytes, expected " +
-                    std::to_string(width) + "x" + std::to_string(height) + ", 1 or 3 channels");
+  if (image.empty() || image.width != width || image.height != height || (image.channels != 1 && image.channels != 3) ||
+      image.data.size() != expected) {
+    throw DataError("camera '" + camera + "': picture of " + size_text(image.width, image.height, image.channels) +
+                    " with " + std::to_string(image.data.size()) + " bytes, expected " + std::to_string(width) + "x" +
+                    std::to_string(height) + ", 1 or 3 channels");
   }
   if (image.channels != given.channels && given.channels != 0) {
-    throw DataError("camera '" + camera + "': picture with " + std::to_string(image.channels) +
-                    " channels, expected " + std::to_string(given.channels) + " as in the background");
+    throw DataError("camera '" + camera + "': picture with " + std::to_string(image.channels) + " channels, expected " +
+                    std::to_string(given.channels) + " as in the background");
   }
 }
 
@@ -182,8 +179,7 @@ void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model) {
     const float least_sigma = variances * sigma * sigma;
     std::uint8_t* hit = hits.data();
     for (std::size_t u = 0; u < w; ++u) {
-      hit[u] = static_cast<std::uint8_t>((score[u] * precision[u] > least_sigma) &
-                                         (score[u] > limit));
+      hit[u] = static_cast<std::uint8_t>((score[u] * precision[u] > least_sigma) & (score[u] > limit));
     }
     pack_bits(hit, w, out);
   };
@@ -250,11 +246,10 @@ void Segmenter::Impl::mark_valid(const BackgroundModel& model, BinaryMask& valid
   }
 }
 
-void Segmenter::Impl::refine(const Image& image, const BackgroundModel& model, BinaryMask& mask,
-                             BinaryMask& valid, std::vector<std::uint8_t>& coverage) {
-  coverage_estimator.estimate(image, model, detected, sure,
-                              static_cast<float>(setup.least_contrast_sigma), mask, uncertain,
-                              coverage);
+void Segmenter::Impl::refine(const Image& image, const BackgroundModel& model, BinaryMask& mask, BinaryMask& valid,
+                             std::vector<std::uint8_t>& coverage) {
+  coverage_estimator.estimate(image, model, detected, sure, static_cast<float>(setup.least_contrast_sigma), mask,
+                              uncertain, coverage);
   if (setup.method == SegmentationMethod::kStatistics) {
     soften(mask, coverage);
   } else {
@@ -285,8 +280,8 @@ void Segmenter::Impl::soften(BinaryMask& mask, std::vector<std::uint8_t>& covera
           sum += sure.at(a, b) ? (2 - std::abs(du)) * (2 - std::abs(dv)) : 0;
         }
       }
-      coverage[static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
-               static_cast<std::size_t>(u)] = static_cast<std::uint8_t>(std::min(sum * 16, 255));
+      coverage[static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u)] =
+          static_cast<std::uint8_t>(std::min(sum * 16, 255));
       mask.set(u, v, sum >= 8);
     }
   }
@@ -342,10 +337,12 @@ bool Segmenter::ready() const {
   return impl_->learned_offline || impl_->learned.frames_seen() >= impl_->setup.learning_frames;
 }
 
-const BackgroundModel& Segmenter::background() const { return impl_->background(); }
+const BackgroundModel& Segmenter::background() const {
+  return impl_->background();
+}
 
-void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
-                        std::vector<std::uint8_t>& coverage, const BinaryMask* predicted) {
+void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid, std::vector<std::uint8_t>& coverage,
+                        const BinaryMask* predicted) {
   admit(image);
   auto& self = *impl_;
   self.just_learned = false;

@@ -17,7 +17,9 @@ constexpr double kMemory = 0.9;
 constexpr int kEagerFrames = 20;
 constexpr int kUpkeepFrames = 5;
 
-std::array<double, 6> terms_at(double x, double y) { return {1.0, x, y, x * x, x * y, y * y}; }
+std::array<double, 6> terms_at(double x, double y) {
+  return {1.0, x, y, x * x, x * y, y * y};
+}
 
 }  // namespace
 
@@ -128,8 +130,7 @@ void SingleColourBackground::solve(const Moments& moments, std::size_t terms) {
   Matrix normal(n, n);
   for (std::size_t i = 0; i < terms; ++i) {
     for (std::size_t j = 0; j < terms; ++j) {
-      normal(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
-          moments.normal[i * kTerms + j];
+      normal(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = moments.normal[i * kTerms + j];
     }
   }
   // A trace of ridge on slope and curvature keeps corners that nothing supports from running off.
@@ -170,8 +171,7 @@ void SingleColourBackground::update(const Image& frame) {
       accumulate(gate, moments);
       solve(moments, terms);
       history_ = moments;
-      gate = round < 16 ? kWidestGate
-                        : std::clamp(5.0 * inlier_quantile(kWidestGate, false), 1.5, kWidestGate);
+      gate = round < 16 ? kWidestGate : std::clamp(5.0 * inlier_quantile(kWidestGate, false), 1.5, kWidestGate);
     }
     ready_ = true;
   } else {
@@ -202,8 +202,7 @@ void SingleColourBackground::update(const Image& frame) {
 }
 
 void SingleColourBackground::render() {
-  std::fill(model_.precision.begin(), model_.precision.end(),
-            1.0f / (model_.noise_sd * model_.noise_sd));
+  std::fill(model_.precision.begin(), model_.precision.end(), 1.0f / (model_.noise_sd * model_.noise_sd));
   // Pixel u lies at (u + 1/2) / block in block units, whatever remains beyond the last block.
   const double scale_x = 2.0 / (static_cast<double>(columns_) * std::min(kBlock, model_.width));
   const double scale_y = 2.0 / (static_cast<double>(rows_) * std::min(kBlock, model_.height));
@@ -215,8 +214,8 @@ void SingleColourBackground::render() {
       const auto a = static_cast<float>(s[0] + s[2] * y + s[5] * y * y);
       const auto b = static_cast<float>(s[1] + s[4] * y);
       const auto q = static_cast<float>(s[3]);
-      float* out = model_.mean.data() +
-                   static_cast<std::size_t>(v) * static_cast<std::size_t>(model_.width) * channels + c;
+      float* out =
+          model_.mean.data() + static_cast<std::size_t>(v) * static_cast<std::size_t>(model_.width) * channels + c;
       for (int u = 0; u < model_.width; ++u, out += channels) {
         const float x = (static_cast<float>(u) + 0.5f) * static_cast<float>(scale_x) - 1.0f;
         *out = a + x * (b + q * x);

@@ -6,26 +6,22 @@ namespace bodyschema {
 
 VisionSetup VisionSetup::from(const Configuration& vision) {
   VisionSetup setup;
-  const auto method =
-      vision.choice_or("method", "learned_background",
-                       {"single_colour", "background_picture", "learned_background", "statistics"});
+  const auto method = vision.choice_or("method", "learned_background",
+                                       {"single_colour", "background_picture", "learned_background", "statistics"});
   if (method == "single_colour") setup.method = SegmentationMethod::kSingleColour;
   if (method == "background_picture") setup.method = SegmentationMethod::kBackgroundPicture;
   if (method == "learned_background") setup.method = SegmentationMethod::kLearnedBackground;
   if (method == "statistics") setup.method = SegmentationMethod::kStatistics;
-  setup.edges = vision.choice_or("edges", "blurred", {"blurred", "hard"}) == "hard"
-                    ? EdgeKind::kHard
-                    : EdgeKind::kBlurred;
+  setup.edges =
+      vision.choice_or("edges", "blurred", {"blurred", "hard"}) == "hard" ? EdgeKind::kHard : EdgeKind::kBlurred;
 
   setup.noise_levels = vision.number_or("noise_levels", setup.noise_levels, 0.0, 64.0);
   setup.threshold_sigma = vision.number_or("threshold_sigma", setup.threshold_sigma, 1.0, 100.0);
   setup.threshold_levels = vision.number_or("threshold_levels", setup.threshold_levels, 0.0, 254.0);
-  setup.least_contrast_sigma =
-      vision.number_or("least_contrast_sigma", setup.least_contrast_sigma, 0.0, 100.0);
+  setup.least_contrast_sigma = vision.number_or("least_contrast_sigma", setup.least_contrast_sigma, 0.0, 100.0);
   setup.min_component_px =
       static_cast<int>(vision.integer_or("min_component_px", setup.min_component_px, 0, 1'000'000));
-  setup.max_hole_px =
-      static_cast<int>(vision.integer_or("max_hole_px", setup.max_hole_px, 0, 1'000'000));
+  setup.max_hole_px = static_cast<int>(vision.integer_or("max_hole_px", setup.max_hole_px, 0, 1'000'000));
 
   const auto rgb = vision.numbers_or("background_rgb", {});
   if (!rgb.empty()) {
@@ -45,10 +41,8 @@ VisionSetup VisionSetup::from(const Configuration& vision) {
   }
   setup.black_is_unknown = vision.boolean_or("black_is_unknown", setup.black_is_unknown);
 
-  setup.learning_frames =
-      static_cast<int>(vision.integer_or("learning_frames", setup.learning_frames, 2, 10'000));
-  setup.min_sightings =
-      static_cast<int>(vision.integer_or("min_sightings", setup.min_sightings, 1, 64));
+  setup.learning_frames = static_cast<int>(vision.integer_or("learning_frames", setup.learning_frames, 2, 10'000));
+  setup.min_sightings = static_cast<int>(vision.integer_or("min_sightings", setup.min_sightings, 1, 64));
   setup.search_px = static_cast<int>(vision.integer_or("search_px", setup.search_px, 2, 64));
   return setup;
 }

@@ -70,16 +70,15 @@ class OneSource : public testing::Test {
  protected:
   void SetUp() override {
     // Before the receiver's thread begins and until it has ended: spdlog's loggers may not be exchanged beside it.
-    spdlog::set_default_logger(std::make_shared<spdlog::logger>(
-        "test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log_)));
+    spdlog::set_default_logger(
+        std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log_)));
     try {
       link_ = std::make_unique<LcmLink>("udpm://239.255.76.67:" + std::to_string(port_) + "?ttl=0", 60.0);
     } catch (const Error& e) {
       GTEST_SKIP() << "LCM needs a multicast route (scripts/multicast adds it): " << e.what();
     }
-    link_->subscribe(kChannel, 4, [this](const std::string&, Bytes message, std::int64_t) {
-      sizes_.push_back(message.size());
-    });
+    link_->subscribe(kChannel, 4,
+                     [this](const std::string&, Bytes message, std::int64_t) { sizes_.push_back(message.size()); });
     sender_.message();
     if (!link_->handle(2000)) {
       GTEST_SKIP() << "no multicast packet comes back on this machine: LCM needs a route (scripts/multicast adds it)";
@@ -153,7 +152,8 @@ TEST_F(OneSource, TwoOthersInTurnDoNotFillTheLog) {
 }
 
 TEST(LcmLink, ASignalDoesNotEndTheReceiving) {
-  struct sigaction action {}, previous {};
+  struct sigaction action {
+  }, previous{};
   action.sa_handler = [](int) {};
   sigaction(SIGUSR1, &action, &previous);
   LcmLink link("memq://");

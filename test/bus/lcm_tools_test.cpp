@@ -108,7 +108,8 @@ class LcmTools : public ::testing::Test {
   void SetUp() override {
     if (std::string(BODYSCHEMA_LCM_LOGGER).find("NOTFOUND") != std::string::npos ||
         std::string(BODYSCHEMA_LCM_LOGPLAYER).find("NOTFOUND") != std::string::npos) {
-      GTEST_SKIP() << "lcm-logger and lcm-logplayer come with the package liblcm-bin, which is not installed (scripts/setup brings it)";
+      GTEST_SKIP() << "lcm-logger and lcm-logplayer come with the package liblcm-bin, which is not installed "
+                      "(scripts/setup brings it)";
     }
     directory_ = std::filesystem::temp_directory_path() / ("bodyschema_lcm_tools_" + std::to_string(getpid()));
     std::filesystem::create_directories(directory_);

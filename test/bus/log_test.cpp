@@ -41,8 +41,8 @@ class LogFiles : public ::testing::Test {
     return {std::istreambuf_iterator<char>(in), {}};
   }
   void spit(const Content& bytes) const {
-    std::ofstream(file_, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()),
-                                                 static_cast<std::streamsize>(bytes.size()));
+    std::ofstream(file_, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
   /// Every event that can be read; checks that each is one that was written.
   std::vector<std::int64_t> readable() const {
@@ -124,7 +124,8 @@ TEST_F(LogFiles, CutAnywhereKeepTheirWholeEvents) {
   }
   for (std::size_t n = ends[0]; n < whole.size(); ++n) {
     spit(Content(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n)));
-    const auto expected = static_cast<std::size_t>(std::count_if(ends.begin(), ends.end(), [&](auto e) { return e <= n; }));
+    const auto expected =
+        static_cast<std::size_t>(std::count_if(ends.begin(), ends.end(), [&](auto e) { return e <= n; }));
     EXPECT_EQ(readable().size(), expected) << "cut at " << n;
   }
 }

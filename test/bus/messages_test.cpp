@@ -309,8 +309,8 @@ TEST(Decode, DoesNotLookAtEffort) {
 }
 
 TEST(Decode, RefusesStampsThatCannotBe) {
-  for (const std::int64_t stamp : {std::int64_t{-1}, std::numeric_limits<std::int64_t>::max(),
-                                   std::numeric_limits<std::int64_t>::min()}) {
+  for (const std::int64_t stamp :
+       {std::int64_t{-1}, std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
     auto message = joint_state();
     message.utime = stamp;
     JointStateMessage out;
@@ -433,7 +433,9 @@ TEST(Unpack, SurvivesDamagedJpeg) {
   }
 }
 
-TEST(ToJpegMessage, RefusesAnEmptyPicture) { EXPECT_THROW(to_jpeg_message(Image{}, 0, 90), DataError); }
+TEST(ToJpegMessage, RefusesAnEmptyPicture) {
+  EXPECT_THROW(to_jpeg_message(Image{}, 0, 90), DataError);
+}
 
 TEST(Names, AreOnePerValue) {
   EXPECT_EQ(name_of(MessageFault::kNone), "none");

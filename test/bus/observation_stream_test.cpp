@@ -113,8 +113,8 @@ TEST(ObservationStream, ALegThatFallsSilentIsNotMissed) {
            "' type='continuous'><parent link='base'/><child link='" + child + "'/><axis xyz='0 0 1'/></joint>";
   };
   RobotSetup setup;
-  setup.model.urdf = folder.write("robot.urdf", "<robot name='r'><link name='base'/>" + joint("arm", "hand") +
-                                                    joint("knee", "foot") + "</robot>");
+  setup.model.urdf = folder.write(
+      "robot.urdf", "<robot name='r'><link name='base'/>" + joint("arm", "hand") + joint("knee", "foot") + "</robot>");
   setup.hand_link = "hand";
   setup.estimated_joints = {"arm"};
   StereoRig cameras;
@@ -222,7 +222,8 @@ TEST(ObservationStream, ServesAMonoRigOfTheRightCamera) {
 }
 
 TEST(BusOptions, ReadTheirSectionAndRefuseNonsense) {
-  const auto configuration = Configuration::parse("bus: {channel_prefix: ROBOT, pairing_window_ms: 20, joint_velocity: differences}");
+  const auto configuration =
+      Configuration::parse("bus: {channel_prefix: ROBOT, pairing_window_ms: 20, joint_velocity: differences}");
   const BusOptions options = BusOptions::from(configuration.section("bus"));
   EXPECT_EQ(options.channels().cameras, "ROBOT_CAMERAS");
   EXPECT_EQ(options.synchroniser.pairing_window, 20 * kMs);

@@ -371,8 +371,8 @@ TEST_F(SynchroniserTest, NothingIsInterpolatedAcrossAJump) {
   for (const int ms : {5, 15, 20, 25}) picture(0, ms * kMs);
   std::vector<double> q;
   while (auto arrived = sync_->next()) q.push_back(arrived->observation.cameras[0]->joints.q[0]);
-  EXPECT_THAT(q, ElementsAre(testing::DoubleNear(0.1, 1e-6), testing::DoubleNear(1.1, 1e-6),
-                             testing::DoubleNear(1.1, 1e-6)));
+  EXPECT_THAT(
+      q, ElementsAre(testing::DoubleNear(0.1, 1e-6), testing::DoubleNear(1.1, 1e-6), testing::DoubleNear(1.1, 1e-6)));
   EXPECT_EQ(dropped(DropReason::kEncoderJump), 1u);
 }
 

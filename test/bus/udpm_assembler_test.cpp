@@ -31,7 +31,8 @@ Packet short_message(const std::string& channel, const Packet& data) {
 }
 
 /// As LCM cuts them: the first holds the channel besides.
-std::vector<Packet> fragments(const std::string& channel, const Packet& data, std::uint32_t sequence, std::size_t each) {
+std::vector<Packet> fragments(const std::string& channel, const Packet& data, std::uint32_t sequence,
+                              std::size_t each) {
   std::vector<Packet> packets;
   const std::size_t count = (data.size() + each - 1) / each;
   for (std::size_t i = 0; i < count; ++i) {

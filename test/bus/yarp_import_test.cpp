@@ -116,7 +116,8 @@ TEST_F(YarpImport, TurnsRowsAndPicturesIntoMessagesInOrderOfTime) {
     } else {
       EXPECT_THAT(joints.names, ElementsAre("tip", "elbow"));
       EXPECT_NEAR(joints.position_rad[0], radians(3.0), 1e-6);
-      EXPECT_NEAR(joints.position_rad[1], radians(90.0 + static_cast<double>(event.time_us % 100'000 - 1000) * 1e-4), 1e-5);
+      EXPECT_NEAR(joints.position_rad[1], radians(90.0 + static_cast<double>(event.time_us % 100'000 - 1000) * 1e-4),
+                  1e-5);
       const bool inner = event.time_us % 100'000 == 11'000;  // the ends know one neighbour only
       EXPECT_NEAR(joints.velocity_rad_s[1], inner ? radians(100.0) : 0.0, 1e-4);
     }
@@ -148,7 +149,8 @@ TEST_F(YarpImport, NamesFileAndLineOfWhatIsWrong) {
   EXPECT_THAT(with("arm/data.log", "-1 100.0 1 2 3\n-1 100.1 1 x2 3\n"),
               AllOf(HasSubstr("arm/data.log:2"), HasSubstr("'x2' is not a number")));
   EXPECT_THAT(with("arm/data.log", "-1 100.0 1 2 nan\n"), HasSubstr("'nan' is not a finite number"));
-  EXPECT_THAT(with("arm/data.log", "-1 100.0 1 2\n"), AllOf(HasSubstr("arm/data.log:1"), HasSubstr("has 2 values, expected 3")));
+  EXPECT_THAT(with("arm/data.log", "-1 100.0 1 2\n"),
+              AllOf(HasSubstr("arm/data.log:1"), HasSubstr("has 2 values, expected 3")));
   EXPECT_THAT(with("arm/data.log", "-1 soon 1 2 3\n"), HasSubstr("'soon' is not a time stamp"));
   EXPECT_THAT(with("arm/data.log", "-1 -5.0 1 2 3\n"), HasSubstr("not a time stamp"));
   EXPECT_THAT(with("arm/data.log", "-1\n"), HasSubstr("expected a counter, a time stamp and values"));
@@ -322,7 +324,8 @@ TEST_F(YarpImport, WarnsOfReadingsThatLookLikeTheOtherUnit) {
   EXPECT_THAT(import_with(in_radians).warnings, ElementsAre(HasSubstr("yarp_import.encoder_unit: deg")));
   write("head/data.log", "-1 100.0 0.17 0.07\n-1 100.02 0.17 0.07\n");
   write("arm/data.log", "-1 100.0 1.57 120 -2.5\n-1 100.01 1.58 120 -2.5\n");  // the second column is not used
-  EXPECT_THAT(import().warnings, ElementsAre(AllOf(HasSubstr("beyond 2.50"), HasSubstr("yarp_import.encoder_unit: rad"))));
+  EXPECT_THAT(import().warnings,
+              ElementsAre(AllOf(HasSubstr("beyond 2.50"), HasSubstr("yarp_import.encoder_unit: rad"))));
   EXPECT_TRUE(import_with(in_radians).warnings.empty());
 }
 
@@ -346,17 +349,20 @@ yarp_import:
   write("arm/data.log", "-1 100.001 90.0 1\n");
   EXPECT_THROW(import_yarp(directory_, with_hand, Channels::with_prefix("ICUB"), directory_ / "out.log"), FileError);
   write_recording();
-  EXPECT_TRUE(import_yarp(directory_, with_hand, Channels::with_prefix("ICUB"), directory_ / "out.log").warnings.empty());
+  EXPECT_TRUE(
+      import_yarp(directory_, with_hand, Channels::with_prefix("ICUB"), directory_ / "out.log").warnings.empty());
 }
 
 TEST_F(YarpImport, FoldersOfAnIncludedFileCanBeTakenOut) {
   write_recording();
-  write("base.yaml", "yarp_import:\n  encoders: {head: [version, vergence], rightArm: [elbow, '-', distal], leftArm: [x]}\n"
-                     "  optional_from: {rightArm: '-'}\n"
-                     "  combined_joints: {l_pan: {version: 1}, r_pan: {x: 1}}\n"
-                     "  images: {left: images/left, right: images/right}\n");
-  write("mine.yaml", "include: base.yaml\nyarp_import:\n  encoders: {rightArm: [], leftArm: null, arm: [elbow, '-', distal]}\n"
-                     "  combined_joints: {r_pan: null}\n  images: {left: left, right: ''}\n");
+  write("base.yaml",
+        "yarp_import:\n  encoders: {head: [version, vergence], rightArm: [elbow, '-', distal], leftArm: [x]}\n"
+        "  optional_from: {rightArm: '-'}\n"
+        "  combined_joints: {l_pan: {version: 1}, r_pan: {x: 1}}\n"
+        "  images: {left: images/left, right: images/right}\n");
+  write("mine.yaml",
+        "include: base.yaml\nyarp_import:\n  encoders: {rightArm: [], leftArm: null, arm: [elbow, '-', distal]}\n"
+        "  combined_joints: {r_pan: null}\n  images: {left: left, right: ''}\n");
   const auto configuration = Configuration::load(directory_ / "mine.yaml");
   const auto options = YarpImportOptions::from(configuration.section("yarp_import"));
   configuration.reject_unknown_keys();
@@ -371,9 +377,11 @@ TEST_F(YarpImport, NamesWhatIsMissing) {
   std::filesystem::remove_all(directory_ / "arm");
   EXPECT_THAT(error(), AllOf(HasSubstr("no such folder"), HasSubstr("yarp_import.encoders.arm"),
                              HasSubstr("it holds head, left, right")));
-  EXPECT_THROW(import_yarp(directory_ / "nowhere", options(), Channels::with_prefix("A"), directory_ / "out.log"), FileError);
+  EXPECT_THROW(import_yarp(directory_ / "nowhere", options(), Channels::with_prefix("A"), directory_ / "out.log"),
+               FileError);
   write_recording();
-  EXPECT_THROW(import_yarp(directory_, options(), Channels::with_prefix("A"), directory_ / "no/folder/out.log"), FileError);
+  EXPECT_THROW(import_yarp(directory_, options(), Channels::with_prefix("A"), directory_ / "no/folder/out.log"),
+               FileError);
 }
 
 TEST_F(YarpImport, ConfigurationErrorsNameTheKey) {
@@ -388,13 +396,15 @@ TEST_F(YarpImport, ConfigurationErrorsNameTheKey) {
   EXPECT_THAT(error_in("yarp_import: {images: {left: l}}"), HasSubstr("encoders"));
   EXPECT_THAT(error_in("yarp_import: {encoders: {a: [x]}}"), HasSubstr("images"));
   EXPECT_THAT(error_in("yarp_import: {encoders: {a: [x, x]}, images: {left: l}}"), HasSubstr("'x' only once"));
-  EXPECT_THAT(error_in("yarp_import: {encoders: {a: [version]}, images: {left: l}, combined_joints: {pan: {verson: 1}}}"),
-              HasSubstr("did you mean 'version'"));
+  EXPECT_THAT(
+      error_in("yarp_import: {encoders: {a: [version]}, images: {left: l}, combined_joints: {pan: {verson: 1}}}"),
+      HasSubstr("did you mean 'version'"));
   EXPECT_THAT(error_in("yarp_import: {encoders: {a: [x, y]}, optional_from: {a: x}, images: {left: l}}"),
               HasSubstr("a column of this folder, not its first"));
   EXPECT_THAT(error_in("yarp_import: {encoders: {a: []}, images: {left: l}}"), HasSubstr("encoders"));
-  EXPECT_THAT(error_in("yarp_import: {encoders: {a: [x], b: [y]}, images: {left: l}, combined_joints: {s: {x: 1, y: 1}}}"),
-              HasSubstr("columns of one folder"));
+  EXPECT_THAT(
+      error_in("yarp_import: {encoders: {a: [x], b: [y]}, images: {left: l}, combined_joints: {s: {x: 1, y: 1}}}"),
+      HasSubstr("columns of one folder"));
 }
 
 /// The recording imported and synchronised as replay does it: at every kept picture the encoders must
@@ -439,9 +449,8 @@ TEST_F(YarpImport, RecordingGivesTheHeldEncodersAtEveryPicture) {
       ++observations;
       for (const auto& camera : arrived->observation.cameras) {
         ASSERT_TRUE(camera);
-        const auto hold = std::find_if(holds.begin(), holds.end(), [&](const Hold& h) {
-          return camera->utime >= h.from && camera->utime <= h.to;
-        });
+        const auto hold = std::find_if(holds.begin(), holds.end(),
+                                       [&](const Hold& h) { return camera->utime >= h.from && camera->utime <= h.to; });
         ASSERT_NE(hold, holds.end()) << camera->utime;
         ++hold->pictures;
         for (std::size_t j = 0; j < columns.size(); ++j) {

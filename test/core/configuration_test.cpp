@@ -28,8 +28,7 @@ std::string error_of(Action action) {
 class ConfigurationFiles : public ::testing::Test {
  protected:
   void SetUp() override {
-    directory_ = std::filesystem::temp_directory_path() /
-                 ("bodyschema_configuration_" + std::to_string(getpid()));
+    directory_ = std::filesystem::temp_directory_path() / ("bodyschema_configuration_" + std::to_string(getpid()));
     std::filesystem::create_directories(directory_);
   }
   void TearDown() override { std::filesystem::remove_all(directory_); }
@@ -41,8 +40,8 @@ class ConfigurationFiles : public ::testing::Test {
 };
 
 TEST(Configuration, ReadsTypesAndDefaults) {
-  const auto c = Configuration::parse(
-      "filter: {particles: 200, spread_deg: 3.5, on: yes}\nnames: [a, b]\nk: [1, 2.5]\n");
+  const auto c =
+      Configuration::parse("filter: {particles: 200, spread_deg: 3.5, on: yes}\nnames: [a, b]\nk: [1, 2.5]\n");
   EXPECT_EQ(c.section("filter").integer("particles", 1, 1000), 200);
   EXPECT_DOUBLE_EQ(c.section("filter").number("spread_deg"), 3.5);
   EXPECT_TRUE(c.section("filter").boolean("on"));
@@ -75,9 +74,10 @@ TEST(Configuration, WrongTypeAndRangeSayWhatWasExpected) {
   const auto a = c.section("a");
   EXPECT_THAT(error_of([&] { (void)a.integer("n", 1, 10); }),
               AllOf(HasSubstr("'a.n' is 'abc'"), HasSubstr("a whole number from 1 to 10")));
-  EXPECT_THAT(error_of([&] { (void)a.number("r", 0, 5); }),
-              AllOf(HasSubstr("'7'"), HasSubstr("a number from 0 to 5")));
-  EXPECT_THAT(error_of([&] { (void)a.choice("e", {"atlas", "contour", "auto"}); }),
+  EXPECT_THAT(error_of([&] { (void)a.number("r", 0, 5); }), AllOf(HasSubstr("'7'"), HasSubstr("a number from 0 to 5")));
+  EXPECT_THAT(error_of([&] {
+                (void)a.choice("e", {"atlas", "contour", "auto"});
+              }),
               HasSubstr("expected atlas, contour or auto"));
   EXPECT_THAT(error_of([&] { (void)a.numbers("l"); }), HasSubstr("a list of numbers"));
   EXPECT_THAT(error_of([&] { (void)a.number("s"); }), HasSubstr("is a list"));
@@ -157,7 +157,8 @@ TEST_F(ConfigurationFiles, IncludeCycleAndMissingFileAreErrors) {
   EXPECT_THAT(error_of([&] { Configuration::load(file); }), HasSubstr("includes itself"));
   EXPECT_THAT(error_of([&] { Configuration::load(directory_ / "none.yaml"); }),
               AllOf(HasSubstr("none.yaml"), HasSubstr("no such configuration file")));
-  EXPECT_THAT(error_of([&] { Configuration::load(write("c.yaml", "x: 1\n"), {"novalue"}); }), HasSubstr("key.key=value"));
+  EXPECT_THAT(error_of([&] { Configuration::load(write("c.yaml", "x: 1\n"), {"novalue"}); }),
+              HasSubstr("key.key=value"));
 }
 
 TEST(Configuration, EnvironmentIsSubstituted) {

@@ -15,9 +15,8 @@ class InstallationTest : public testing::Test {
  protected:
   InstallationTest() {
     fs::remove_all(root_);
-    for (const char* folder : {"prefix/bin", "prefix/share/bodyschema/config",
-                               "prefix/share/bodyschema/meshes", "sources/config", "sources/meshes",
-                               "sources/build/release/bin", "elsewhere/bin"}) {
+    for (const char* folder : {"prefix/bin", "prefix/share/bodyschema/config", "prefix/share/bodyschema/meshes",
+                               "sources/config", "sources/meshes", "sources/build/release/bin", "elsewhere/bin"}) {
       fs::create_directories(root_ / folder);
     }
   }

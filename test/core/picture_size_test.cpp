@@ -27,8 +27,8 @@ TEST(PictureSize, IsNoneWhereThereIsNone) {
   for (const std::string& file : {""s, "P"s, "P7\n1 1"s, "BM\0\0\0\0\0\0"s, "\x89PNG\r\n\x1A"s}) {
     EXPECT_EQ(size_of(file), std::nullopt) << file;
   }
-  for (const std::string& file : {"P6\n#"s, "P5 x"s, "\xFF\xD8\xFF\xE0\xFF\xFF"s, "\xFF\xD8xxxxxxxxxxxx"s,
-                                  "\x89PNG\r\n\x1A\n"s}) {
+  for (const std::string& file :
+       {"P6\n#"s, "P5 x"s, "\xFF\xD8\xFF\xE0\xFF\xFF"s, "\xFF\xD8xxxxxxxxxxxx"s, "\x89PNG\r\n\x1A\n"s}) {
     EXPECT_EQ(size_of(file), (PictureSize{0, 0})) << file;
   }
 }

@@ -65,7 +65,9 @@ TEST(NoiseCorrelation, OfWhiteNoiseLengthensNoBlock) {
   EXPECT_EQ(noise_correlation_s({}), 0.0);
 }
 
-TEST(NoiseCorrelation, CountsTheSlowShareOnly) { EXPECT_LT(measured_s(1.0, 0.5), 0.8 * measured_s(1.0, 0.0)); }
+TEST(NoiseCorrelation, CountsTheSlowShareOnly) {
+  EXPECT_LT(measured_s(1.0, 0.5), 0.8 * measured_s(1.0, 0.0));
+}
 
 /// At once its covariance would take 26 GB.
 TEST(NoiseCorrelation, TakesAnHourOfRestInPieces) {
@@ -107,8 +109,9 @@ class Shaking final : public MeasurementSource {
 TEST(BlockPlan, ShakingFingersDoNotHideARest) {
   const auto log = make_synthetic_log(test::robot(), {}, 1);
   std::vector<CompressedView> views;
-  log->compress(std::vector<Corrections>(log->views().size(), Corrections(static_cast<Eigen::Index>(log->roles().names.size()))),
-                views);
+  log->compress(
+      std::vector<Corrections>(log->views().size(), Corrections(static_cast<Eigen::Index>(log->roles().names.size()))),
+      views);
   const auto plan = plan_blocks(Shaking(*log, test::seed()), views, 2.0);
   EXPECT_NEAR(plan.still_share, 1.0 / 6.0, 0.08);
   EXPECT_GT(plan.correlation_s, 0.0);
@@ -117,8 +120,9 @@ TEST(BlockPlan, ShakingFingersDoNotHideARest) {
 TEST(BlockPlan, ARestIsOneBlockThatWeighsAsOne) {
   const auto log = make_synthetic_log(test::robot(), {}, 1);
   std::vector<CompressedView> views;
-  log->compress(std::vector<Corrections>(log->views().size(), Corrections(static_cast<Eigen::Index>(log->roles().names.size()))),
-                views);
+  log->compress(
+      std::vector<Corrections>(log->views().size(), Corrections(static_cast<Eigen::Index>(log->roles().names.size()))),
+      views);
   const auto plan = plan_blocks(*log, views, 2.0);
   ASSERT_EQ(plan.block_of_view.size(), log->views().size());
   EXPECT_GE(plan.length_s, 2.0);

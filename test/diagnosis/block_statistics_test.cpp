@@ -53,8 +53,8 @@ TEST(BlockStatistics, HoldsOutWhatItSaysItHoldsOut) {
     y << r.y.head(b * 20), r.y.tail(380 - b * 20);
     const Eigen::VectorXd without = X.colPivHouseholderQr().solve(y);
     EXPECT_LT((fit.replicas.col(b) - without).norm(), 1e-9);
-    EXPECT_NEAR(fit.heldout_loss[b],
-                (r.y.segment(b * 20, 20) - r.X.middleRows(b * 20, 20) * without).squaredNorm(), 1e-8);
+    EXPECT_NEAR(fit.heldout_loss[b], (r.y.segment(b * 20, 20) - r.X.middleRows(b * 20, 20) * without).squaredNorm(),
+                1e-8);
   }
 }
 
@@ -140,9 +140,9 @@ TEST(NestedFits, SayHowMuchOfAColumnIsItsOwn) {
 
 TEST(EquivalentZ, AgreesWithChiSquareTables) {
   EXPECT_DOUBLE_EQ(equivalent_z(9.0, 1), 3.0);
-  EXPECT_NEAR(equivalent_z(5.991, 2), 1.645, 0.02);   // 95 % one-sided
+  EXPECT_NEAR(equivalent_z(5.991, 2), 1.645, 0.02);  // 95 % one-sided
   EXPECT_NEAR(equivalent_z(11.070, 5), 1.645, 0.02);
-  EXPECT_NEAR(equivalent_z(13.816, 2), 3.09, 0.05);   // 99.9 %
+  EXPECT_NEAR(equivalent_z(13.816, 2), 3.09, 0.05);  // 99.9 %
   EXPECT_LT(equivalent_z(100.0, 6), 10.0);
   EXPECT_GT(equivalent_z(100.0, 6), 6.0);
 }

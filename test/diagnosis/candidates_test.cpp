@@ -15,7 +15,9 @@ namespace {
 
 using testing::HasSubstr;
 
-Linearisation at_zero(MeasurementSource& log) { return linearise(log, ErrorModel(log.roles())); }
+Linearisation at_zero(MeasurementSource& log) {
+  return linearise(log, ErrorModel(log.roles()));
+}
 
 const NotTestable* find(const std::vector<NotTestable>& list, const CauseName& cause) {
   const auto at = std::find_if(list.begin(), list.end(), [&](const auto& n) { return n.cause == cause; });
@@ -26,8 +28,8 @@ TEST(Candidates, AreTheCatalogueTheSlipsAndTheGenericFeatures) {
   const auto log = make_synthetic_log(test::robot(), {}, 1);
   const auto at = at_zero(*log);
   const auto plan = plan_blocks(*log, at.views, 2.0);
-  const auto set = make_candidates(*log, at, plan, CoordinateLayout(log->roles()),
-                                   usual_nuisances(log->roles()), {{{"backlash", "r_elbow", ""}, "for a test"}});
+  const auto set = make_candidates(*log, at, plan, CoordinateLayout(log->roles()), usual_nuisances(log->roles()),
+                                   {{{"backlash", "r_elbow", ""}, "for a test"}});
   EXPECT_EQ(set.offsets.size(), 7u);
   std::size_t nuisances = 0, generic = 0, slips = 0, backlashes = 0;
   for (const auto& c : set.candidates) {

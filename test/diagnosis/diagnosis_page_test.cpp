@@ -77,9 +77,8 @@ TEST(DiagnosisPage, BeginsWithTheVerdictAndShowsEveryPart) {
   EXPECT_LT(verdict, gain);
   EXPECT_LT(gain, chart);
   for (const char* part : {"3.5 to 4.5", "31.0 %", "Sweep r_elbow", "eccentricity of r_elbow", "0.900 px", "0.300 px",
-                           "threshold 0.6 %", "What this log cannot test", "no masses", "latency", "4.2 ms",
-                           "61 %", "93 %", "z = 4.5", "3.0 for a slip",
-                           "rising against falling"}) {
+                           "threshold 0.6 %", "What this log cannot test", "no masses", "latency", "4.2 ms", "61 %",
+                           "93 %", "z = 4.5", "3.0 for a slip", "rising against falling"}) {
     EXPECT_THAT(page, HasSubstr(part));
   }
 }

@@ -31,7 +31,9 @@ TrialOptions log_with(std::vector<TrialFault> faults) {
   return options;
 }
 
-DiagnosisReport diagnosis(MeasurementSource& log) { return diagnose(log, usual_options(log)); }
+DiagnosisReport diagnosis(MeasurementSource& log) {
+  return diagnose(log, usual_options(log));
+}
 
 const DiagnosedCause* find(const DiagnosisReport& report, const CauseName& cause) {
   for (const auto& c : report.causes) {
@@ -52,9 +54,10 @@ TEST(LazyBreakers, NothingWrongIsNothing) {
 TEST(LazyBreakers, AModelOfAnotherRobotIsWrongInSeveralLengthsAndInNothingElse) {
   // The differences between the first iCub's nominal lengths and those of a robot built otherwise.
   const auto log = make_synthetic_log(
-      robot(), log_with({fault("base_shift", "", -7.6, 2.0), fault("axis_shift", "r_shoulder_yaw", -15.4),
-                         fault("axis_shift", "r_elbow", 30.4, 5.0), fault("axis_shift", "r_wrist_prosup", 3.9, 15.0),
-                         fault("axis_shift", "r_wrist_pitch", 3.7)}),
+      robot(),
+      log_with({fault("base_shift", "", -7.6, 2.0), fault("axis_shift", "r_shoulder_yaw", -15.4),
+                fault("axis_shift", "r_elbow", 30.4, 5.0), fault("axis_shift", "r_wrist_prosup", 3.9, 15.0),
+                fault("axis_shift", "r_wrist_pitch", 3.7)}),
       test::log_seed());
   auto options = usual_options(*log);
   options.noise_rms_px = 0.8;  // with it offsets alone do not explain the log
@@ -101,7 +104,8 @@ TEST(LazyBreakers, IntervalsHoldWhatAllBlocksErrInAlike) {
     held += holds(kShare);
     held_by_blocks_alone += holds(0.0);
   }
-  std::cout << held << " of " << kLogs << " intervals hold, " << held_by_blocks_alone << " by blocks alone" << std::endl;
+  std::cout << held << " of " << kLogs << " intervals hold, " << held_by_blocks_alone << " by blocks alone"
+            << std::endl;
   EXPECT_GE(held, test::fewest_right(std::vector<double>(kLogs, 0.93)));
   EXPECT_LT(held_by_blocks_alone, held);
 }
@@ -191,15 +195,14 @@ TEST(LazyBreakers, AnExactlyAliasedPairIsAClass) {
   ASSERT_FALSE(report.causes.empty());
   const auto& same = report.causes[0].same;
   EXPECT_THAT(same, testing::Contains(CauseName{"encoder_gain", "r_elbow", ""})) << report.sentence;
-  EXPECT_THAT(same, testing::Contains(CauseName{"joint_coupling", "r_elbow", "r_shoulder_yaw"}))
-      << report.sentence;
+  EXPECT_THAT(same, testing::Contains(CauseName{"joint_coupling", "r_elbow", "r_shoulder_yaw"})) << report.sentence;
   EXPECT_EQ(report.verdict, "class");
   EXPECT_FALSE(report.causes[0].advice.empty());
 }
 
 TEST(LazyBreakers, TwoCausesOfOppositeSignOnOneJoint) {
-  const auto options = log_with({fault("backlash", "r_elbow", 0.9),
-                                 fault("joint_coupling", "r_elbow", -4.0, 0.0, "r_shoulder_yaw")});
+  const auto options =
+      log_with({fault("backlash", "r_elbow", 0.9), fault("joint_coupling", "r_elbow", -4.0, 0.0, "r_shoulder_yaw")});
   const auto log = make_synthetic_log(robot(), options, test::log_seed());
   const auto report = diagnosis(*log);
   EXPECT_TRUE(in_class(report, options.faults[0])) << report.sentence;
@@ -247,8 +250,7 @@ TEST(LazyBreakers, AFixedPatternInTheMeshIsNoCause) {
   const auto report = diagnosis(*log);
   // The parts' size and thickness may take up some of it; nothing that moves may.
   for (const auto& cause : report.causes) {
-    EXPECT_THAT(cause.cause.name, testing::AnyOf("mesh_scale", "silhouette_bias", "finger_posture"))
-        << report.sentence;
+    EXPECT_THAT(cause.cause.name, testing::AnyOf("mesh_scale", "silhouette_bias", "finger_posture")) << report.sentence;
   }
 }
 

@@ -67,8 +67,8 @@ TEST(ExclusionLimits, HoldWhatWasTooSmallToBeFound) {
       std::cout << fault.cause.text() << " " << fault.value << " is above its limit " << limit->limit << std::endl;
     }
   }
-  std::cout << held << " of " << limited << " limits hold; the tightest is " << tightest
-            << " of what can be detected" << std::endl;
+  std::cout << held << " of " << limited << " limits hold; the tightest is " << tightest << " of what can be detected"
+            << std::endl;
   EXPECT_GE(limited, kLogs / 4);
   EXPECT_GE(held, test::fewest_right(std::vector<double>(static_cast<std::size_t>(limited), 0.95)));
   EXPECT_LT(tightest, 1.0);
@@ -98,9 +98,9 @@ TEST(ExclusionLimits, AreOfEveryCauseThatIsNeitherNamedNorUntestable) {
         });
         const bool limited = count(report.exclusion_limits) > 0;
         const auto untestable = count(report.not_testable);
-        EXPECT_EQ(possible + limited + untestable, 1) << cause.text() << ": named or in a class " << possible
-                                                      << ", limited " << limited << ", not testable " << untestable
-                                                      << "; " << report.sentence;
+        EXPECT_EQ(possible + limited + untestable, 1)
+            << cause.text() << ": named or in a class " << possible << ", limited " << limited << ", not testable "
+            << untestable << "; " << report.sentence;
       }
     }
     for (const auto& limit : report.exclusion_limits) EXPECT_TRUE(std::isfinite(limit.limit)) << limit.cause.text();

@@ -59,10 +59,10 @@ void record(const fs::path& file, bool clutter, double missing_share, bool swapp
 }
 
 DiagnosisReport diagnosis(const fs::path& log, const std::string& method = "learned_background") {
-  Configuration c = Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml",
-                                        {"silhouette.engine=contour", "filter.particles=50",
-                                         "bus.max_image_gap_ms=1000", "bus.max_encoder_gap_ms=1000",
-                                         "vision.method=" + method});
+  Configuration c =
+      Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml",
+                          {"silhouette.engine=contour", "filter.particles=50", "bus.max_image_gap_ms=1000",
+                           "bus.max_encoder_gap_ms=1000", "vision.method=" + method});
   LogDiagnosisOptions options;
   options.log = log;
   options.quiet = true;

@@ -14,21 +14,19 @@ namespace {
 using testing::HasSubstr;
 
 Configuration robot() {
-  return Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) /
-                             "config/icub_right/estimator.yaml");
+  return Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml");
 }
 
 /// The elbow swings 40 deg to and fro every four seconds, or goes one way; nothing else moves.
 std::filesystem::path log_of(const std::string& name, double duration_s, bool to_and_fro) {
   const auto file = std::filesystem::path(testing::TempDir()) / ("bodyschema-" + name + ".lcmlog");
   LogWriter writer(file);
-  const std::vector<std::string> joints = {
-      "neck_pitch",       "neck_roll",      "neck_yaw",          "eyes_tilt",
-      "l_eye_pan",        "r_eye_pan",      "r_shoulder_pitch",  "r_shoulder_roll",
-      "r_shoulder_yaw",   "r_elbow",        "r_wrist_prosup",    "r_wrist_pitch",
-      "r_wrist_yaw",      "r_thumb_oppose", "r_thumb_proximal",  "r_thumb_distal",
-      "r_index_proximal", "r_index_distal", "r_middle_proximal", "r_middle_distal",
-      "r_pinky"};
+  const std::vector<std::string> joints = {"neck_pitch",       "neck_roll",      "neck_yaw",          "eyes_tilt",
+                                           "l_eye_pan",        "r_eye_pan",      "r_shoulder_pitch",  "r_shoulder_roll",
+                                           "r_shoulder_yaw",   "r_elbow",        "r_wrist_prosup",    "r_wrist_pitch",
+                                           "r_wrist_yaw",      "r_thumb_oppose", "r_thumb_proximal",  "r_thumb_distal",
+                                           "r_index_proximal", "r_index_distal", "r_middle_proximal", "r_middle_distal",
+                                           "r_pinky"};
   const Image black(320, 240, 1);
   for (int i = 0; i < static_cast<int>(duration_s * 100.0); ++i) {
     const Microseconds utime = 1'700'000'000'000'000 + i * 10'000;
@@ -38,11 +36,9 @@ std::filesystem::path log_of(const std::string& name, double duration_s, bool to
     message.joint_name = joints;
     message.joint_position.assign(joints.size(), 0.2f);
     const double t = 0.01 * i;
-    message.joint_position[9] =
-        static_cast<float>(1.0 + (to_and_fro ? 0.35 * std::sin(1.57 * t) : 0.05 * t));
+    message.joint_position[9] = static_cast<float>(1.0 + (to_and_fro ? 0.35 * std::sin(1.57 * t) : 0.05 * t));
     message.joint_velocity.assign(joints.size(), 0.0f);
-    message.joint_velocity[9] =
-        static_cast<float>(to_and_fro ? 0.35 * 1.57 * std::cos(1.57 * t) : 0.05);
+    message.joint_velocity[9] = static_cast<float>(to_and_fro ? 0.35 * 1.57 * std::cos(1.57 * t) : 0.05);
     message.joint_effort.assign(joints.size(), 0.0f);
     writer.publish("ICUB_JOINT_STATE", utime, encode(message));
     if (i % 20 != 10) continue;
@@ -80,8 +76,7 @@ TEST(LogTestability, OneWayTellsNoBacklash) {
 }
 
 TEST(LogTestability, ShortAndEmptyLogs) {
-  EXPECT_THAT(testability_of(robot(), log_of("short", 4.0, true)).text(),
-              HasSubstr("needs at least 10 s"));
+  EXPECT_THAT(testability_of(robot(), log_of("short", 4.0, true)).text(), HasSubstr("needs at least 10 s"));
   const auto file = std::filesystem::path(testing::TempDir()) / "bodyschema-nothing.lcmlog";
   LogWriter(file).publish("OTHERS", 1, std::vector<std::uint8_t>(8, 0));
   EXPECT_THROW(testability_of(robot(), file), DataError);

@@ -12,8 +12,8 @@ using test::robot;
 
 /// Predicted place of a point of a link along its normal, for a set of corrections.
 double along_normal(CorrectedKinematics& kinematics, const Eigen::VectorXd& q, const Corrections& c,
-                    const PinholeIntrinsics& k, const Eigen::Vector3d& p_B, std::size_t link,
-                    std::size_t links, const Eigen::Vector2d& normal) {
+                    const PinholeIntrinsics& k, const Eigen::Vector3d& p_B, std::size_t link, std::size_t links,
+                    const Eigen::Vector2d& normal) {
   std::vector<Pose> X(links);
   kinematics.compute(q, c, 0, X);
   const Eigen::Vector3d p = X[link] * ((1.0 + c.mesh_scale) * p_B);
@@ -53,9 +53,9 @@ TEST(ViewCompressor, DerivativesAgreeWithMovingTheRobot) {
       constexpr double kStep = 1e-4;
       CoordinateLayout::slot(entry, high) += kStep;
       CoordinateLayout::slot(entry, low) -= kStep;
-      const double expected =
-          (along_normal(kinematics, q, high, k, p_B, link, links.size(), normal) -
-           along_normal(kinematics, q, low, k, p_B, link, links.size(), normal)) / (2 * kStep);
+      const double expected = (along_normal(kinematics, q, high, k, p_B, link, links.size(), normal) -
+                               along_normal(kinematics, q, low, k, p_B, link, links.size(), normal)) /
+                              (2 * kStep);
       // One point with residual and weight one: b is its row of derivatives.
       EXPECT_NEAR(view.vector[i], expected, 1e-3 * (1.0 + std::abs(expected)))
           << "coordinate " << i << " link " << links[link];

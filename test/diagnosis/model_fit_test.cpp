@@ -42,9 +42,7 @@ class Forwarded : public MeasurementSource {
   void compress(std::span<const Corrections> corrections, std::vector<CompressedView>& out) override {
     log_.compress(corrections, out);
   }
-  Eigen::MatrixXd hand_jacobian(std::size_t view, const Corrections& c) override {
-    return log_.hand_jacobian(view, c);
-  }
+  Eigen::MatrixXd hand_jacobian(std::size_t view, const Corrections& c) override { return log_.hand_jacobian(view, c); }
 
  private:
   MeasurementSource& log_;
@@ -114,8 +112,8 @@ TEST(Misfit, CountsPointsThatLeftThePictures) {
 }
 
 TEST(Misfit, StandsForADistance) {
-  EXPECT_DOUBLE_EQ(typical_distance_px(0.25), 0.5);   // quadratic within a pixel
-  EXPECT_DOUBLE_EQ(typical_distance_px(9.0), 5.0);    // 2 |r| - 1 beyond
+  EXPECT_DOUBLE_EQ(typical_distance_px(0.25), 0.5);  // quadratic within a pixel
+  EXPECT_DOUBLE_EQ(typical_distance_px(9.0), 5.0);   // 2 |r| - 1 beyond
 }
 
 }  // namespace

@@ -61,7 +61,9 @@ TEST(NearerModel, NoRobotIsBuiltSoWrongThatItsElbowTiltsByThirtyDegrees) {
   EXPECT_FALSE(tilted(-30.0));
 }
 
-TEST(NearerModel, FindsNothingWhereOffsetsExplainIt) { EXPECT_FALSE(look({}).model.has_value()); }
+TEST(NearerModel, FindsNothingWhereOffsetsExplainIt) {
+  EXPECT_FALSE(look({}).model.has_value());
+}
 
 }  // namespace
 }  // namespace bodyschema::diagnosis

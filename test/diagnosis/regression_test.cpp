@@ -40,7 +40,8 @@ struct Toy {
   [[nodiscard]] Eigen::Matrix<double, 3, 2> map(std::size_t v) const {
     Eigen::Matrix<double, 3, 2> m = Eigen::Matrix<double, 3, 2>::Zero();
     for (int c = 0; c < 2; ++c) {
-      for (const auto& e : columns[static_cast<std::size_t>(c)].views[v]) m(e.coordinate, c) = static_cast<double>(e.value);
+      for (const auto& e : columns[static_cast<std::size_t>(c)].views[v])
+        m(e.coordinate, c) = static_cast<double>(e.value);
     }
     return m;
   }

@@ -81,7 +81,8 @@ TEST(Selection, AsksForMoreWhereEveryPostureIsPassedOnce) {
     auto one_pass = usual;
     one_pass.one_pass = true;
     EXPECT_EQ(select_causes(statistics, {{0}}, candidates, usual).causes.size(), 1u) << size;
-    EXPECT_EQ(select_causes(statistics, {{0}}, candidates, one_pass).causes.size(), found_in_one_pass ? 1u : 0u) << size;
+    EXPECT_EQ(select_causes(statistics, {{0}}, candidates, one_pass).causes.size(), found_in_one_pass ? 1u : 0u)
+        << size;
   }
 }
 
@@ -134,10 +135,13 @@ TEST(Selection, PutsUpWithWhatTheShapeOfALargeCauseLeaves) {
   options.shape_error = 0.02;
   for (std::uint64_t i = 0; i < 10; ++i) {
     const auto small = log_with({30.0, 0.5, 0.0, 0.0}, test::seed() + i);
-    EXPECT_EQ(found(select_causes(small, {{0}}, several(4))), (std::vector<std::size_t>{0, 1})) << "seed " << test::seed() + i;
-    EXPECT_EQ(found(select_causes(small, {{0}}, several(4), options)), (std::vector<std::size_t>{0})) << "seed " << test::seed() + i;
+    EXPECT_EQ(found(select_causes(small, {{0}}, several(4))), (std::vector<std::size_t>{0, 1}))
+        << "seed " << test::seed() + i;
+    EXPECT_EQ(found(select_causes(small, {{0}}, several(4), options)), (std::vector<std::size_t>{0}))
+        << "seed " << test::seed() + i;
     const auto second = log_with({30.0, 3.0, 0.0, 0.0}, test::seed() + i);
-    EXPECT_EQ(found(select_causes(second, {{0}}, several(4), options)), (std::vector<std::size_t>{0, 1})) << "seed " << test::seed() + i;
+    EXPECT_EQ(found(select_causes(second, {{0}}, several(4), options)), (std::vector<std::size_t>{0, 1}))
+        << "seed " << test::seed() + i;
   }
 }
 
@@ -176,7 +180,8 @@ TEST(Selection, InACrowdNamesOnlyWhatIsLargeEnoughToBeFoundAnywhere) {
     const auto log = log_with({0.12, -0.12, 0.12, 0.12, -0.12, 0.8}, test::seed() + i);
     auto candidates = several(6);
     candidates[5].detectable = 0.7;
-    EXPECT_EQ(found(select_causes(log, {{0}}, candidates)), (std::vector<std::size_t>{5})) << "seed " << test::seed() + i;
+    EXPECT_EQ(found(select_causes(log, {{0}}, candidates)), (std::vector<std::size_t>{5}))
+        << "seed " << test::seed() + i;
     candidates[5].detectable = 0.9;
     const auto below = select_causes(log, {{0}}, candidates);
     EXPECT_TRUE(below.causes.empty() && below.crowded) << "seed " << test::seed() + i;
@@ -186,11 +191,13 @@ TEST(Selection, InACrowdNamesOnlyWhatIsLargeEnoughToBeFoundAnywhere) {
     const auto pair = log_with({0.0, 0.0, 0.0, 0.0, 0.3, 0.8}, test::seed() + i);
     EXPECT_TRUE(select_causes(pair, {{0}}, candidates).causes.empty()) << "seed " << test::seed() + i;
     candidates[5].detectable = 0.7;
-    EXPECT_EQ(found(select_causes(pair, {{0}}, candidates)), (std::vector<std::size_t>{4, 5})) << "seed " << test::seed() + i;
+    EXPECT_EQ(found(select_causes(pair, {{0}}, candidates)), (std::vector<std::size_t>{4, 5}))
+        << "seed " << test::seed() + i;
     candidates[5].detectable = 0.9;
     // Alone it is what is wrong, whatever its size.
     const auto alone = log_with({0.0, 0.0, 0.0, 0.0, 0.0, 0.8}, test::seed() + i);
-    EXPECT_EQ(found(select_causes(alone, {{0}}, candidates)), (std::vector<std::size_t>{5})) << "seed " << test::seed() + i;
+    EXPECT_EQ(found(select_causes(alone, {{0}}, candidates)), (std::vector<std::size_t>{5}))
+        << "seed " << test::seed() + i;
   }
 }
 
@@ -241,9 +248,16 @@ TEST(Selection, RefusesWhatCannotBeFitted) {
     return testing::ThrowsMessage<DataError>(testing::AllOf(testing::HasSubstr(why), testing::HasSubstr("; record")));
   };
   // One block, as of an arm that never moves; and offsets that are one and the same.
-  EXPECT_THAT([&] { select_causes(test::statistics_of(data.X, data.y, 1), {{0}, {1}}, candidates); }, refused("stands still"));
-  EXPECT_THAT([&] { select_causes(test::statistics_of(data.X, data.y, 20), {{0}, {1}, {1}}, candidates); },
-              refused("too little"));
+  EXPECT_THAT(
+      [&] {
+        select_causes(test::statistics_of(data.X, data.y, 1), {{0}, {1}}, candidates);
+      },
+      refused("stands still"));
+  EXPECT_THAT(
+      [&] {
+        select_causes(test::statistics_of(data.X, data.y, 20), {{0}, {1}, {1}}, candidates);
+      },
+      refused("too little"));
 }
 
 }  // namespace

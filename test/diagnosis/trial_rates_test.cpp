@@ -33,11 +33,11 @@ TEST(TrialRates, CountWhatTheTableCounts) {
   const auto r = rates({
       outcome(TrialRow::kNull, {}, {}),
       outcome(TrialRow::kNull, {}, {cause(kDrift, 1.0, 0.1)}),
-      outcome(TrialRow::kSingle, {gain}, {cause(kGain, 4.1, 0.2)}),                 // right
-      outcome(TrialRow::kSingle, {gain}, {cause(kLatency, 9.0, 1.0, {kGain})}),     // in the class, second
-      outcome(TrialRow::kSingle, {gain}, {cause(kEccentric, 1.0, 0.1)}),            // counts as one
-      outcome(TrialRow::kSingle, {gain}, {cause(kDrift, 1.0, 0.1)}),                // wrong
-      outcome(TrialRow::kSingle, {gain}, {}),                                       // missed, not wrong
+      outcome(TrialRow::kSingle, {gain}, {cause(kGain, 4.1, 0.2)}),              // right
+      outcome(TrialRow::kSingle, {gain}, {cause(kLatency, 9.0, 1.0, {kGain})}),  // in the class, second
+      outcome(TrialRow::kSingle, {gain}, {cause(kEccentric, 1.0, 0.1)}),         // counts as one
+      outcome(TrialRow::kSingle, {gain}, {cause(kDrift, 1.0, 0.1)}),             // wrong
+      outcome(TrialRow::kSingle, {gain}, {}),                                    // missed, not wrong
       outcome(TrialRow::kTwo, {gain, latency}, {cause(kGain, 3.0, 0.5), cause(kLatency, -30.0, 1.0)}),
       outcome(TrialRow::kTwo, {gain, latency}, {cause(kGain, 4.0, 0.5), cause(kDrift, 1.0, 0.1)}),
   });

@@ -37,7 +37,9 @@ inline std::uint64_t seed() {
 
 /// For single logs, each of which may go wrong now and then at the demanded rates: the same log each
 /// run, or BODYSCHEMA_SEED.
-inline std::uint64_t log_seed() { return std::getenv("BODYSCHEMA_SEED") ? seed() : 1; }
+inline std::uint64_t log_seed() {
+  return std::getenv("BODYSCHEMA_SEED") ? seed() : 1;
+}
 
 inline DiagnosisOptions usual_options(const MeasurementSource& source) {
   DiagnosisOptions options;

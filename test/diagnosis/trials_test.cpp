@@ -22,8 +22,7 @@ void expect_right(const char* what, double rate, double demanded, std::size_t tr
 
 TEST(Trials, AFewOfEveryRowGoWell) {
   const TrialCounts counts = {4, 4, 6, 4, 5, 5, 10};
-  const auto outcomes =
-      run_diagnosis_trials(test::robot(), counts, test::seed(), 2, silhouette_logs(test::robot()));
+  const auto outcomes = run_diagnosis_trials(test::robot(), counts, test::seed(), 2, silhouette_logs(test::robot()));
   const auto r = rates(outcomes);
   for (std::size_t row = 0; row < kTrialRows; ++row) {
     EXPECT_EQ(r.trials[row], static_cast<std::size_t>(counts[row])) << kTrialRowNames[row];
@@ -47,8 +46,8 @@ TEST(Trials, AFewOfEveryRowGoWell) {
   EXPECT_GT(r.removable_excess_median, 0.5);
   for (const auto& o : outcomes) {
     if (o.row != TrialRow::kSingle || in_class(o.report, o.truth[0])) continue;
-    std::cout << o.truth[0].cause.text() << " " << o.truth[0].value << ", seed " << o.seed << ": "
-              << o.report.sentence << std::endl;
+    std::cout << o.truth[0].cause.text() << " " << o.truth[0].value << ", seed " << o.seed << ": " << o.report.sentence
+              << std::endl;
   }
 }
 

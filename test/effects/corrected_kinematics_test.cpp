@@ -78,15 +78,13 @@ TEST_F(CorrectedKinematicsTest, TiltTurnsTheAxisAndKeepsTheZeroPose) {
   const auto plain = tip(Corrections(2));
   EXPECT_LT((tip(corrections) - plain).norm(), 1e-12);
   // Turning by q about the tilted axis, written out.
-  const Eigen::Vector3d tilt =
-      0.02 * kinematics.tilt_axis(0, 0) - 0.01 * kinematics.tilt_axis(0, 1);
+  const Eigen::Vector3d tilt = 0.02 * kinematics.tilt_axis(0, 0) - 0.01 * kinematics.tilt_axis(0, 1);
   EXPECT_NEAR(tilt.z(), 0.0, 1e-12);
   q << 0.7, 0.2;
   const auto axis = Eigen::AngleAxisd(tilt.norm(), tilt.normalized()) * Eigen::Vector3d::UnitZ();
   const double b = 0.2;
   const Eigen::Vector3d p_one(0.3 + 0.2 * std::cos(b), 0.0, -0.2 * std::sin(b));
-  const Eigen::Vector3d expected =
-      Eigen::AngleAxisd(0.7, axis) * p_one + Eigen::Vector3d(0.0, 0.0, 1.0);
+  const Eigen::Vector3d expected = Eigen::AngleAxisd(0.7, axis) * p_one + Eigen::Vector3d(0.0, 0.0, 1.0);
   EXPECT_LT((tip(corrections) - expected).norm(), 1e-12);
 }
 
@@ -133,7 +131,8 @@ TEST_F(CorrectedKinematicsTest, BaseShiftMovesEveryLinkAlikeInTheRootFrame) {
 std::shared_ptr<const RobotModel> sensor_between(const std::string& axis) {
   return load(R"(<robot name="two"><link name="root"/><link name="one"/><link name="sensor"/>
     <link name="two"/><link name="eye"/>
-    <joint name="a" type="revolute"><parent link="root"/><child link="one"/><axis xyz=")" + axis + R"("/>
+    <joint name="a" type="revolute"><parent link="root"/><child link="one"/><axis xyz=")" +
+              axis + R"("/>
       <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
     <joint name="s" type="fixed"><parent link="one"/><child link="sensor"/><origin xyz="0 0 -0.1"/></joint>
     <joint name="b" type="revolute"><parent link="sensor"/><child link="two"/><axis xyz="0 1 0"/>

@@ -26,7 +26,9 @@ Corrections corrections(Effect& effect, double value, const Instant& at) {
   return c;
 }
 
-double dq_deg(const Corrections& c, Eigen::Index joint) { return degrees(c.dq[joint]); }
+double dq_deg(const Corrections& c, Eigen::Index joint) {
+  return degrees(c.dq[joint]);
+}
 
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
@@ -210,15 +212,10 @@ TEST(CameraSkew, OnlyTheRightPictureIsLater) {
 TEST(Geometry, LengthTiltAndHeadGoWhereTheyBelong) {
   const auto r = roles();
   const auto at = instant(r);
-  EXPECT_NEAR(
-      corrections(*make_effect("link_length", {"s_yaw", ""}, r), 2.0, at).adjustments[8].along_m,
-      0.002, 1e-15);
-  EXPECT_NEAR(corrections(*make_effect("axis_tilt", {"elbow", ""}, r), 2.0, at)
-                  .adjustments[kElbow]
-                  .tilt_1_rad,
+  EXPECT_NEAR(corrections(*make_effect("link_length", {"s_yaw", ""}, r), 2.0, at).adjustments[8].along_m, 0.002, 1e-15);
+  EXPECT_NEAR(corrections(*make_effect("axis_tilt", {"elbow", ""}, r), 2.0, at).adjustments[kElbow].tilt_1_rad,
               radians(2.0), 1e-15);
-  EXPECT_NEAR(dq_deg(corrections(*make_effect("head_offset", {"neck_yaw", ""}, r), 1.0, at), 2),
-              1.0, 1e-12);
+  EXPECT_NEAR(dq_deg(corrections(*make_effect("head_offset", {"neck_yaw", ""}, r), 1.0, at), 2), 1.0, 1e-12);
   const auto vergence = corrections(*make_effect("vergence", {}, r), 1.0, at);
   EXPECT_NEAR(dq_deg(vergence, 4) - dq_deg(vergence, 5), 1.0, 1e-12);
   const auto fingers = corrections(*make_effect("finger_posture", {}, r), 5.0, at);
@@ -235,8 +232,7 @@ TEST(Cameras, CorrectionsReachTheRightEye) {
   at.camera = 1;
   EXPECT_NEAR(corrections(*difference, 2.0, at).camera.cx_px, -1.0, 1e-15);
   EXPECT_NEAR(corrections(*make_effect("baseline", {}, r), 1.0, at).camera.shift_x_m, 1e-3, 1e-15);
-  EXPECT_NEAR(corrections(*make_effect("focal_length", {}, r), 1.0, at).camera.focal_scale, 0.01,
-              1e-15);
+  EXPECT_NEAR(corrections(*make_effect("focal_length", {}, r), 1.0, at).camera.focal_scale, 0.01, 1e-15);
   EXPECT_NEAR(corrections(*make_effect("distortion", {}, r), 0.05, at).camera.k1, 0.05, 1e-15);
   EXPECT_NEAR(corrections(*make_effect("silhouette_bias", {}, r), 0.7, at).dilation_px, 0.7, 1e-15);
   EXPECT_NEAR(corrections(*make_effect("mesh_scale", {}, r), 2.0, at).mesh_scale, 0.02, 1e-15);

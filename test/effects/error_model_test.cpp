@@ -81,14 +81,11 @@ TEST(ErrorModel, CorrectsIntrinsics) {
 
 TEST(ErrorModel, SaysWhatIsWrongWithAFile) {
   const auto r = roles();
-  const auto parse = [&](const std::string& text) {
-    return [&r, text] { ErrorModel::parse(text, r, "x.yaml"); };
-  };
+  const auto parse = [&](const std::string& text) { return [&r, text] { ErrorModel::parse(text, r, "x.yaml"); }; };
   EXPECT_THAT(parse("effects: []"), ThrowsMessage<ConfigurationError>(HasSubstr("version")));
   EXPECT_THAT(parse("version: 2"), ThrowsMessage<ConfigurationError>(HasSubstr("'2', expected 1")));
   EXPECT_THAT(parse("version: 1\nefects: []"),
-              ThrowsMessage<ConfigurationError>(
-                  HasSubstr("x.yaml:2: unknown key 'efects'; did you mean 'effects'")));
+              ThrowsMessage<ConfigurationError>(HasSubstr("x.yaml:2: unknown key 'efects'; did you mean 'effects'")));
   EXPECT_THAT(parse("[1, 2"), ThrowsMessage<ConfigurationError>(HasSubstr("not YAML")));
   const std::string head = "version: 1\neffects:\n- {name: backlash, joint: ";
   EXPECT_THAT(parse(head + "elbw, parameters: {width_deg: 1}}"),

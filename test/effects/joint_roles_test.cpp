@@ -21,8 +21,7 @@ struct Robot {
 };
 
 Robot robot(const std::string& file, const std::vector<std::string>& overrides = {}) {
-  const auto configuration =
-      Configuration::load(std::string(BODYSCHEMA_SOURCE_DIR) + "/config/" + file, overrides);
+  const auto configuration = Configuration::load(std::string(BODYSCHEMA_SOURCE_DIR) + "/config/" + file, overrides);
   const auto setup = RobotSetup::from(configuration.section("robot"));
   const auto rig = StereoRig::from(configuration.section("cameras"));
   return {JointRoles::of(setup.load(), setup, rig)};

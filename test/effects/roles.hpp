@@ -7,9 +7,8 @@ namespace bodyschema::test {
 /// A made-up robot: six head joints, seven arm joints, two fingers.
 inline JointRoles roles() {
   JointRoles r;
-  r.names = {"neck_pitch", "neck_roll", "neck_yaw", "eyes_tilt", "l_eye_pan",
-             "r_eye_pan",  "s_pitch",   "s_roll",   "s_yaw",     "elbow",
-             "prosup",     "w_pitch",   "w_yaw",    "index",     "thumb"};
+  r.names = {"neck_pitch", "neck_roll", "neck_yaw", "eyes_tilt", "l_eye_pan", "r_eye_pan", "s_pitch", "s_roll",
+             "s_yaw",      "elbow",     "prosup",   "w_pitch",   "w_yaw",     "index",     "thumb"};
   r.head = {0, 1, 2, 3, 4, 5};
   r.neck = {0, 1, 2, 3};
   r.left_pan = 4;

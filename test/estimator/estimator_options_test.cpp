@@ -11,8 +11,7 @@
 namespace bodyschema {
 namespace {
 
-const std::filesystem::path kShipped =
-    std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/estimator.yaml";
+const std::filesystem::path kShipped = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/estimator.yaml";
 
 TEST(EstimatorOptions, ShippedFileHoldsKnownKeysAndUnitsAreConverted) {
   const Configuration configuration =

@@ -264,8 +264,8 @@ TEST_F(EstimatorOnOwnRobot, WhatAStallTaughtDoesNotOutliveIt) {
       Estimator estimator(robot_, setup_, rig_, options_);
       const int stalls = between(30, 90), lives = stalls + between(20, 200), end = lives + 60;
       const int period = between(40, 120);
-      SCOPED_TRACE("BODYSCHEMA_SEED=" + std::to_string(seed) + ", stalls from frame " + std::to_string(stalls) + " to " +
-                   std::to_string(lives) + ", there and back in " + std::to_string(period));
+      SCOPED_TRACE("BODYSCHEMA_SEED=" + std::to_string(seed) + ", stalls from frame " + std::to_string(stalls) +
+                   " to " + std::to_string(lives) + ", there and back in " + std::to_string(period));
       Stall stall{.joint = index, .offset = elbow, .from = stalls, .to = lives};
       for (int frame = 0; frame < end; ++frame) {
         if (between(0, 3) == 0 && frame != stalls) continue;
@@ -400,8 +400,7 @@ TEST_F(EstimatorOnOwnRobot, AFrameWithASlipBetweenItsTwoPicturesIsNotRemembered)
   constexpr double kFrames = 60.0;
   for (int joint = 0; joint < 7; ++joint) {
     for (const double slip_deg : {5.0, -8.0}) {
-      SCOPED_TRACE(setup_.estimated_joints[static_cast<std::size_t>(joint)] + " by " +
-                   std::to_string(slip_deg));
+      SCOPED_TRACE(setup_.estimated_joints[static_cast<std::size_t>(joint)] + " by " + std::to_string(slip_deg));
       Estimator estimator(robot_, setup_, rig_, options_);
       follow(estimator, *reach_, kTorn - 15, kTorn, kFrames);
       Eigen::VectorXd slipped = offset_rad_;

@@ -16,10 +16,9 @@ namespace bodyschema {
 class OwnRobot : public ::testing::Test {
  protected:
   OwnRobot()
-      : configuration_(Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) /
-                                           "config/icub_right/robot.yaml")),
-        setup_(RobotSetup::from(configuration_.section("robot"))),
-        robot_(setup_.load()),
+      : configuration_(
+            Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/robot.yaml")),
+        setup_(RobotSetup::from(configuration_.section("robot"))), robot_(setup_.load()),
         rig_(StereoRig::from(configuration_.section("cameras"))) {}
 
   /// The offsets of the paper's Table I.

@@ -17,7 +17,8 @@ class TwoJoints : public ::testing::Test {
             bool fits = true, bool settled = true, bool remembers = true) {
     const Eigen::Vector2d reading(radians(reading_0_deg), radians(reading_1_deg));
     const Eigen::Vector2d offset(radians(offset_0_deg), radians(offset_1_deg));
-    encoders_.look(time_s_ += 1.0 / 30.0, reading, offset, Eigen::Vector2d::Constant(radians(0.1)), fits, settled, remembers);
+    encoders_.look(time_s_ += 1.0 / 30.0, reading, offset, Eigen::Vector2d::Constant(radians(0.1)), fits, settled,
+                   remembers);
   }
   StalledEncoders encoders_{2};
   double time_s_ = 0.0;

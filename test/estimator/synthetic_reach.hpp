@@ -16,10 +16,9 @@ namespace bodyschema {
 /// drawn at four times the resolution, encoders carry known offsets.
 class SyntheticReach {
  public:
-  SyntheticReach(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
-                 const StereoRig& rig, const Eigen::VectorXd& offset_rad)
-      : robot_(std::move(robot)), setup_(setup), rig_(rig), offset_(offset_rad),
-        body_(robot_, setup_, rig_, {}) {
+  SyntheticReach(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                 const Eigen::VectorXd& offset_rad)
+      : robot_(std::move(robot)), setup_(setup), rig_(rig), offset_(offset_rad), body_(robot_, setup_, rig_, {}) {
     SilhouetteModel model;
     model.culling = setup.culling;
     for (const auto& part : robot_->meshes()) model.parts.push_back(part.mesh);
@@ -43,8 +42,7 @@ class SyntheticReach {
     observation.utime = utime;
     Eigen::VectorXd q_encoder = q_true;
     for (std::size_t k = 0; k < setup_.estimated_joints.size(); ++k) {
-      q_encoder(robot_->joint_index(setup_.estimated_joints[k])) +=
-          offset_(static_cast<Eigen::Index>(k));
+      q_encoder(robot_->joint_index(setup_.estimated_joints[k])) += offset_(static_cast<Eigen::Index>(k));
     }
     std::vector<Eigen::Isometry3f> X_CB(body_.part_count());
     for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {

@@ -14,17 +14,12 @@ ContestantRecord reach(const std::string& engine, const std::string& platform, s
       std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml";
   const Configuration configuration =
       Configuration::load(config, {"silhouette.engine=" + engine, "silhouette.gl_platform=" + platform});
-  TrialSetting setting{configuration,
-                       simulator::SimulatorSettings::from(configuration.section("simulator")),
-                       {},
-                       {}};
+  TrialSetting setting{configuration, simulator::SimulatorSettings::from(configuration.section("simulator")), {}, {}};
   setting.simulator.background_frames = 25;
   setting.simulator.entry_frames = 0;
   setting.plan.frames = 100;
-  setting.plan.offsets_deg = {{"r_shoulder_pitch", 5}, {"r_shoulder_roll", 4},
-                              {"r_shoulder_yaw", 3},   {"r_elbow", -2},
-                              {"r_wrist_prosup", 3},   {"r_wrist_pitch", -7},
-                              {"r_wrist_yaw", 3}};
+  setting.plan.offsets_deg = {{"r_shoulder_pitch", 5}, {"r_shoulder_roll", 4}, {"r_shoulder_yaw", 3}, {"r_elbow", -2},
+                              {"r_wrist_prosup", 3},   {"r_wrist_pitch", -7},  {"r_wrist_yaw", 3}};
   Contestant contestant{engine, EstimatorOptions::from(configuration), false};
   contestant.options.mode = mode;
   contestant.options.filter.particles = particles;

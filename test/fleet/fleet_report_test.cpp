@@ -31,23 +31,21 @@ class FleetReport : public testing::Test {
   }
   void add_log(const std::string& log, Microseconds begin, const std::string& outcome,
                const std::string& report) const {
-    write(log + "/info.json",
-          "{\"begin_utime\": " + std::to_string(begin) + ", \"duration_s\": 61.5}");
+    write(log + "/info.json", "{\"begin_utime\": " + std::to_string(begin) + ", \"duration_s\": 61.5}");
     write(log + "/outcome.txt", outcome + "\n");
     if (!report.empty()) write(log + "/report.json", report);
   }
   static std::string backlash(double estimate, double elbow) {
-    nlohmann::json j = {
-        {"verdict", "named"},
-        {"sentence", "backlash of r_elbow"},
-        {"causes",
-         {{{"name", "backlash"},
-           {"joint", "r_elbow"},
-           {"parameter", "backlash"},
-           {"unit", "deg"},
-           {"estimate", estimate},
-           {"ci95", {estimate - 0.1, estimate + 0.1}}}}},
-        {"offsets_deg", {{"before", {{"r_elbow", 9.0}}}, {"after", {{"r_elbow", elbow}}}}}};
+    nlohmann::json j = {{"verdict", "named"},
+                        {"sentence", "backlash of r_elbow"},
+                        {"causes",
+                         {{{"name", "backlash"},
+                           {"joint", "r_elbow"},
+                           {"parameter", "backlash"},
+                           {"unit", "deg"},
+                           {"estimate", estimate},
+                           {"ci95", {estimate - 0.1, estimate + 0.1}}}}},
+                        {"offsets_deg", {{"before", {{"r_elbow", 9.0}}}, {"after", {{"r_elbow", elbow}}}}}};
     return j.dump();
   }
   const fs::path results_ = fs::path(testing::TempDir()) / "bodyschema-fleet";
@@ -58,8 +56,7 @@ TEST_F(FleetReport, FollowsACauseOverWeeks) {
   add_log("alpha/c", kBegin, "diagnosed", backlash(0.8, 1.0));
   add_log("alpha/b", kBegin + kWeek, "diagnosed", backlash(1.0, 1.5));
   add_log("alpha/a", kBegin + 3 * kWeek, "diagnosed", backlash(1.4, 2.5));
-  add_log("beta/only", kBegin, "diagnosed",
-          R"({"verdict": "none", "sentence": "fine", "causes": []})");
+  add_log("beta/only", kBegin, "diagnosed", R"({"verdict": "none", "sentence": "fine", "causes": []})");
   const auto robots = gather_fleet(results_);
   ASSERT_EQ(robots.size(), 2u);
   EXPECT_EQ(robots[0].name, "alpha");
@@ -83,8 +80,7 @@ TEST_F(FleetReport, SaysWhyALogWasNotDiagnosed) {
   write("alpha/empty/info.json", "[]");
   const auto robots = gather_fleet(results_);
   ASSERT_EQ(robots.at(0).logs.size(), 4u);
-  for (const auto& log : robots[0].logs)
-    EXPECT_EQ(log.verdict, "not diagnosed") << log.name;
+  for (const auto& log : robots[0].logs) EXPECT_EQ(log.verdict, "not diagnosed") << log.name;
   EXPECT_THAT(robots[0].logs[1].sentence, HasSubstr("at least 10 s are needed"));
   EXPECT_THAT(robots[0].logs[2].sentence, HasSubstr("report.json: not valid JSON"));
   EXPECT_THAT(robots[0].logs[3].sentence, HasSubstr("no 'verdict'"));

@@ -27,8 +27,7 @@ void refuse_or_accept(Decoder&& decoder) {
 }
 
 /// The input as a file, for decoders that open one; rewritten for each input.
-inline std::filesystem::path as_file(const std::uint8_t* data, std::size_t size,
-                                     const std::string& name) {
+inline std::filesystem::path as_file(const std::uint8_t* data, std::size_t size, const std::string& name) {
   static const std::filesystem::path folder = [] {
     const std::filesystem::path memory = "/dev/shm";
     const auto base = std::filesystem::exists(memory) ? memory : std::filesystem::temp_directory_path();
@@ -38,8 +37,7 @@ inline std::filesystem::path as_file(const std::uint8_t* data, std::size_t size,
   }();
   const auto file = folder / name;
   std::filesystem::create_directories(file.parent_path());
-  std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(data),
-                                               static_cast<std::streamsize>(size));
+  std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
   return file;
 }
 

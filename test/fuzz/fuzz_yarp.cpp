@@ -28,8 +28,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   options.encoders = {{"arm", {"a", "b"}}};
   options.combined_joints = {{"c", {{"a", 1.0}, {"b", 0.5}}}};
   options.left_images = "left";
-  fuzz::refuse_or_accept([&] {
-    import_yarp(recording, options, Channels::with_prefix("FUZZ"), recording / "out.log");
-  });
+  fuzz::refuse_or_accept(
+      [&] { import_yarp(recording, options, Channels::with_prefix("FUZZ"), recording / "out.log"); });
   return 0;
 }

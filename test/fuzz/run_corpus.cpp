@@ -29,8 +29,10 @@ Input changed(Input input, std::mt19937_64& random) {
         input.insert(input.begin() + static_cast<std::ptrdiff_t>(below(input.size())), piece.begin(), piece.end());
         break;
       }
-      case 4: std::fill_n(input.begin() + static_cast<std::ptrdiff_t>(at), std::min<std::size_t>(4, input.size() - at),
-                          static_cast<std::uint8_t>(below(2) * 255)); break;
+      case 4:
+        std::fill_n(input.begin() + static_cast<std::ptrdiff_t>(at), std::min<std::size_t>(4, input.size() - at),
+                    static_cast<std::uint8_t>(below(2) * 255));
+        break;
     }
   }
   return input;

@@ -8,9 +8,7 @@ namespace bodyschema {
 namespace {
 
 TriangleMesh tetrahedron() {
-  return {"tetrahedron",
-          {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
-          {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
+  return {"tetrahedron", {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
 }
 
 TEST(MeshTopology, ClosedTetrahedron) {
@@ -21,8 +19,7 @@ TEST(MeshTopology, ClosedTetrahedron) {
   for (const auto& edge : topology.edges) {
     const auto runs = [&](std::uint32_t triangle, std::uint32_t from, std::uint32_t to) {
       const auto& t = topology.triangles[triangle];
-      return (t[0] == from && t[1] == to) || (t[1] == from && t[2] == to) ||
-             (t[2] == from && t[0] == to);
+      return (t[0] == from && t[1] == to) || (t[1] == from && t[2] == to) || (t[2] == from && t[0] == to);
     };
     EXPECT_TRUE(runs(edge.left, edge.from, edge.to));
     EXPECT_TRUE(runs(edge.right, edge.to, edge.from));
@@ -80,8 +77,7 @@ TEST(MeshTopology, FourTrianglesOnAnEdgeArePaired) {
   TriangleMesh mesh = tetrahedron();
   mesh.vertices.push_back({0, -1, 0});
   mesh.vertices.push_back({0, 0, -1});
-  for (const auto& t : std::vector<std::array<std::uint32_t, 3>>{
-           {0, 4, 1}, {0, 1, 5}, {0, 5, 4}, {1, 4, 5}}) {
+  for (const auto& t : std::vector<std::array<std::uint32_t, 3>>{{0, 4, 1}, {0, 1, 5}, {0, 5, 4}, {1, 4, 5}}) {
     mesh.triangles.push_back(t);
   }
   const auto topology = build_topology(mesh);

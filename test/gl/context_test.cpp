@@ -86,8 +86,7 @@ TEST_P(Platform, ShaderErrorNamesTheProgram) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Gl, Platform,
-                         testing::Values("auto", "egl_device", "egl_surfaceless", "osmesa"),
+INSTANTIATE_TEST_SUITE_P(Gl, Platform, testing::Values("auto", "egl_device", "egl_surfaceless", "osmesa"),
                          [](const auto& p) { return std::string(p.param); });
 
 TEST(Context, UnknownPlatformIsNamed) {

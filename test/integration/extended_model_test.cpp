@@ -42,14 +42,14 @@ class ExtendedModel : public testing::Test {
 
 /// Pictures that come 60 ms late: no joint offset makes up for that in a moving arm.
 TEST_F(ExtendedModel, DiagnosedLatencyIsAppliedAndTheHandsErrorFalls) {
-  ASSERT_EQ(run({"bodyschema-sim", "--config", kSimulator, "--babble", "24", "--seed", "11", "--fault",
-                 "latency:value=60", "--log", path("late.log"), "--truth", path("truth.json"), "--set",
-                 "simulator.cameras.rate_hz=15"}),
-            0)
+  ASSERT_EQ(
+      run({"bodyschema-sim", "--config", kSimulator, "--babble", "24", "--seed", "11", "--fault", "latency:value=60",
+           "--log", path("late.log"), "--truth", path("truth.json"), "--set", "simulator.cameras.rate_hz=15"}),
+      0)
       << err;
-  ASSERT_EQ(run({"bodyschema", "diagnose", path("late.log"), "--config", reach_configuration(), "--out",
-                 path("diagnosis")}),
-            0)
+  ASSERT_EQ(
+      run({"bodyschema", "diagnose", path("late.log"), "--config", reach_configuration(), "--out", path("diagnosis")}),
+      0)
       << err;
   const Json report = read_json(scratch_ / "diagnosis/report.json");
   const auto& causes = report.at("causes");
@@ -81,8 +81,8 @@ TEST_F(ExtendedModel, DiagnosedLatencyIsAppliedAndTheHandsErrorFalls) {
   std::printf("hand error %.2f -> %.2f mm\n", before, after);
   EXPECT_LT(after, before / 3.0);
 
-  std::vector<std::string> command = {"bodyschema", "export", path("extended/summary.json"), "--config",
-                                      reach_configuration(), "--out", path("apply")};
+  std::vector<std::string> command = {
+      "bodyschema", "export", path("extended/summary.json"), "--config", reach_configuration(), "--out", path("apply")};
   EXPECT_NE(run(command), 0);
   EXPECT_THAT(err, HasSubstr("--extended-model"));
   command.insert(command.end(), extended.begin(), extended.end());

@@ -44,12 +44,12 @@ struct Fault {
   Robot::Faults faults;
   std::string words;  ///< of the status sentence, while it lasts
   HealthLevel level = HealthLevel::kWarn;
-  double notice_s = 5.0;    ///< the sentence must come within
+  double notice_s = 5.0;  ///< the sentence must come within
   /// Estimates must be good again within, after the end of the fault. Most are within 1 s, but each lap of the
   /// robot takes its hand out of view for a while (4 s were too short for pictures 0.5 s late).
   double recover_s = 10.0;
-  double lasts_s = 0.0;     ///< at least; else it ends when the sentence has come
-  double quiet_s = -1.0;    ///< this long after its begin nothing is to be seen of it any more; negative: it is
+  double lasts_s = 0.0;   ///< at least; else it ends when the sentence has come
+  double quiet_s = -1.0;  ///< this long after its begin nothing is to be seen of it any more; negative: it is
 };
 
 class World : public testing::Test {
@@ -137,8 +137,8 @@ class World : public testing::Test {
         Seconds(fault.recover_s + 2.0));
     const double recovery_s = std::max(0.0, Seconds(Clock::now() - end).count() - 1.0);
     if (const auto reason = too_busy(listener, wait); !recovered && !reason.empty()) GTEST_SKIP() << reason;
-    ASSERT_TRUE(recovered) << "no good estimates " << patience() * fault.recover_s << " s after the fault; last: "
-                           << listener.statuses().back().sentence;
+    ASSERT_TRUE(recovered) << "no good estimates " << patience() * fault.recover_s
+                           << " s after the fault; last: " << listener.statuses().back().sentence;
     EXPECT_LE(recovery_s, patience() * fault.recover_s);
     EXPECT_TRUE(service.running());
     check_honest(listener.offsets());
@@ -148,9 +148,10 @@ class World : public testing::Test {
     last_ = listener.statuses();
     RecordProperty("notice_s", std::to_string(notice_s));
     RecordProperty("recovery_s", std::to_string(recovery_s));
-    std::printf("%-28s noticed %4.1f s  right again %4.1f s  worst error of a converged estimate %.1f sd  "
-                "waited for a processor %2.0f %%  \"%s\"\n",
-                fault.name.c_str(), notice_s, recovery_s, worst_sd_, 100.0 * waited, noticed->sentence.c_str());
+    std::printf(
+        "%-28s noticed %4.1f s  right again %4.1f s  worst error of a converged estimate %.1f sd  "
+        "waited for a processor %2.0f %%  \"%s\"\n",
+        fault.name.c_str(), notice_s, recovery_s, worst_sd_, 100.0 * waited, noticed->sentence.c_str());
   }
 
   static void sleep_until(Clock::time_point begin, double s) {
@@ -170,8 +171,7 @@ class World : public testing::Test {
       if (all[i].sentence == "hand not in view") continue;  // the robot's doing, once each lap
       EXPECT_EQ(all[i].level, offsets_status_t::OK) << all[i].sentence;
     }
-    const double rate_hz =
-        static_cast<double>(listener.offsets().size() - estimates) / (fault.lasts_s - fault.quiet_s);
+    const double rate_hz = static_cast<double>(listener.offsets().size() - estimates) / (fault.lasts_s - fault.quiet_s);
     EXPECT_GE(rate_hz, 0.5 * 30.0 * speed());
   }
 
@@ -189,9 +189,8 @@ class World : public testing::Test {
         const double error = std::abs(message.mean_rad[k] - offset);
         const double sd = std::sqrt(message.covariance_rad2[k][k]);
         worst_sd_ = std::max(worst_sd_, error / sd);
-        ASSERT_LE(error, std::max(5.0 * sd, radians(1.0)))
-            << message.joint_name[k] << " at " << message.utime << ": " << degrees(error) << " deg off, says "
-            << degrees(sd);
+        ASSERT_LE(error, std::max(5.0 * sd, radians(1.0))) << message.joint_name[k] << " at " << message.utime << ": "
+                                                           << degrees(error) << " deg off, says " << degrees(sd);
       }
     }
   }
@@ -229,27 +228,36 @@ TEST_F(World, CameraDiesAndReturns) {
 }
 
 TEST_F(World, BothCamerasDie) {
-  suffer({.name = "both cameras die", .faults = faults::both_cameras_die(),
-          .words = "no pictures on ICUB_CAMERAS for", .level = HealthLevel::kStale});
+  suffer({.name = "both cameras die",
+          .faults = faults::both_cameras_die(),
+          .words = "no pictures on ICUB_CAMERAS for",
+          .level = HealthLevel::kStale});
 }
 
 TEST_F(World, CameraFreezes) {
-  suffer({.name = "left camera freezes", .faults = faults::camera_freezes(0),
-          .words = "the left camera has shown the same picture for", .notice_s = 15.0});
+  suffer({.name = "left camera freezes",
+          .faults = faults::camera_freezes(0),
+          .words = "the left camera has shown the same picture for",
+          .notice_s = 15.0});
 }
 
 TEST_F(World, CamerasSwapped) {
-  suffer({.name = "left and right swapped", .faults = faults::cameras_swapped(),
-          .words = "the left and right pictures are swapped", .level = HealthLevel::kError, .notice_s = 3.0});
+  suffer({.name = "left and right swapped",
+          .faults = faults::cameras_swapped(),
+          .words = "the left and right pictures are swapped",
+          .level = HealthLevel::kError,
+          .notice_s = 3.0});
 }
 
 TEST_F(World, PicturesDoubled) {
-  suffer({.name = "pictures twice", .faults = faults::pictures_doubled(),
+  suffer({.name = "pictures twice",
+          .faults = faults::pictures_doubled(),
           .words = "is there a second publisher on ICUB_CAMERAS?"});
 }
 
 TEST_F(World, SecondPublisherOfOtherPictures) {
-  suffer({.name = "second publisher, clock behind", .faults = faults::second_publisher(),
+  suffer({.name = "second publisher, clock behind",
+          .faults = faults::second_publisher(),
           .words = "is there a second publisher on ICUB_CAMERAS?"});
 }
 
@@ -261,40 +269,56 @@ TEST_F(World, PicturesLate) {
   // As over a bad network: the encoders of that time are still remembered, and all stays well. It begins
   // with a time without pictures, 0.5 s of the robot's.
   const double begins_s = 0.5 / speed();
-  suffer({.name = "pictures 0.5 s late", .faults = faults::pictures_late(500'000),
-          .words = "converged", .level = HealthLevel::kOk, .lasts_s = begins_s + 6.0, .quiet_s = begins_s + 2.0});
+  suffer({.name = "pictures 0.5 s late",
+          .faults = faults::pictures_late(500'000),
+          .words = "converged",
+          .level = HealthLevel::kOk,
+          .lasts_s = begins_s + 6.0,
+          .quiet_s = begins_s + 2.0});
 }
 
 TEST_F(World, PictureSizeJumps) {
-  suffer({.name = "picture size jumps", .faults = faults::picture_size_jumps(),
-          .words = "a picture has not the size", .level = HealthLevel::kError});
+  suffer({.name = "picture size jumps",
+          .faults = faults::picture_size_jumps(),
+          .words = "a picture has not the size",
+          .level = HealthLevel::kError});
 }
 
 TEST_F(World, PixelFormatJumps) {
-  suffer({.name = "pixel format jumps", .faults = faults::pixel_format_jumps(),
-          .words = "the pixel format is not", .level = HealthLevel::kError});
+  suffer({.name = "pixel format jumps",
+          .faults = faults::pixel_format_jumps(),
+          .words = "the pixel format is not",
+          .level = HealthLevel::kError});
 }
 
 TEST_F(World, PixelFormatJumpsToGray) {
-  suffer({.name = "pictures turn gray", .faults = faults::pixel_format_jumps_to_gray(),
-          .words = "gray where colour is expected", .level = HealthLevel::kError});
+  suffer({.name = "pictures turn gray",
+          .faults = faults::pixel_format_jumps_to_gray(),
+          .words = "gray where colour is expected",
+          .level = HealthLevel::kError});
 }
 
 TEST_F(World, LightsGoOff) {
-  suffer({.name = "lights off", .faults = faults::lights_go_off(), .words = "picture is black",
+  suffer({.name = "lights off",
+          .faults = faults::lights_go_off(),
+          .words = "picture is black",
           .level = HealthLevel::kError});
 }
 
 TEST_F(World, HandLeavesTheView) {
-  suffer({.name = "hand leaves the view for a minute", .faults = faults::hand_leaves_the_view(),
-          .words = "hand not in view", .lasts_s = 60.0});
+  suffer({.name = "hand leaves the view for a minute",
+          .faults = faults::hand_leaves_the_view(),
+          .words = "hand not in view",
+          .lasts_s = 60.0});
 }
 
 // --- encoders --------------------------------------------------------------------------------------
 
 TEST_F(World, EncodersStop) {
-  suffer({.name = "encoders stop", .faults = faults::encoders_stop(),
-          .words = "no encoder readings on ICUB_JOINT_STATE for", .level = HealthLevel::kStale});
+  suffer({.name = "encoders stop",
+          .faults = faults::encoders_stop(),
+          .words = "no encoder readings on ICUB_JOINT_STATE for",
+          .level = HealthLevel::kStale});
 }
 
 TEST_F(World, EncodersLate) {
@@ -302,25 +326,35 @@ TEST_F(World, EncodersLate) {
 }
 
 TEST_F(World, EncoderNotANumber) {
-  suffer({.name = "encoder reports NaN", .faults = faults::encoder_not_a_number(),
-          .words = "an encoder reports NaN", .level = HealthLevel::kError});
+  suffer({.name = "encoder reports NaN",
+          .faults = faults::encoder_not_a_number(),
+          .words = "an encoder reports NaN",
+          .level = HealthLevel::kError});
 }
 
 TEST_F(World, OneJointMissing) {
-  suffer({.name = "one joint missing", .faults = faults::joint_missing("r_elbow"),
-          .words = "readings of r_elbow have stopped", .level = HealthLevel::kError});
+  suffer({.name = "one joint missing",
+          .faults = faults::joint_missing("r_elbow"),
+          .words = "readings of r_elbow have stopped",
+          .level = HealthLevel::kError});
 }
 
 TEST_F(World, EncoderJumpsToAndFro) {
-  suffer({.name = "encoder jumps by 60 deg", .faults = faults::encoder_jumps("r_elbow"),
-          .words = "the encoder of r_elbow jumped", .level = HealthLevel::kError});
+  suffer({.name = "encoder jumps by 60 deg",
+          .faults = faults::encoder_jumps("r_elbow"),
+          .words = "the encoder of r_elbow jumped",
+          .level = HealthLevel::kError});
 }
 
 TEST_F(World, EncoderWraps) {
   // A full turn more or less is the same arm: a frame is left out at most, should one fall between
   // the two readings around the jump, and all stays well.
-  suffer({.name = "encoder wraps by 360 deg", .faults = faults::encoder_wraps("r_elbow"),
-          .words = "converged", .level = HealthLevel::kOk, .lasts_s = 5.0, .quiet_s = 0.0});
+  suffer({.name = "encoder wraps by 360 deg",
+          .faults = faults::encoder_wraps("r_elbow"),
+          .words = "converged",
+          .level = HealthLevel::kOk,
+          .lasts_s = 5.0,
+          .quiet_s = 0.0});
   if (last_.empty()) return;
   // It wraps and wraps back: two jumps, at each a frame of two pictures.
   EXPECT_LE(counter("dropped.encoder_jump"), 4);
@@ -331,15 +365,19 @@ TEST_F(World, EncoderStalls) {
   // Messages go on with stamps that advance; one joint's reading stays as it was. What an offset is then
   // changes with the arm, and estimates are measured by that.
   stalled_joint_ = faults::kStalls;
-  suffer({.name = "encoder of r_elbow stalls", .faults = faults::encoder_stalls(faults::kStalls, stall_),
-          .words = "the encoder of r_elbow stands still", .level = HealthLevel::kError, .notice_s = 15.0,
+  suffer({.name = "encoder of r_elbow stalls",
+          .faults = faults::encoder_stalls(faults::kStalls, stall_),
+          .words = "the encoder of r_elbow stands still",
+          .level = HealthLevel::kError,
+          .notice_s = 15.0,
           .lasts_s = 20.0});
 }
 
 // --- the rest --------------------------------------------------------------------------------------
 
 TEST_F(World, ClockStepsBack) {
-  suffer({.name = "clock steps back an hour", .faults = faults::clock_steps_back(),
+  suffer({.name = "clock steps back an hour",
+          .faults = faults::clock_steps_back(),
           .words = "the clock of the time stamps stepped back"});
 }
 
@@ -386,8 +424,10 @@ TEST_F(World, PacketsLostAndSwapped) {
     check_honest(listener.offsets());
     EXPECT_GT(relay.lost(), 0u);
     EXPECT_GT(relay.swapped(), 0u);
-    std::printf("%.0f %% of packets lost, 10 %% swapped: estimates at %.1f Hz of %.0f  right again %.1f s  worst error of "
-                "a converged estimate %.1f sd\n", 100.0 * lost, rate_hz, 30.0 * speed(), recovery_s, worst_sd_);
+    std::printf(
+        "%.0f %% of packets lost, 10 %% swapped: estimates at %.1f Hz of %.0f  right again %.1f s  worst error of "
+        "a converged estimate %.1f sd\n",
+        100.0 * lost, rate_hz, 30.0 * speed(), recovery_s, worst_sd_);
   }
 }
 
@@ -395,8 +435,11 @@ TEST_F(World, SecondSourceIsRefusedWhenConfigured) {
   // Another process (as LCM tells them: another connection) publishes grey pictures in between.
   LcmLink other(url_);
   auto fault = faults::second_publisher(other);
-  suffer({.name = "second source, one_source: true", .faults = fault, .words = "of a second source on ICUB_CAMERAS",
-          .lasts_s = 2.5 / speed()}, {"--set", "bus.one_source=true"});
+  suffer({.name = "second source, one_source: true",
+          .faults = fault,
+          .words = "of a second source on ICUB_CAMERAS",
+          .lasts_s = 2.5 / speed()},
+         {"--set", "bus.one_source=true"});
   if (IsSkipped()) return;
   ASSERT_FALSE(last_.empty());
   EXPECT_GT(counter("refused.second_source"), 20);
@@ -425,7 +468,8 @@ TEST_F(World, RefusalsAddUpOverAReload) {
 
 TEST_F(World, AnotherSourceMayFollowOnceTheFirstIsSilent) {
   Process service({"bodyschemad", "--config", reach_configuration(), "-l", url_, "--set", "bus.one_source=true",
-                   "--set", "bus.one_source_silence_s=0.5"}, scratch_.folder());
+                   "--set", "bus.one_source_silence_s=0.5"},
+                  scratch_.folder());
   ASSERT_TRUE(service.said("waiting for", kStart));
   Listener listener(url_);
   {
@@ -439,7 +483,8 @@ TEST_F(World, AnotherSourceMayFollowOnceTheFirstIsSilent) {
   // Its stamps begin anew: that is a stepped clock besides.
   EXPECT_TRUE(listener.wait_offsets(before + 3, Seconds(15)));
   check_honest(listener.offsets());
-  std::printf("driver started again, one_source: true: estimates after %.1f s\n", Seconds(Clock::now() - begin).count());
+  std::printf("driver started again, one_source: true: estimates after %.1f s\n",
+              Seconds(Clock::now() - begin).count());
 }
 
 TEST_F(World, GlContextLost) {
@@ -454,7 +499,9 @@ TEST_F(World, GlContextLost) {
   Listener listener(url_);
   Robot robot(url_, reach_log(), 0.2 * speed());
   const auto told = listener.wait_status(
-      [](const offsets_status_t& s) { return s.sentence.find("silhouettes are now drawn by contour") != std::string::npos; },
+      [](const offsets_status_t& s) {
+        return s.sentence.find("silhouettes are now drawn by contour") != std::string::npos;
+      },
       Seconds(60));
   ASSERT_TRUE(told) << service.err();
   EXPECT_EQ(told->level, offsets_status_t::WARN);

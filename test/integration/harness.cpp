@@ -101,8 +101,12 @@ bool Process::running() {
   return false;
 }
 
-std::string Process::out() const { return contents(out_); }
-std::string Process::err() const { return contents(err_); }
+std::string Process::out() const {
+  return contents(out_);
+}
+std::string Process::err() const {
+  return contents(err_);
+}
 
 bool Process::said(const std::string& words, Seconds limit) {
   return eventually([&] { return err().find(words) != std::string::npos || !running(); }, limit) &&
@@ -218,8 +222,8 @@ std::vector<joint_offsets_t> Listener::take_offsets() {
   return std::exchange(offsets_, {});
 }
 
-std::optional<offsets_status_t> Listener::wait_status(
-    const std::function<bool(const offsets_status_t&)>& wanted, Seconds limit) {
+std::optional<offsets_status_t> Listener::wait_status(const std::function<bool(const offsets_status_t&)>& wanted,
+                                                      Seconds limit) {
   std::unique_lock lock(mutex_);
   std::size_t next = statuses_.size();
   std::optional<offsets_status_t> found;
@@ -370,7 +374,9 @@ fs::path reach_log() {
   return file;
 }
 
-fs::path reach_truth() { return fs::path(BODYSCHEMA_BINARY_DIR) / "test-logs" / "reach_truth.json"; }
+fs::path reach_truth() {
+  return fs::path(BODYSCHEMA_BINARY_DIR) / "test-logs" / "reach_truth.json";
+}
 
 std::map<Microseconds, std::string> estimates_by_utime(const fs::path& file) {
   std::map<Microseconds, std::string> lines;
@@ -384,8 +390,15 @@ std::map<Microseconds, std::string> estimates_by_utime(const fs::path& file) {
 std::map<Microseconds, std::string> replay_estimates(const fs::path& log, const fs::path& out,
                                                      const std::vector<std::string>& more) {
   fs::create_directories(out);
-  std::vector<std::string> command = {"bodyschema", "replay", log.string(), "--config", reach_configuration(),
-                                      "--overlays", "0", "--learn-background-online", "--out",
+  std::vector<std::string> command = {"bodyschema",
+                                      "replay",
+                                      log.string(),
+                                      "--config",
+                                      reach_configuration(),
+                                      "--overlays",
+                                      "0",
+                                      "--learn-background-online",
+                                      "--out",
                                       out.string()};
   command.insert(command.end(), more.begin(), more.end());
   Process replay(command, out);

@@ -198,8 +198,7 @@ std::string reach_configuration();
 /// Lines of estimates.jsonl by utime.
 std::map<Microseconds, std::string> estimates_by_utime(const std::filesystem::path& file);
 /// Runs `bodyschema replay` and returns its estimates.
-std::map<Microseconds, std::string> replay_estimates(const std::filesystem::path& log,
-                                                     const std::filesystem::path& out,
+std::map<Microseconds, std::string> replay_estimates(const std::filesystem::path& log, const std::filesystem::path& out,
                                                      const std::vector<std::string>& more = {});
 
 }  // namespace bodyschema::integration

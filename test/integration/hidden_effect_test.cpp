@@ -73,9 +73,9 @@ struct Robot {
 Written simulate(const Scratch& scratch, const std::string& name, const std::vector<std::string>& arguments,
                  const Robot& robot = {}) {
   Written written{scratch / (name + ".log"), scratch / (name + ".truth.json"), ""};
-  std::vector<std::string> command = {"bodyschema-sim", "--config", robot.simulator,
-                                      "--set", "simulator.cameras.rate_hz=10", "--offsets", "random",
-                                      "--log", written.log.string(), "--truth", written.truth.string()};
+  std::vector<std::string> command = {
+      "bodyschema-sim", "--config", robot.simulator,      "--set",   "simulator.cameras.rate_hz=10", "--offsets",
+      "random",         "--log",    written.log.string(), "--truth", written.truth.string()};
   command.insert(command.end(), arguments.begin(), arguments.end());
   std::filesystem::create_directories(scratch / name);
   Process simulator(command, scratch / name);
@@ -90,8 +90,9 @@ Answer diagnose(const Scratch& scratch, const std::string& name, const Written& 
   answer.error = written.error;
   if (!answer.error.empty()) return answer;
   const auto out = scratch / (name + ".report");
-  std::vector<std::string> command = {"bodyschema", "diagnose", written.log.string(), "--config",
-                                      robot.estimator, "--threads", "1", "--out", out.string()};
+  std::vector<std::string> command = {"bodyschema", "diagnose",      written.log.string(),
+                                      "--config",   robot.estimator, "--threads",
+                                      "1",          "--out",         out.string()};
   command.insert(command.end(), arguments.begin(), arguments.end());
   std::filesystem::create_directories(scratch / name);
   Process diagnose(command, scratch / name);
@@ -244,9 +245,8 @@ bool not_taken_for_another(const Answer& answer) {
   const auto verdict = text_of(answer.report, "verdict");
   if (verdict != "class") return verdict == "unexplained";
   return std::any_of(answer.report["causes"].begin(), answer.report["causes"].end(), [&](const Json& cause) {
-    return std::any_of(answer.truth["faults"].begin(), answer.truth["faults"].end(), [&](const Json& fault) {
-      return text_of(cause, "joint") == text_of(fault, "joint");
-    });
+    return std::any_of(answer.truth["faults"].begin(), answer.truth["faults"].end(),
+                       [&](const Json& fault) { return text_of(cause, "joint") == text_of(fault, "joint"); });
   });
 }
 
@@ -268,8 +268,8 @@ TEST(HiddenEffect, IsFoundBehindFreshSeeds) {
   std::mt19937_64 random(seed());
   const auto number = [&] { return std::to_string(random() % 1'000'000'000); };
   const auto babble = [&](std::vector<std::string> more) {
-    std::vector<std::string> list = {"--babble", std::to_string(static_cast<int>(kLog_s)), "--seed", number(),
-                                     "--hidden-size", "5"};
+    std::vector<std::string> list = {
+        "--babble", std::to_string(static_cast<int>(kLog_s)), "--seed", number(), "--hidden-size", "5"};
     list.insert(list.end(), more.begin(), more.end());
     return list;
   };
@@ -280,12 +280,12 @@ TEST(HiddenEffect, IsFoundBehindFreshSeeds) {
   }
   for (int i = 0; i < times(); ++i) {
     const auto n = std::to_string(i);
-    tasks.push_back({"nothing" + n, babble({}), 0.93,
-                     [](const Answer& a) { return text_of(a.report, "verdict") == "none"; }});
+    tasks.push_back(
+        {"nothing" + n, babble({}), 0.93, [](const Answer& a) { return text_of(a.report, "verdict") == "none"; }});
     tasks.push_back({"two" + n, babble({"--hidden-fault", number(), "--hidden-fault", number()}), 0.80,
                      [](const Answer& a) { return all_found(a) && spurious(a) == 0; }});
-    tasks.push_back({"outside" + n, babble({"--hidden-fault", number(), "--hidden-outside"}), 0.80,
-                     not_taken_for_another});
+    tasks.push_back(
+        {"outside" + n, babble({"--hidden-fault", number(), "--hidden-outside"}), 0.80, not_taken_for_another});
   }
   const auto answers = ask_all(scratch, tasks);
   int right = 0;
@@ -298,8 +298,7 @@ TEST(HiddenEffect, IsFoundBehindFreshSeeds) {
   for (const auto& answer : answers) parameters.add(answer);
   std::vector<double> rates;
   for (const auto& task : tasks) rates.push_back(task.demanded_rate);
-  EXPECT_GE(right, fewest_right(rates))
-      << "of " << tasks.size() << "; repeat with BODYSCHEMA_SEED=" << seed();
+  EXPECT_GE(right, fewest_right(rates)) << "of " << tasks.size() << "; repeat with BODYSCHEMA_SEED=" << seed();
   // Through pictures: nine errors of ten below 15 %, intervals that hold 90 %, each five points worse.
   const auto least = fewest_right(std::vector<double>(static_cast<std::size_t>(parameters.known), 0.85));
   EXPECT_GE(parameters.near, least) << "of " << parameters.known << "; repeat with BODYSCHEMA_SEED=" << seed();
@@ -307,16 +306,16 @@ TEST(HiddenEffect, IsFoundBehindFreshSeeds) {
 }
 
 bool not_testable(const Json& report, const std::string& name, const std::string& joint) {
-  return std::any_of(report["not_testable"].begin(), report["not_testable"].end(), [&](const Json& n) {
-    return text_of(n, "name") == name && text_of(n, "joint") == joint;
-  });
+  return std::any_of(report["not_testable"].begin(), report["not_testable"].end(),
+                     [&](const Json& n) { return text_of(n, "name") == name && text_of(n, "joint") == joint; });
 }
 
 TEST(HiddenEffect, AFrozenJointLeavesTheRestTestable) {
   const Scratch scratch;
   const std::string at = std::to_string(seed() % 1'000'000'000);
-  const auto answer = ask(scratch, "frozen", {"--babble", "60", "--seed", at, "--freeze", "r_wrist_pitch",
-                                              "--fault", "encoder_gain:joint=r_elbow,value=4"});
+  const auto answer = ask(
+      scratch, "frozen",
+      {"--babble", "60", "--seed", at, "--freeze", "r_wrist_pitch", "--fault", "encoder_gain:joint=r_elbow,value=4"});
   ASSERT_EQ(answer.error, "");
   EXPECT_TRUE(not_testable(answer.report, "encoder_gain", "r_wrist_pitch"));
   EXPECT_TRUE(all_found(answer)) << sentence_of(answer) << "; repeat with BODYSCHEMA_SEED=" << seed();
@@ -336,27 +335,35 @@ TEST(HiddenEffect, OneWayMotionShowsNoBacklashAndBlamesNoOther) {
   const Scratch scratch;
   // What masks and meshes get wrong follows a posture, and time where each comes once: both logs had a cause
   // before, a slip of 0.03 deg or the acceleration of a joint.
-  EXPECT_EQ(once_right(0.93, [&](const std::string& at) -> std::string {
-              const auto answer = ask(scratch, "one_way_nothing" + at, {"--one-way", "40", "--seed", at});
-              if (!answer.error.empty()) return answer.error;
-              return text_of(answer.report, "verdict") == "none" ? "" : sentence_of(answer);
-            }), "") << "repeat with BODYSCHEMA_SEED=" << seed();
-  EXPECT_EQ(once_right(0.93, [&](const std::string& at) -> std::string {
-              const auto answer = ask(scratch, "one_way" + at, {"--one-way", "40", "--seed", at,
-                                                                "--fault", "backlash:joint=r_elbow,value=1"});
-              if (!answer.error.empty()) return answer.error;
-              EXPECT_EQ(cause_of(answer.report, answer.truth["faults"][0]), nullptr) << sentence_of(answer);
-              EXPECT_TRUE(not_testable(answer.report, "backlash", "r_elbow"));
-              return blames_another(answer, "r_elbow") ? sentence_of(answer) : "";
-            }), "") << "repeat with BODYSCHEMA_SEED=" << seed();
+  EXPECT_EQ(once_right(0.93,
+                       [&](const std::string& at) -> std::string {
+                         const auto answer = ask(scratch, "one_way_nothing" + at, {"--one-way", "40", "--seed", at});
+                         if (!answer.error.empty()) return answer.error;
+                         return text_of(answer.report, "verdict") == "none" ? "" : sentence_of(answer);
+                       }),
+            "")
+      << "repeat with BODYSCHEMA_SEED=" << seed();
+  EXPECT_EQ(once_right(0.93,
+                       [&](const std::string& at) -> std::string {
+                         const auto answer =
+                             ask(scratch, "one_way" + at,
+                                 {"--one-way", "40", "--seed", at, "--fault", "backlash:joint=r_elbow,value=1"});
+                         if (!answer.error.empty()) return answer.error;
+                         EXPECT_EQ(cause_of(answer.report, answer.truth["faults"][0]), nullptr) << sentence_of(answer);
+                         EXPECT_TRUE(not_testable(answer.report, "backlash", "r_elbow"));
+                         return blames_another(answer, "r_elbow") ? sentence_of(answer) : "";
+                       }),
+            "")
+      << "repeat with BODYSCHEMA_SEED=" << seed();
 }
 
 /// The official robot, its head looking down as the project's own does.
 Robot official_robot(const Scratch& scratch) {
   const std::string configurations = std::string(BODYSCHEMA_SOURCE_DIR) + "/config/";
   Robot official{(scratch / "official.yaml").string(), configurations + "icub_v2_5/estimator.yaml"};
-  std::ofstream(official.simulator) << "include: [" << configurations << "icub_v2_5/robot.yaml, " << configurations
-                                    << "bus.yaml]\nsimulator: {motion: {posture_deg: {neck_pitch: -22, eyes_tilt: -18}}}\n";
+  std::ofstream(official.simulator)
+      << "include: [" << configurations << "icub_v2_5/robot.yaml, " << configurations
+      << "bus.yaml]\nsimulator: {motion: {posture_deg: {neck_pitch: -22, eyes_tilt: -18}}}\n";
   return official;
 }
 
@@ -364,12 +371,16 @@ TEST(HiddenEffect, TheOfficialRobotIsDiagnosedWithItsOwnConfiguration) {
   SKIP_WITHOUT("icub-models");
   const Scratch scratch;
   const auto official = official_robot(scratch);
-  EXPECT_EQ(once_right(0.90, [&](const std::string& at) -> std::string {
-              const auto answer = ask(scratch, "official" + at, {"--babble", "40", "--seed", at, "--fault", "latency:value=40"},
-                                      official);
-              if (!answer.error.empty()) return answer.error;
-              return all_found(answer) && answer.report["causes"].size() == 1 ? "" : sentence_of(answer);
-            }), "") << "repeat with BODYSCHEMA_SEED=" << seed();
+  EXPECT_EQ(once_right(0.90,
+                       [&](const std::string& at) -> std::string {
+                         const auto answer =
+                             ask(scratch, "official" + at,
+                                 {"--babble", "40", "--seed", at, "--fault", "latency:value=40"}, official);
+                         if (!answer.error.empty()) return answer.error;
+                         return all_found(answer) && answer.report["causes"].size() == 1 ? "" : sentence_of(answer);
+                       }),
+            "")
+      << "repeat with BODYSCHEMA_SEED=" << seed();
 }
 
 /// A log as many are recorded: still postures one after another, with jumps between them. What all small errors
@@ -379,23 +390,31 @@ TEST(HiddenEffect, StillPosturesOfTheOfficialRobotShowItsGainOrNothing) {
   const Scratch scratch;
   const auto official = official_robot(scratch);
   const auto postures = [&](const std::string& at, std::vector<std::string> more) {
-    more.insert(more.begin(), {"--poses", "70", "--seed", at, "--set", "simulator.cameras.rate_hz=4",
-                               "--set", "simulator.motion.fast_deg_s=500"});
+    more.insert(more.begin(), {"--poses", "70", "--seed", at, "--set", "simulator.cameras.rate_hz=4", "--set",
+                               "simulator.motion.fast_deg_s=500"});
     return more;
   };
-  EXPECT_EQ(once_right(0.90, [&](const std::string& at) -> std::string {
-              const auto answer = ask(scratch, "postures" + at,
-                                      postures(at, {"--fault", "encoder_gain:joint=r_elbow,value=4"}), official);
-              if (!answer.error.empty()) return answer.error;
-              return all_found(answer) && answer.report["causes"].size() == 1 ? "" : sentence_of(answer);
-            }), "") << "repeat with BODYSCHEMA_SEED=" << seed();
-  EXPECT_EQ(once_right(0.93, [&](const std::string& at) -> std::string {
-              const auto answer = ask(scratch, "postures_nothing" + at, postures(at, {}), official);
-              if (!answer.error.empty()) return answer.error;
-              const bool none = text_of(answer.report, "verdict") == "none" &&
-                                text_of(answer.report, "sentence").find("explains the log to its noise") != std::string::npos;
-              return none ? "" : sentence_of(answer);
-            }), "") << "repeat with BODYSCHEMA_SEED=" << seed();
+  EXPECT_EQ(once_right(0.90,
+                       [&](const std::string& at) -> std::string {
+                         const auto answer =
+                             ask(scratch, "postures" + at,
+                                 postures(at, {"--fault", "encoder_gain:joint=r_elbow,value=4"}), official);
+                         if (!answer.error.empty()) return answer.error;
+                         return all_found(answer) && answer.report["causes"].size() == 1 ? "" : sentence_of(answer);
+                       }),
+            "")
+      << "repeat with BODYSCHEMA_SEED=" << seed();
+  EXPECT_EQ(once_right(0.93,
+                       [&](const std::string& at) -> std::string {
+                         const auto answer = ask(scratch, "postures_nothing" + at, postures(at, {}), official);
+                         if (!answer.error.empty()) return answer.error;
+                         const bool none = text_of(answer.report, "verdict") == "none" &&
+                                           text_of(answer.report, "sentence").find("explains the log to its noise") !=
+                                               std::string::npos;
+                         return none ? "" : sentence_of(answer);
+                       }),
+            "")
+      << "repeat with BODYSCHEMA_SEED=" << seed();
 }
 
 /// Every event of a log in order of its time stamp, to be edited.
@@ -471,9 +490,9 @@ std::vector<LogEvent> with_random_directions(std::vector<LogEvent> events, std::
 /// Empty, or what a tool does wrong with a log of backlash whose frames come twice and whose directions
 /// of motion are shuffled.
 std::string wrong_with_copies(const Scratch& scratch, const std::string& at) {
-  const auto written = simulate(scratch, "plain" + at, {"--babble", "40", "--seed", at, "--set",
-                                                        "simulator.cameras.rate_hz=5", "--fault",
-                                                        "backlash:joint=r_elbow,value=1.5"});
+  const auto written = simulate(scratch, "plain" + at,
+                                {"--babble", "40", "--seed", at, "--set", "simulator.cameras.rate_hz=5", "--fault",
+                                 "backlash:joint=r_elbow,value=1.5"});
   if (!written.error.empty()) return written.error;
   const auto events = events_of(written.log);
   auto twice = written, shuffled = written;
@@ -518,9 +537,9 @@ TEST(HiddenEffect, DuplicatedFramesSharpenNothingAndShuffledDirectionsShowNoBack
 }
 
 TEST(BinomialBound, IsThatOfTables) {
-  EXPECT_EQ(fewest_right(std::vector<double>(8, 0.8)), 2);   // at most 1 of 8: 0.00008, 2: 0.0012
-  EXPECT_EQ(fewest_right(std::vector<double>(20, 0.9)), 13); // at most 12 of 20: 0.0004, 13: 0.0024
-  EXPECT_EQ(attempts_at(0.93), 3);  // 0.07^3 = 0.0003
+  EXPECT_EQ(fewest_right(std::vector<double>(8, 0.8)), 2);    // at most 1 of 8: 0.00008, 2: 0.0012
+  EXPECT_EQ(fewest_right(std::vector<double>(20, 0.9)), 13);  // at most 12 of 20: 0.0004, 13: 0.0024
+  EXPECT_EQ(attempts_at(0.93), 3);                            // 0.07^3 = 0.0003
   EXPECT_EQ(attempts_at(0.5), 10);
 }
 

@@ -41,8 +41,8 @@ class LivePageInBrowser : public testing::Test {
   /// What test/integration/browser.py says of every tab once the page has asked a few times.
   nlohmann::json tabs(const std::vector<std::string>& more) const {
     std::vector<std::string> command = {"python3", BODYSCHEMA_SOURCE_DIR "/test/integration/browser.py",
-                                        "http://localhost:" + std::to_string(port_) + "/",
-                                        "--until", "Number(document.body.dataset.updates) > 3"};
+                                        "http://localhost:" + std::to_string(port_) + "/", "--until",
+                                        "Number(document.body.dataset.updates) > 3"};
     command.insert(command.end(), more.begin(), more.end());
     Process chromium(command, scratch_.folder());
     EXPECT_EQ(chromium.wait(Seconds(400)), 0) << chromium.err();
@@ -104,12 +104,13 @@ TEST_F(LivePageInBrowser, LoadsUpdatesAndShowsADeadCameraAsDead) {
   EXPECT_THAT(first, HasSubstr("r_wrist_prosup"));
   EXPECT_THAT(first, testing::Not(HasSubstr("class=\"camera dead\"")));
 
-  robot.set_faults({.pictures = [](bot_core::images_t& pictures, LcmLink&) {
-                      pictures.images.resize(1);  // the left one
-                      pictures.image_types.resize(1);
-                      pictures.n_images = 1;
-                      return true;
-                    },
+  robot.set_faults({.pictures =
+                        [](bot_core::images_t& pictures, LcmLink&) {
+                          pictures.images.resize(1);  // the left one
+                          pictures.image_types.resize(1);
+                          pictures.n_images = 1;
+                          return true;
+                        },
                     .joints = {}});
   std::this_thread::sleep_for(std::chrono::seconds(4));
   const std::string dead = look();
@@ -138,9 +139,9 @@ TEST_F(LivePageInBrowser, SeveralViewersOnAPhoneWideScreen) {
   Robot robot(url_, reach_log(), 0.5);
   Listener listener(url_);
   ASSERT_TRUE(listener.wait_offsets(20, Seconds(60)));
-  const auto seen = tabs({"--tabs", "4", "--width", "400", "--height", "800",
-                          "--until", "document.querySelectorAll('.camera img[src]').length == 2 && "
-                                     "Number(document.body.dataset.updates) > 3",
+  const auto seen = tabs({"--tabs", "4", "--width", "400", "--height", "800", "--until",
+                          "document.querySelectorAll('.camera img[src]').length == 2 && "
+                          "Number(document.body.dataset.updates) > 3",
                           "--expression", R"(({
     wide: document.documentElement.scrollWidth,
     updates: Number(document.body.dataset.updates),
@@ -251,10 +252,11 @@ TEST(LivePageViewers, DoNotSlowTheEstimator) {
   ASSERT_GT(pictures, 8 * rounds) << "the viewers did see pictures";
   const double alone = quantile(latency_ms[0], 0.5);
   const double watched = quantile(latency_ms[1], 0.5);
-  std::printf("picture to estimate, nobody watching: median %.1f ms, 90 %% within %.1f ms (%zu estimates)\n"
-              "four viewers, %d pictures:            median %.1f ms, 90 %% within %.1f ms (%zu estimates), %.2f times\n",
-              alone, quantile(latency_ms[0], 0.9), latency_ms[0].size(), pictures, watched,
-              quantile(latency_ms[1], 0.9), latency_ms[1].size(), watched / alone);
+  std::printf(
+      "picture to estimate, nobody watching: median %.1f ms, 90 %% within %.1f ms (%zu estimates)\n"
+      "four viewers, %d pictures:            median %.1f ms, 90 %% within %.1f ms (%zu estimates), %.2f times\n",
+      alone, quantile(latency_ms[0], 0.9), latency_ms[0].size(), pictures, watched, quantile(latency_ms[1], 0.9),
+      latency_ms[1].size(), watched / alone);
   if (wish != nullptr) {
     EXPECT_LT(watched, 1.5 * alone);
   }

@@ -96,9 +96,9 @@ effects:
   const auto log = reach_log();
   Listener listener(url_);
   const auto file = scratch_ / "estimates.jsonl";
-  Process service(daemon({"--estimates", file.string(), "--stop-after-idle", kIdle_s,
-                          "--extended-model", model.string()}),
-                  scratch_.folder());
+  Process service(
+      daemon({"--estimates", file.string(), "--stop-after-idle", kIdle_s, "--extended-model", model.string()}),
+      scratch_.folder());
   ASSERT_TRUE(service.said("extended model: backlash of r_elbow width 1 deg; latency delay 25 ms", kStart))
       << service.err();
   ASSERT_TRUE(service.said("waiting for", kStart));
@@ -140,7 +140,8 @@ TEST_F(Service, AgreesWithReplayOverLcmLogplayer) {
 
 TEST_F(Service, TwoReplaysAreIdentical) {
   const auto log = reach_log();
-  EXPECT_EQ(replay_estimates(log, scratch_ / "a"), replay_estimates(log, scratch_ / "b", {"--set", "silhouette.threads=1"}));
+  EXPECT_EQ(replay_estimates(log, scratch_ / "a"),
+            replay_estimates(log, scratch_ / "b", {"--set", "silhouette.threads=1"}));
 }
 
 TEST_F(Service, MalformedMessagesAreCountedAndChangeNothing) {
@@ -152,7 +153,8 @@ TEST_F(Service, MalformedMessagesAreCountedAndChangeNothing) {
   auto in_step = in_step_with(listener);
   int sent = 0;
   Player player(url_, log, 1000.0, [&](LogEvent& event, LcmLink& link) {
-    const std::vector<std::uint8_t> half(event.data.begin(), event.data.begin() + static_cast<std::ptrdiff_t>(event.data.size() / 2));
+    const std::vector<std::uint8_t> half(event.data.begin(),
+                                         event.data.begin() + static_cast<std::ptrdiff_t>(event.data.size() / 2));
     const std::vector<std::uint8_t> noise(33, 0xA5);
     if (++sent % 10 == 0) {
       link.publish(event.channel, 0, half);
@@ -242,12 +244,14 @@ TEST_F(Service, TellsTheManagerWhenItIsReadyAndAlive) {
   address.sun_family = AF_UNIX;
   std::memcpy(address.sun_path + 1, name.data() + 1, name.size() - 1);
   ASSERT_EQ(bind(manager, reinterpret_cast<const sockaddr*>(&address),
-                 static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name.size())), 0);
+                 static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name.size())),
+            0);
   std::string heard;
   const auto hears = [&](const std::string& words, double limit_s) {
     for (int i = 0; i < limit_s * 100; ++i) {
       char text[4096];
-      for (ssize_t n; (n = recv(manager, text, sizeof text, 0)) > 0;) heard.append(text, static_cast<std::size_t>(n)).append("\n");
+      for (ssize_t n; (n = recv(manager, text, sizeof text, 0)) > 0;)
+        heard.append(text, static_cast<std::size_t>(n)).append("\n");
       if (heard.find(words) != std::string::npos) return true;
       usleep(10'000);
     }
@@ -420,10 +424,11 @@ TEST_F(Service, FilesThatAFullDiskDoesNotTakeAreNoWrongInput) {
     std::filesystem::create_directories(disk);
     // A file system of its own, with room for its own folder only.
     const std::string program = std::string(BODYSCHEMA_BINARY_DIR) + "/bin/bodyschemad";
-    Process service({"unshare", "-rm", "sh", "-c",
-                     "mount -t tmpfs -o size=64k,nr_inodes=1 full \"$1\" || exit 77; shift; exec \"$@\"", "sh",
-                     disk.string(), program, "--config", reach_configuration(), "-l", url_, option, (disk / "file").string()},
-                    scratch_.folder());
+    Process service(
+        {"unshare", "-rm", "sh", "-c",
+         "mount -t tmpfs -o size=64k,nr_inodes=1 full \"$1\" || exit 77; shift; exec \"$@\"", "sh", disk.string(),
+         program, "--config", reach_configuration(), "-l", url_, option, (disk / "file").string()},
+        scratch_.folder());
     const auto status = service.wait(kStart);
     if (status == 77 || status == 127 || (status && service.err().find("unshare") != std::string::npos)) {
       GTEST_SKIP() << "no file system can be mounted here: " << service.err();
@@ -447,8 +452,8 @@ TEST_F(Service, StatusFollowsWhatHappens) {
     Player player(url_, reach_log(), 1.0 / patience());
     ASSERT_TRUE(listener.wait_status(says(HealthLevel::kWarn, "hand not in view"), Seconds(10)));
     // Frames are shed on a slow machine, which the sentence may say instead; the state is there too.
-    const auto tracking = listener.wait_status(
-        [](const offsets_status_t& status) { return status.state == "converged"; }, Seconds(20));
+    const auto tracking =
+        listener.wait_status([](const offsets_status_t& status) { return status.state == "converged"; }, Seconds(20));
     ASSERT_TRUE(tracking);
     EXPECT_LE(tracking->level, offsets_status_t::WARN) << tracking->sentence;
     EXPECT_GT(tracking->frame_rate_hz, 1.0 / patience());
@@ -521,11 +526,12 @@ TEST_F(Service, SaysWhichCameraSeesNothingOfTheArm) {
   Robot robot(url_, reach_log(), 0.5);
   ASSERT_TRUE(listener.wait_status([](const offsets_status_t& s) { return s.state == "converged"; }, Seconds(60)));
   int n = 0;
-  robot.set_faults({.pictures = [&](bot_core::images_t& pictures, LcmLink&) {
-                      pictures.images[0].data = empty.images[0].data;
-                      pictures.images[0].data[0] = static_cast<std::uint8_t>(++n);  // not frozen, only empty
-                      return true;
-                    },
+  robot.set_faults({.pictures =
+                        [&](bot_core::images_t& pictures, LcmLink&) {
+                          pictures.images[0].data = empty.images[0].data;
+                          pictures.images[0].data[0] = static_cast<std::uint8_t>(++n);  // not frozen, only empty
+                          return true;
+                        },
                     .joints = {}});
   EXPECT_TRUE(listener.wait_status(
       [](const offsets_status_t& s) {

@@ -79,8 +79,8 @@ std::int64_t counters_with(const offsets_status_t& status, const std::string& pr
 /// What was measured over one minute of the run.
 struct Minute {
   double rss_MiB = 0.0;
-  double latency_ms = 0.0;      ///< median of the seconds' medians
-  double cost_ms = 0.0;         ///< processor time of the daemon per estimate
+  double latency_ms = 0.0;  ///< median of the seconds' medians
+  double cost_ms = 0.0;     ///< processor time of the daemon per estimate
   double estimates = 0.0;
   double load = 0.0;
 };
@@ -195,7 +195,8 @@ TEST(Soak, DaemonLivesThroughFaultsAtRandom) {
         robot.set_faults({});
       }
       healthy = !healthy;
-      next_change = Clock::now() + std::chrono::duration_cast<Clock::duration>(Seconds(between(2.0, healthy ? 12.0 : 8.0)));
+      next_change =
+          Clock::now() + std::chrono::duration_cast<Clock::duration>(Seconds(between(2.0, healthy ? 12.0 : 8.0)));
     }
     if (Clock::now() < next_minute) continue;
     next_minute += std::chrono::seconds(60);
@@ -208,8 +209,10 @@ TEST(Soak, DaemonLivesThroughFaultsAtRandom) {
     rss.clear();
     latency.clear();
     const Minute& m = minutes.back();
-    std::printf("minute %3zu  resident %6.1f MiB  latency %6.1f ms  %5.1f ms of processor per estimate  %5.0f estimates"
-                "  load %.1f\n", minutes.size(), m.rss_MiB, m.latency_ms, m.cost_ms, m.estimates, m.load);
+    std::printf(
+        "minute %3zu  resident %6.1f MiB  latency %6.1f ms  %5.1f ms of processor per estimate  %5.0f estimates"
+        "  load %.1f\n",
+        minutes.size(), m.rss_MiB, m.latency_ms, m.cost_ms, m.estimates, m.load);
     std::fflush(stdout);
   }
   ASSERT_EQ(crashes, 0) << "during: " << fault << "\n" << service.err();
@@ -228,7 +231,9 @@ TEST(Soak, DaemonLivesThroughFaultsAtRandom) {
   std::printf("\nfaults suffered:\n");
   int total = 0;
   for (std::size_t i = 0; i < suffered.size(); ++i) {
-    const std::string name = i < faults.size() ? faults[i].name : i == faults.size() ? "configuration reloaded" : "held up for 3 s";
+    const std::string name = i < faults.size()    ? faults[i].name
+                             : i == faults.size() ? "configuration reloaded"
+                                                  : "held up for 3 s";
     std::printf("  %3d  %s\n", suffered[i], name.c_str());
     total += suffered[i];
   }
@@ -241,8 +246,8 @@ TEST(Soak, DaemonLivesThroughFaultsAtRandom) {
   const std::int64_t mono = counter(last, "mono");
   const std::int64_t shed = counter(last, "shed.queue");
   const std::int64_t failed = counter(last, "failed");
-  std::printf("%d faults; %lld messages sent, %lld arrived, %lld lost on the way\n", total, static_cast<long long>(sent),
-              static_cast<long long>(arrived), static_cast<long long>(sent - arrived));
+  std::printf("%d faults; %lld messages sent, %lld arrived, %lld lost on the way\n", total,
+              static_cast<long long>(sent), static_cast<long long>(arrived), static_cast<long long>(sent - arrived));
   std::printf("%lld pictures: %lld used, %lld dropped, %lld refused, %lld waiting at the end\n",
               static_cast<long long>(pictures), static_cast<long long>(used), static_cast<long long>(dropped),
               static_cast<long long>(refused), static_cast<long long>(pictures - used - dropped - refused));

@@ -17,8 +17,12 @@ using bot_core::joint_state_t;
 constexpr const char* kCameras = "ICUB_CAMERAS";
 constexpr const char* kJoints = "ICUB_JOINT_STATE";
 
-Fault on_pictures(std::function<bool(images_t&, MessageSink&)> change) { return {.pictures = std::move(change), .joints = {}}; }
-Fault on_joints(std::function<bool(joint_state_t&, MessageSink&)> change) { return {.pictures = {}, .joints = std::move(change)}; }
+Fault on_pictures(std::function<bool(images_t&, MessageSink&)> change) {
+  return {.pictures = std::move(change), .joints = {}};
+}
+Fault on_joints(std::function<bool(joint_state_t&, MessageSink&)> change) {
+  return {.pictures = {}, .joints = std::move(change)};
+}
 
 /// Changes the reading of one joint in every message.
 Fault on_joint(const std::string& joint, std::function<void(float&)> change) {
@@ -100,7 +104,9 @@ Fault pictures_out_of_order() {
   });
 }
 
-Fault pictures_late(Microseconds delay) { return on_pictures(delayed<images_t>(delay, kCameras)); }
+Fault pictures_late(Microseconds delay) {
+  return on_pictures(delayed<images_t>(delay, kCameras));
+}
 
 Fault picture_size_jumps() {
   return on_pictures([](images_t& p, MessageSink&) {
@@ -179,7 +185,9 @@ Fault encoders_stop() {
   return on_joints([](joint_state_t&, MessageSink&) { return false; });
 }
 
-Fault encoders_late(Microseconds delay) { return on_joints(delayed<joint_state_t>(delay, kJoints)); }
+Fault encoders_late(Microseconds delay) {
+  return on_joints(delayed<joint_state_t>(delay, kJoints));
+}
 
 Fault encoder_not_a_number() {
   return on_joints([](joint_state_t& j, MessageSink&) {

@@ -16,10 +16,9 @@ namespace fs = std::filesystem;
 TEST(McapExport, CountsWhatItWrites) {
   const auto out = testing_logs::scratch_file("counts.mcap");
   const auto summary = export_mcap({testing_logs::swinging_log("counts.lcmlog"), out});
-  EXPECT_THAT(summary.messages,
-              testing::UnorderedElementsAre(testing::Pair("/ICUB_JOINT_STATE", 400u),
-                                            testing::Pair("/ICUB_CAMERAS/left", 30u),
-                                            testing::Pair("/ICUB_CAMERAS/right", 30u)));
+  EXPECT_THAT(summary.messages, testing::UnorderedElementsAre(testing::Pair("/ICUB_JOINT_STATE", 400u),
+                                                              testing::Pair("/ICUB_CAMERAS/left", 30u),
+                                                              testing::Pair("/ICUB_CAMERAS/right", 30u)));
   EXPECT_EQ(summary.unreadable, 0u);
   EXPECT_EQ(summary.bytes, fs::file_size(out));
   EXPECT_FALSE(fs::exists(out.string() + ".part"));
@@ -59,8 +58,7 @@ TEST(McapExport, FailsWithOneClearErrorAndLeavesNothing) {
   EXPECT_FALSE(fs::exists(out));
   EXPECT_FALSE(fs::exists(out.string() + ".part"));
   EXPECT_THROW(export_mcap({"/nonexistent.lcmlog", out}), FileError);
-  EXPECT_THROW(export_mcap({testing_logs::swinging_log("unwritten.lcmlog"), "/nonexistent/a.mcap"}),
-               FileError);
+  EXPECT_THROW(export_mcap({testing_logs::swinging_log("unwritten.lcmlog"), "/nonexistent/a.mcap"}), FileError);
 }
 
 }  // namespace

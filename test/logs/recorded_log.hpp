@@ -44,13 +44,11 @@ inline std::filesystem::path swinging_log(const std::string& name) {
   const auto file = scratch_file(name);
   LogWriter writer(file);
   Image left(32, 24, 3), right(32, 24, 1);
-  for (std::size_t i = 0; i < left.data.size(); ++i)
-    left.data[i] = static_cast<std::uint8_t>(i);
+  for (std::size_t i = 0; i < left.data.size(); ++i) left.data[i] = static_cast<std::uint8_t>(i);
   for (Microseconds t = 0; t < 4'000'000; t += 10'000) {
     const double phase = 2.0 * 3.14159265358979 * seconds(t);
     const double elbow = 0.5 - 15.0 / 57.29577951308232 * std::cos(phase);
-    writer.publish("ICUB_JOINT_STATE", kBegin + t + 500,
-                   encode(joints(kBegin + t, static_cast<float>(elbow), 0.25f)));
+    writer.publish("ICUB_JOINT_STATE", kBegin + t + 500, encode(joints(kBegin + t, static_cast<float>(elbow), 0.25f)));
     if (t % 100'000 == 0 && (t < 1'000'000 || t >= 2'000'000)) {
       writer.publish("ICUB_CAMERAS", kBegin + t + 6000, encode(pictures(kBegin + t, left, right)));
     }

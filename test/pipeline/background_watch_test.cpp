@@ -101,8 +101,8 @@ class LookingAbout : public ::testing::Test {
     while (auto frame = simulator.next()) publisher.publish(*frame, log);
   }
   static std::string closing(const std::string& log, const std::string& method, bool online) {
-    Configuration c = Configuration::load(kConfig, {"vision.method=" + method, "filter.particles=50",
-                                                    "silhouette.engine=contour"});
+    Configuration c =
+        Configuration::load(kConfig, {"vision.method=" + method, "filter.particles=50", "silhouette.engine=contour"});
     (void)simulator::SimulatorSettings::from(c.section("simulator"));
     ReplayOptions options;
     options.log = folder_ / log;

@@ -19,9 +19,9 @@ class ExtendedModel : public ::testing::Test {
   ~ExtendedModel() override { fs::remove(file_); }
   void write(const std::string& text) const { std::ofstream(file_) << text; }
   [[nodiscard]] Pipeline pipeline(bool extended = true) const {
-    return Pipeline(Configuration::load(
-        fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml",
-        {"robot.extended_model='" + (extended ? file_.string() : std::string()) + "'"}));
+    return Pipeline(
+        Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml",
+                            {"robot.extended_model='" + (extended ? file_.string() : std::string()) + "'"}));
   }
   void refuse(const std::string& words) const {
     try {

@@ -33,7 +33,8 @@ std::string content(const fs::path& file) {
 void record(const Configuration& configuration, const simulator::SimulatorSettings& settings,
             const simulator::SimulationPlan& plan, const fs::path& file, const fs::path& truth_file) {
   const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
-  simulator::Simulator simulator(setup.load(), setup, StereoRig::from(configuration.section("cameras")), settings, plan);
+  simulator::Simulator simulator(setup.load(), setup, StereoRig::from(configuration.section("cameras")), settings,
+                                 plan);
   LogWriter log(file);
   simulator::FramePublisher publisher(simulator.joint_names(), {});
   simulator::TruthWriter truth(truth_file, simulator, setup);
@@ -153,7 +154,8 @@ TEST_F(ReplayTest, LearnsTheBackgroundFromTheWholeLogUnlessToldOtherwise) {
     return largest;
   };
   constexpr int kLearning = 20;
-  for (const auto& [mode, from, bound_mm] : {std::tuple<std::string, int, double>{"best", 3, 2.0}, {"paper", 60, 15.0}}) {
+  for (const auto& [mode, from, bound_mm] :
+       {std::tuple<std::string, int, double>{"best", 3, 2.0}, {"paper", 60, 15.0}}) {
     replay(configuration({"estimator.mode=" + mode}), o);
     EXPECT_LT(largest_error_mm(from), bound_mm) << mode;
     std::printf("%s, learned from the whole log: %.2f mm at most\n", mode.c_str(), largest_error_mm(from));
@@ -230,7 +232,8 @@ TEST_F(ReplayTest, SaysSoWhenLeftAndRightAreSwapped) {
     }
   }
   const std::string table = replay(configuration(), o);
-  EXPECT_THAT(table, HasSubstr("\nNOT CONVERGED: the log ended in state 'diverged': each picture shows what the other eye"));
+  EXPECT_THAT(table,
+              HasSubstr("\nNOT CONVERGED: the log ended in state 'diverged': each picture shows what the other eye"));
   EXPECT_THAT(table, HasSubstr("\nWARNING: the left and right pictures are swapped in "));
 }
 
@@ -329,8 +332,9 @@ TEST_F(ReplayTest, ACameraOnALinkThatIsNotThereIsRefusedByItsKey) {
     replay(configuration({"cameras.right.link=r_eye_optica"}), options("link"));
     FAIL() << "no error";
   } catch (const ConfigurationError& e) {
-    EXPECT_STREQ(e.what(), "cameras.right.link: 'r_eye_optica' is not a link of robot 'icub_right'; "
-                           "did you mean 'r_eye_optical'?");
+    EXPECT_STREQ(e.what(),
+                 "cameras.right.link: 'r_eye_optica' is not a link of robot 'icub_right'; "
+                 "did you mean 'r_eye_optical'?");
   }
 }
 

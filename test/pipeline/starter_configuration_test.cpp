@@ -48,13 +48,11 @@ TEST_F(StarterConfiguration, FindsTheArmBetweenRootAndHand) {
   Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
   EXPECT_THAT(pipeline.setup().estimated_joints,
               ElementsAre("joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "joint7"));
-  EXPECT_THAT(pipeline.setup().model.rendered_links,
-              ElementsAre("link1", "link2", "link3", "link4", "link5", "link6", "link7", "hand",
-                          "left_finger", "right_finger"));
+  EXPECT_THAT(pipeline.setup().model.rendered_links, ElementsAre("link1", "link2", "link3", "link4", "link5", "link6",
+                                                                 "link7", "hand", "left_finger", "right_finger"));
   EXPECT_TRUE(pipeline.setup().head_joints.empty());
   ASSERT_EQ(pipeline.rig().cameras.size(), 2u);
-  EXPECT_EQ(pipeline.rig().cameras[1].intrinsics,
-            (PinholeIntrinsics{320, 240, 420.0, 420.0, 159.5, 119.5}));
+  EXPECT_EQ(pipeline.rig().cameras[1].intrinsics, (PinholeIntrinsics{320, 240, 420.0, 420.0, 159.5, 119.5}));
   EXPECT_EQ(pipeline.bus().channels().cameras, "ROBOT_CAMERAS");
   // Played by bodyschema-sim on the same channels; docs/calibrate_my_robot.md does so.
   const Configuration stand_in = Configuration::load(o.out / "simulator.yaml");
@@ -104,11 +102,9 @@ TEST_F(StarterConfiguration, AHumanoidsTorsoIsSharedAndItsHeadIsNoArm) {
   EXPECT_THAT(told, HasSubstr("focal length: a guess, 55"));
   Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
   const Configuration ours = Configuration::load(kSource / "config/icub_right/robot.yaml");
-  EXPECT_EQ(pipeline.setup().estimated_joints,
-            RobotSetup::from(ours.section("robot")).estimated_joints);
-  EXPECT_THAT(pipeline.setup().head_joints,
-              testing::UnorderedElementsAre("neck_pitch", "neck_roll", "neck_yaw", "eyes_tilt",
-                                            "l_eye_pan", "r_eye_pan"));
+  EXPECT_EQ(pipeline.setup().estimated_joints, RobotSetup::from(ours.section("robot")).estimated_joints);
+  EXPECT_THAT(pipeline.setup().head_joints, testing::UnorderedElementsAre("neck_pitch", "neck_roll", "neck_yaw",
+                                                                          "eyes_tilt", "l_eye_pan", "r_eye_pan"));
   EXPECT_TRUE(pipeline.setup().fixed_joints_rad.contains("torso_pitch"));
   EXPECT_TRUE(pipeline.setup().fixed_joints_rad.contains("r_thumb_proximal"));
 }
@@ -142,7 +138,8 @@ TEST_F(StarterConfiguration, NamesOfAnyLettersComeBackAsTheyAre) {
   std::ifstream in(o.urdf);
   std::string text((std::istreambuf_iterator<char>(in)), {});
   const auto written = [](std::string name) {
-    const std::vector<std::pair<std::string, std::string>> escapes = {{"'", "&apos;"}, {"\"", "&quot;"}, {"\n", "&#10;"}};
+    const std::vector<std::pair<std::string, std::string>> escapes = {
+        {"'", "&apos;"}, {"\"", "&quot;"}, {"\n", "&#10;"}};
     for (const auto& [from, to] : escapes) {
       for (std::size_t at = 0; (at = name.find(from, at)) != std::string::npos; at += to.size()) {
         name.replace(at, from.size(), to);

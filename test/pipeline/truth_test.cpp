@@ -51,8 +51,7 @@ TEST_F(TruthFile, ReadsTheSimulatorsFrames) {
 }
 
 TEST_F(TruthFile, ReadsARobotWithOneCamera) {
-  const std::string text =
-      std::string(R"({"frames": [{"utime": 1000000, "hand_in_right_camera": )") + kPose + "}]}";
+  const std::string text = std::string(R"({"frames": [{"utime": 1000000, "hand_in_right_camera": )") + kPose + "}]}";
   const Truth truth = load(text, {"right"});
   ASSERT_NE(truth.at(1'000'000), nullptr);
   ASSERT_EQ(truth.at(1'000'000)->X_CP.size(), 1u);
@@ -66,13 +65,18 @@ TEST_F(TruthFile, ErrorsNameTheFile) {
   EXPECT_THAT(error_of(R"({"frames": []})"), HasSubstr("holds no pose"));
   EXPECT_THROW(Truth::load("/nonexistent/truth.json"), FileError);
   std::filesystem::resize_file(path_, std::uintmax_t{4} << 30);  // without a byte on the disk
-  EXPECT_THAT([&] { Truth::load(path_, {"left", "right"}); }, ThrowsMessage<FileError>(HasSubstr("at most 1073741824 expected")));
+  EXPECT_THAT(
+      [&] {
+        Truth::load(path_, {"left", "right"});
+      },
+      ThrowsMessage<FileError>(HasSubstr("at most 1073741824 expected")));
 }
 
 TEST_F(TruthFile, TimesThatNoClockShows) {
   for (const char* time : {"1.6e+140", "-1e300", "9300000000000000", "18446744073709551615"}) {
     SCOPED_TRACE(time);
-    const std::string poses = std::string(R"(, "hand_in_left_camera": )") + kPose + R"(, "hand_in_right_camera": )" + kPose;
+    const std::string poses =
+        std::string(R"(, "hand_in_left_camera": )") + kPose + R"(, "hand_in_right_camera": )" + kPose;
     EXPECT_THAT(error_of(std::string(R"({"frames": [{"utime": )") + time + poses + "}]}"),
                 AllOf(HasSubstr(path_.string()), HasSubstr("utime is "), HasSubstr("expected a time")));
     EXPECT_THAT(error_of(std::string(R"({"poses": [{"time_s": [0, )") + time + "]" + poses + "}]}"),

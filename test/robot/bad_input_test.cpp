@@ -49,15 +49,12 @@ class BadInput : public testing::Test {
     }
     return "nothing was thrown";
   }
-  static std::string joint(const std::string& name, const std::string& parent,
-                           const std::string& child, const std::string& rest = "",
-                           const std::string& type = "fixed") {
-    return "<joint name='" + name + "' type='" + type + "'><parent link='" + parent +
-           "'/><child link='" + child + "'/>" + rest + "</joint>";
+  static std::string joint(const std::string& name, const std::string& parent, const std::string& child,
+                           const std::string& rest = "", const std::string& type = "fixed") {
+    return "<joint name='" + name + "' type='" + type + "'><parent link='" + parent + "'/><child link='" + child +
+           "'/>" + rest + "</joint>";
   }
-  static std::string robot(const std::string& inside) {
-    return "<robot name='r'>" + inside + "</robot>";
-  }
+  static std::string robot(const std::string& inside) { return "<robot name='r'>" + inside + "</robot>"; }
   static constexpr const char* kLimit = "<limit lower='-1' upper='1' effort='1' velocity='1'/>";
   TemporaryFolder folder_;
 };
@@ -104,10 +101,10 @@ TEST_F(BadInput, UrdfWhoseNestingIsHidden) {
 }
 // The same for what TinyXML in particular reads otherwise than it looks.
 TEST_F(BadInput, UrdfThatTheParserReadsOtherwise) {
-  for (const std::string hidden : {"<a><?xml version=\"?></a>\"?>", "<a><?XML version='?></a>'?>",
-                                   "<a><?x y='?></a>'?>",
-                                   "<1 '><a>'/>", "< '><a>'/>", "<a b=\"&#x\"></a>x41;\">", "<a>&#x</a>x41;",
-                                   "<a>&#</a>#65;", "<a>\xC2</a>", "<a>\xE2\x82</a>", "<a b='\xF0'></a>'>"}) {
+  for (const std::string hidden :
+       {"<a><?xml version=\"?></a>\"?>", "<a><?XML version='?></a>'?>", "<a><?x y='?></a>'?>", "<1 '><a>'/>",
+        "< '><a>'/>", "<a b=\"&#x\"></a>x41;\">", "<a>&#x</a>x41;", "<a>&#</a>#65;", "<a>\xC2</a>", "<a>\xE2\x82</a>",
+        "<a b='\xF0'></a>'>"}) {
     SCOPED_TRACE(hidden);
     std::string text = "<?xml version='1.0'?><robot name='r'>";
     for (int i = 0; i < 60'000; ++i) text += hidden;
@@ -116,15 +113,14 @@ TEST_F(BadInput, UrdfThatTheParserReadsOtherwise) {
   std::string nested;
   for (int i = 0; i < 60'000; ++i) nested += "<a>";
   for (const std::string begin : {"<?xml version='?><!--'?>", "<?xml x=\"a version=\"?><!--\"?>",
-                                  "<?xml \" version=\"?><!--\"?>",
-                                  "<?xml version='1.0'?><?xml version='?><!--'?>"}) {
+                                  "<?xml \" version=\"?><!--\"?>", "<?xml version='1.0'?><?xml version='?><!--'?>"}) {
     SCOPED_TRACE(begin);
     EXPECT_THAT(urdf_message(begin + "<robot name='r'>" + nested + "-->"), HasSubstr("it declares"));
   }
   // What is nothing of the kind stays allowed.
-  for (const std::string begin : {"", "\xEF\xBB\xBF<?xml version=\"1.0\" ?>\n",
-                                  "\n<?xml version = '1.0' encoding='utf-8' standalone=\"yes\"?>",
-                                  "<?xml version='1.0' encoding='iso-8859-1'?><!-- Andr\xE9 said -->"}) {
+  for (const std::string begin :
+       {"", "\xEF\xBB\xBF<?xml version=\"1.0\" ?>\n", "\n<?xml version = '1.0' encoding='utf-8' standalone=\"yes\"?>",
+        "<?xml version='1.0' encoding='iso-8859-1'?><!-- Andr\xE9 said -->"}) {
     SCOPED_TRACE(begin);
     const std::string inside = "<link name='caf\xC3\xA9'/><!-- &#x20AC; a -> b, \xE2\x82\xAC -->";
     const auto good = folder_.write("good.urdf", begin + robot(inside));
@@ -148,10 +144,10 @@ TEST_F(BadInput, UrdfOfMoreLinksThanARobotHas) {
     std::string inside = "<link name='l0'/>";
     for (int i = 1; i < links; ++i) {
       const std::string name = std::to_string(i), above = std::to_string(i - 1);
-      inside += "<link name='l" + name + "'/>" +
-                joint("j" + name, "l" + above, "l" + name,
-                      "<axis xyz='1 0 0'/>" + (i > 1 ? "<mimic joint='j" + above + "'/>" : std::string()),
-                      "continuous");
+      inside +=
+          "<link name='l" + name + "'/>" +
+          joint("j" + name, "l" + above, "l" + name,
+                "<axis xyz='1 0 0'/>" + (i > 1 ? "<mimic joint='j" + above + "'/>" : std::string()), "continuous");
     }
     return robot(inside);
   };
@@ -165,17 +161,16 @@ TEST_F(BadInput, UrdfThatIsTooLarge) {
   EXPECT_THAT(message({file, {}, {}}), HasSubstr("at most 16777216"));
 }
 TEST_F(BadInput, NumbersThatAreNone) {
-  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" +
-                                 joint("j", "a", "b", "<origin xyz='0 zero 0'/>"))),
-              HasSubstr("not a usable URDF"));
-  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" +
-                                 joint("j", "a", "b", "<origin xyz='0 1e999 0'/>"))),
-              AllOf(HasSubstr("bad.urdf"), Not(HasSubstr("nothing was thrown"))));
+  EXPECT_THAT(
+      urdf_message(robot("<link name='a'/><link name='b'/>" + joint("j", "a", "b", "<origin xyz='0 zero 0'/>"))),
+      HasSubstr("not a usable URDF"));
+  EXPECT_THAT(
+      urdf_message(robot("<link name='a'/><link name='b'/>" + joint("j", "a", "b", "<origin xyz='0 1e999 0'/>"))),
+      AllOf(HasSubstr("bad.urdf"), Not(HasSubstr("nothing was thrown"))));
 }
 TEST_F(BadInput, AxisOfNoLength) {
   EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" +
-                                 joint("j", "a", "b", "<axis xyz='0 0 0'/>" + std::string(kLimit),
-                                       "revolute"))),
+                                 joint("j", "a", "b", "<axis xyz='0 0 0'/>" + std::string(kLimit), "revolute"))),
               HasSubstr("joint 'j': axis is zero"));
 }
 TEST_F(BadInput, LimitsTheWrongWayRound) {
@@ -187,18 +182,17 @@ TEST_F(BadInput, LimitsTheWrongWayRound) {
               HasSubstr("joint 'j': limits [2, 1]"));
 }
 TEST_F(BadInput, CycleThroughTheRoot) {
-  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" + joint("j", "a", "b") +
-                                 joint("k", "b", "a"))),
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" + joint("j", "a", "b") + joint("k", "b", "a"))),
               HasSubstr("link 'a' is its own ancestor"));
 }
 TEST_F(BadInput, CycleThatHangsOffTheRoot) {
-  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/><link name='c'/>" +
-                                 joint("j", "a", "b") + joint("k", "b", "c") + joint("l", "c", "b"))),
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/><link name='c'/>" + joint("j", "a", "b") +
+                                 joint("k", "b", "c") + joint("l", "c", "b"))),
               HasSubstr("link 'b' is the child of joints 'j' and 'l'"));
 }
 TEST_F(BadInput, CycleBesideTheRoot) {
-  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/><link name='c'/>" +
-                                 joint("k", "b", "c") + joint("l", "c", "b"))),
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/><link name='c'/>" + joint("k", "b", "c") +
+                                 joint("l", "c", "b"))),
               HasSubstr("link 'b' is its own ancestor"));
 }
 TEST_F(BadInput, TwoRoots) {
@@ -208,20 +202,19 @@ TEST_F(BadInput, JointToALinkThatIsNotThere) {
   EXPECT_THAT(urdf_message(robot("<link name='a'/>" + joint("j", "a", "b"))), HasSubstr("b"));
 }
 TEST_F(BadInput, MimicOfAnUnknownJoint) {
-  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/>" +
-                                 joint("elbow", "a", "b",
-                                       "<axis xyz='1 0 0'/>" + std::string(kLimit) +
-                                           "<mimic joint='elbo' multiplier='1' offset='0'/>",
-                                       "revolute"))),
+  EXPECT_THAT(urdf_message(robot(
+                  "<link name='a'/><link name='b'/>" +
+                  joint("elbow", "a", "b",
+                        "<axis xyz='1 0 0'/>" + std::string(kLimit) + "<mimic joint='elbo' multiplier='1' offset='0'/>",
+                        "revolute"))),
               AllOf(HasSubstr("mimics unknown joint 'elbo'"), HasSubstr("did you mean 'elbow'?")));
 }
 TEST_F(BadInput, MimicsThatChaseEachOther) {
   const std::string rest = "<axis xyz='1 0 0'/>" + std::string(kLimit);
-  EXPECT_THAT(
-      urdf_message(robot("<link name='a'/><link name='b'/><link name='c'/>" +
-                         joint("j", "a", "b", rest + "<mimic joint='k'/>", "revolute") +
-                         joint("k", "b", "c", rest + "<mimic joint='j'/>", "revolute"))),
-      HasSubstr("its mimic chain is a cycle"));
+  EXPECT_THAT(urdf_message(robot("<link name='a'/><link name='b'/><link name='c'/>" +
+                                 joint("j", "a", "b", rest + "<mimic joint='k'/>", "revolute") +
+                                 joint("k", "b", "c", rest + "<mimic joint='j'/>", "revolute"))),
+              HasSubstr("its mimic chain is a cycle"));
 }
 TEST_F(BadInput, NegativeMass) {
   EXPECT_THAT(urdf_message(robot("<link name='a'><inertial><mass value='-1'/><inertia ixx='1' "
@@ -236,9 +229,9 @@ TEST_F(BadInput, RenderedLinkWithoutShape) {
   EXPECT_THAT(urdf_message(one_part_urdf(""), {"part"}), HasSubstr("link 'part' is to be rendered"));
 }
 TEST_F(BadInput, RenderedLinkNamedTwice) {
-  EXPECT_THAT(urdf_message(one_part_urdf("<visual><geometry><box size='1 1 1'/></geometry></visual>"),
-                           {"part", "part"}),
-              HasSubstr("twice"));
+  EXPECT_THAT(
+      urdf_message(one_part_urdf("<visual><geometry><box size='1 1 1'/></geometry></visual>"), {"part", "part"}),
+      HasSubstr("twice"));
 }
 TEST_F(BadInput, MeshThatIsNotThere) {
   EXPECT_THAT(urdf_message(one_part_urdf(mesh_visual("meshes/none.stl")), {"part"}),
@@ -252,11 +245,13 @@ TEST_F(BadInput, PathsThatLeaveTheSearchRoots) {
   folder_.write("outside.obj", obj_text(test_box({0, 0, 0}, {1, 1, 1})));
   const auto root = folder_.path() / "root";
   std::filesystem::create_directories(root / "pkg");
-  const std::vector<std::string> names = {
-      "../outside.obj",         "package://../outside.obj",
-      "sub/../../outside.obj",  "package://pkg/../../outside.obj",
-      "model://pkg/../../outside.obj", (folder_.path() / "outside.obj").string(),
-      "file://" + (folder_.path() / "outside.obj").string()};
+  const std::vector<std::string> names = {"../outside.obj",
+                                          "package://../outside.obj",
+                                          "sub/../../outside.obj",
+                                          "package://pkg/../../outside.obj",
+                                          "model://pkg/../../outside.obj",
+                                          (folder_.path() / "outside.obj").string(),
+                                          "file://" + (folder_.path() / "outside.obj").string()};
   for (const auto& name : names) {
     SCOPED_TRACE(name);
     const auto urdf = folder_.write("root/bad.urdf", one_part_urdf(mesh_visual(name)));
@@ -290,8 +285,7 @@ TEST_F(BadInput, ScaleBeyondAllMeasure) {
                 AllOf(HasSubstr("link 'part'"), HasSubstr("reaches further than 1e6 m")));
   }
   const std::string far = "<visual><origin xyz='0 1e30 0'/><geometry><box size='1 1 1'/></geometry></visual>";
-  EXPECT_THAT(urdf_message(one_part_urdf(far), {"part"}),
-              HasSubstr("reaches further than 1e6 m"));
+  EXPECT_THAT(urdf_message(one_part_urdf(far), {"part"}), HasSubstr("reaches further than 1e6 m"));
 }
 TEST_F(BadInput, MoreTrianglesThanARobotHas) {
   std::string visuals;
@@ -299,8 +293,7 @@ TEST_F(BadInput, MoreTrianglesThanARobotHas) {
   EXPECT_THAT(urdf_message(one_part_urdf(visuals), {"part"}), HasSubstr("more than 4000000 triangles together"));
 }
 TEST_F(BadInput, PrimitiveOfNoSize) {
-  EXPECT_THAT(urdf_message(one_part_urdf("<visual><geometry><sphere radius='-1'/></geometry></visual>"),
-                           {"part"}),
+  EXPECT_THAT(urdf_message(one_part_urdf("<visual><geometry><sphere radius='-1'/></geometry></visual>"), {"part"}),
               HasSubstr("sphere radius must be positive"));
 }
 TEST_F(BadInput, MeshesThatCannotBeRead) {
@@ -343,13 +336,13 @@ TEST_F(BadInput, ColladaThatNestsOrUnfoldsWithoutEnd) {
   };
   EXPECT_THAT(mesh_message("good.dae", spoilt("<node id='n'/>")), "nothing was thrown");
   EXPECT_THAT(mesh_message("deep.dae", spoilt([] {
-                std::string open, close;
-                for (int i = 0; i < 100000; ++i) {
-                  open += "<node>";
-                  close += "</node>";
-                }
-                return open + close;
-              }())),
+                             std::string open, close;
+                             for (int i = 0; i < 100000; ++i) {
+                               open += "<node>";
+                               close += "</node>";
+                             }
+                             return open + close;
+                           }())),
               AllOf(HasSubstr("deep.dae"), HasSubstr("deep, at most 100")));
   std::string hidden;
   for (int i = 0; i < 3000; ++i) hidden += "<node><!--></node>-->";
@@ -358,8 +351,7 @@ TEST_F(BadInput, ColladaThatNestsOrUnfoldsWithoutEnd) {
   std::string ends;
   for (int i = 0; i < 3000; ++i) ends += "</x>";
   EXPECT_THAT(mesh_message("ends.dae", ends + good), HasSubstr("ends an element that has not begun"));
-  EXPECT_THAT(mesh_message("self.dae", spoilt("<node id='n'><instance_node url='#n'/></node>")),
-              HasSubstr("cycle"));
+  EXPECT_THAT(mesh_message("self.dae", spoilt("<node id='n'><instance_node url='#n'/></node>")), HasSubstr("cycle"));
   std::string library = "<library_nodes>";
   for (int i = 0; i < 9; ++i) {
     library += "<node id='n" + std::to_string(i) + "'>";
@@ -371,8 +363,7 @@ TEST_F(BadInput, ColladaThatNestsOrUnfoldsWithoutEnd) {
               HasSubstr("unfold to more than 100000"));
   std::string chain = "<library_nodes>";
   for (int i = 0; i < 50000; ++i) {
-    chain += "<node id='c" + std::to_string(i) + "'><instance_node url='#c" + std::to_string(i + 1) +
-             "'/></node>";
+    chain += "<node id='c" + std::to_string(i) + "'><instance_node url='#c" + std::to_string(i + 1) + "'/></node>";
   }
   chain += "</library_nodes>";
   EXPECT_THAT(mesh_message("chain.dae", spoilt("<node><instance_node url='#c0'/></node>", chain)),
@@ -442,10 +433,8 @@ TEST(RobotSetupErrors, NamesAreCheckedAgainstTheRobot) {
   EXPECT_THAT(text_of([](RobotSetup& s) { s.estimated_joints[0] = "r_elbo"; }),
               AllOf(HasSubstr("robot.estimated_joints"), HasSubstr("'r_elbow'")));
   EXPECT_THAT(text_of([](RobotSetup& s) { s.head_joints[0] = "x"; }), HasSubstr("robot.head_joints"));
-  EXPECT_THAT(text_of([](RobotSetup& s) { s.fingertip_links[0] = "x"; }),
-              HasSubstr("robot.fingertip_links"));
-  EXPECT_THAT(text_of([](RobotSetup& s) { s.fixed_joints_rad["x"] = 0; }),
-              HasSubstr("robot.fixed_joints_deg"));
+  EXPECT_THAT(text_of([](RobotSetup& s) { s.fingertip_links[0] = "x"; }), HasSubstr("robot.fingertip_links"));
+  EXPECT_THAT(text_of([](RobotSetup& s) { s.fixed_joints_rad["x"] = 0; }), HasSubstr("robot.fixed_joints_deg"));
 }
 
 TEST(RobotSetupErrors, JointsThatSlideAreFixedInMetresAndNeverEstimated) {
@@ -455,10 +444,10 @@ TEST(RobotSetupErrors, JointsThatSlideAreFixedInMetresAndNeverEstimated) {
            to + "'/><axis xyz='0 0 1'/><limit lower='-1' upper='1' effort='1' velocity='1'/></joint>";
   };
   RobotSetup setup;
-  setup.model.urdf = folder.write("slide.urdf",
-                                  "<robot name='slide'><link name='base'/><link name='cart'/><link name='hand'/>" +
-                                      joint("lift", "prismatic", "base", "cart") +
-                                      joint("turn", "revolute", "cart", "hand") + "</robot>");
+  setup.model.urdf =
+      folder.write("slide.urdf", "<robot name='slide'><link name='base'/><link name='cart'/><link name='hand'/>" +
+                                     joint("lift", "prismatic", "base", "cart") +
+                                     joint("turn", "revolute", "cart", "hand") + "</robot>");
   setup.hand_link = "hand";
   setup.estimated_joints = {"turn"};
   setup.fixed_joints_m["lift"] = 0.25;
@@ -487,8 +476,7 @@ TEST(RobotSetupErrors, ValuesAreChecked) {
     }
     return std::string("nothing was thrown");
   };
-  const std::string good =
-      "robot:\n  urdf: a.urdf\n  rendered_links: [a]\n  hand_link: a\n  estimated_joints: [j]\n";
+  const std::string good = "robot:\n  urdf: a.urdf\n  rendered_links: [a]\n  hand_link: a\n  estimated_joints: [j]\n";
   EXPECT_EQ(text_of(good), "nothing was thrown");
   EXPECT_THAT(text_of(good + "  gravity_m_s2: [0, 1]\n"), HasSubstr("gravity_m_s2"));
   EXPECT_THAT(text_of(good + "  face_culling: front\n"), HasSubstr("face_culling"));

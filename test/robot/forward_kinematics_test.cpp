@@ -41,8 +41,7 @@ void expect_kinematics_match(const std::string& configuration, unsigned seed) {
     }
     kinematics.compute(q, X_WB);
     for (std::size_t l = 0; l < links.size(); ++l) {
-      const double difference =
-          (X_WB[l].matrix() - walk.pose(links[l], by_name)).cwiseAbs().maxCoeff();
+      const double difference = (X_WB[l].matrix() - walk.pose(links[l], by_name)).cwiseAbs().maxCoeff();
       ASSERT_LT(difference, 1e-9) << links[l];
     }
   }
@@ -72,11 +71,10 @@ TEST(ForwardKinematics, PutsOurHandWhereANominalICubHasIt) {
     std::vector<Pose> X_W(3);
     Eigen::VectorXd q = setup.default_joints(*robot);
     const std::map<std::string, double> posture_deg = {
-        {"torso_pitch", 5},    {"torso_roll", -4},     {"torso_yaw", 8},      {"neck_pitch", -12},
-        {"neck_roll", 6},      {"neck_yaw", -15},      {"eyes_tilt", -9},     {"l_eye_pan", 7},
-        {"r_eye_pan", -6},     {"r_shoulder_pitch", -60}, {"r_shoulder_roll", 25},
-        {"r_shoulder_yaw", 14}, {"r_elbow", 70},       {"r_wrist_prosup", 33},
-        {"r_wrist_pitch", -21}, {"r_wrist_yaw", 11}};
+        {"torso_pitch", 5}, {"torso_roll", -4},        {"torso_yaw", 8},        {"neck_pitch", -12},
+        {"neck_roll", 6},   {"neck_yaw", -15},         {"eyes_tilt", -9},       {"l_eye_pan", 7},
+        {"r_eye_pan", -6},  {"r_shoulder_pitch", -60}, {"r_shoulder_roll", 25}, {"r_shoulder_yaw", 14},
+        {"r_elbow", 70},    {"r_wrist_prosup", 33},    {"r_wrist_pitch", -21},  {"r_wrist_yaw", 11}};
     for (const auto& [name, value] : posture_deg) q[robot->joint_index(name)] = radians(value);
     kinematics.compute(q, X_W);
     return std::pair<Pose, Pose>(X_W[0].inverse() * X_W[2], X_W[1].inverse() * X_W[2]);
@@ -151,20 +149,17 @@ TEST(ForwardKinematics, AgreesWithTheRecordingsTruthInAllPoses) {
 
 TEST(ForwardKinematics, MimicJointsFollowTheirDriverThroughChainsAndOffsets) {
   TemporaryFolder folder;
-  const auto joint = [](const std::string& name, const std::string& parent,
-                        const std::string& child, const std::string& mimic) {
-    return R"(<joint name=")" + name + R"(" type="revolute"><parent link=")" + parent +
-           R"("/><child link=")" + child +
-           R"("/><axis xyz="0 0 1"/><limit lower="-9" upper="9" effort="1" velocity="1"/>)" +
-           mimic + "</joint>";
+  const auto joint = [](const std::string& name, const std::string& parent, const std::string& child,
+                        const std::string& mimic) {
+    return R"(<joint name=")" + name + R"(" type="revolute"><parent link=")" + parent + R"("/><child link=")" + child +
+           R"("/><axis xyz="0 0 1"/><limit lower="-9" upper="9" effort="1" velocity="1"/>)" + mimic + "</joint>";
   };
   const auto urdf = folder.write(
       "chain.urdf",
       R"(<robot name="chain"><link name="base"/><link name="driver"/><link name="first"/><link name="second"/>)" +
           joint("d", "base", "driver", "") +
           joint("a", "base", "first", R"(<mimic joint="b" multiplier="-0.5" offset="0.3"/>)") +
-          joint("b", "base", "second", R"(<mimic joint="d" multiplier="2" offset="0.1"/>)") +
-          "</robot>");
+          joint("b", "base", "second", R"(<mimic joint="d" multiplier="2" offset="0.1"/>)") + "</robot>");
   const auto robot = RobotModel::load({urdf, {}, {}});
   ASSERT_EQ(robot->joint_count(), 1);
   EXPECT_EQ(robot->joints()[0].name, "d");

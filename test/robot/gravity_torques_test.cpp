@@ -34,8 +34,7 @@ void expect_minus_gradient_of_energy(const std::filesystem::path& urdf, unsigned
   std::uniform_real_distribution<double> angle(-1.5, 1.5);
   double largest_Nm = 0.0;
   for (int trial = 0; trial < 3; ++trial) {
-    const Eigen::VectorXd q =
-        Eigen::VectorXd::NullaryExpr(robot->joint_count(), [&] { return angle(random); });
+    const Eigen::VectorXd q = Eigen::VectorXd::NullaryExpr(robot->joint_count(), [&] { return angle(random); });
     const Eigen::VectorXd torque_Nm = gravity.compute(q, gravity_W);
     for (Eigen::Index j = 0; j < q.size(); ++j) {
       Eigen::VectorXd up = q, down = q;
@@ -51,8 +50,8 @@ void expect_minus_gradient_of_energy(const std::filesystem::path& urdf, unsigned
 }
 
 TEST(GravityTorques, AreMinusTheGradientOfEnergyOnOurRobot) {
-  expect_minus_gradient_of_energy(
-      std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "meshes/icub_right/icub_right.urdf", 3);
+  expect_minus_gradient_of_energy(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "meshes/icub_right/icub_right.urdf",
+                                  3);
 }
 
 TEST(GravityTorques, AreMinusTheGradientOfEnergyOnTheOfficialRobot) {
@@ -62,13 +61,12 @@ TEST(GravityTorques, AreMinusTheGradientOfEnergyOnTheOfficialRobot) {
 
 TEST(GravityTorques, CountPrismaticAndMimicJoints) {
   TemporaryFolder folder;
-  const std::string mass =
-      R"(<inertial><origin xyz="0.3 0.1 -0.2" rpy="0 0 0"/><mass value="2"/>)"
-      R"(<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>)";
+  const std::string mass = R"(<inertial><origin xyz="0.3 0.1 -0.2" rpy="0 0 0"/><mass value="2"/>)"
+                           R"(<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>)";
   const auto urdf = folder.write(
       "slide.urdf",
-      R"(<robot name="slide"><link name="base"/><link name="cart">)" + mass +
-          R"(</link><link name="arm">)" + mass + R"(</link><link name="tool">)" + mass +
+      R"(<robot name="slide"><link name="base"/><link name="cart">)" + mass + R"(</link><link name="arm">)" + mass +
+          R"(</link><link name="tool">)" + mass +
           R"(</link><joint name="lift" type="prismatic"><parent link="base"/><child link="cart"/><origin xyz="0 0 1" rpy="0.3 0 0"/><axis xyz="0 0.6 0.8"/><limit lower="-9" upper="9" effort="1" velocity="1"/></joint>)"
           R"(<joint name="turn" type="continuous"><parent link="cart"/><child link="arm"/><origin xyz="0.1 0 0" rpy="0 0.4 0"/><axis xyz="0 1 0"/></joint>)"
           R"(<joint name="follow" type="revolute"><parent link="arm"/><child link="tool"/><origin xyz="0 0.5 0" rpy="0 0 0"/><axis xyz="1 0 1"/><limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="turn" multiplier="-0.5" offset="0.2"/></joint></robot>)");

@@ -26,8 +26,7 @@ Bounds bounds(const TriangleMesh& mesh) {
   return b;
 }
 
-void expect_bounds(const TriangleMesh& mesh, const Eigen::Vector3f& low,
-                   const Eigen::Vector3f& high) {
+void expect_bounds(const TriangleMesh& mesh, const Eigen::Vector3f& low, const Eigen::Vector3f& high) {
   const Bounds b = bounds(mesh);
   EXPECT_LT((b.low - low).norm(), 1e-6) << b.low.transpose();
   EXPECT_LT((b.high - high).norm(), 1e-6) << b.high.transpose();
@@ -83,9 +82,8 @@ TEST_F(MeshTest, ColladaUnitAndNodesApplyButItsUpAxisDoesNot) {
   // Centimetres; the inner node turns x to y about z, the outer one moves along z by 2 units.
   for (const char* up : {"Y_UP", "Z_UP", "X_UP"}) {
     SCOPED_TRACE(up);
-    folder_.write("part.dae",
-                  dae_text(test_box({0, 0, 0}, {10, 20, 30}), "0.01", up,
-                           "<translate>0 0 2</translate>", "<rotate>0 0 1 90</rotate>"));
+    folder_.write("part.dae", dae_text(test_box({0, 0, 0}, {10, 20, 30}), "0.01", up, "<translate>0 0 2</translate>",
+                                       "<rotate>0 0 1 90</rotate>"));
     const auto robot = load(mesh_visual("part.dae"));
     expect_bounds(robot->meshes()[0].mesh, {-0.2f, 0.0f, 0.02f}, {0.0f, 0.1f, 0.32f});
   }
@@ -100,8 +98,8 @@ TEST_F(MeshTest, AMirroringNodeKeepsTheOutsideOutside) {
 
 TEST_F(MeshTest, ScaleThenOriginApplyAndAMirroringScaleKeepsTheOutsideOutside) {
   folder_.write("part.obj", obj_text(test_box({0, 0, 0}, {100, 200, 300})));
-  const auto robot = load(mesh_visual("part.obj", "0.001 -0.001 0.001",
-                                      R"(<origin xyz="1 2 3" rpy="0 0 1.5707963267949"/>)"));
+  const auto robot =
+      load(mesh_visual("part.obj", "0.001 -0.001 0.001", R"(<origin xyz="1 2 3" rpy="0 0 1.5707963267949"/>)"));
   // y is mirrored to [-0.2, 0], then x -> y and y -> -x, then moved.
   expect_bounds(robot->meshes()[0].mesh, {1.0f, 2.0f, 3.0f}, {1.2f, 2.1f, 3.3f});
   EXPECT_GT(signed_volume(robot->meshes()[0].mesh), 0.0);
@@ -140,10 +138,8 @@ TEST_F(MeshTest, MeshesOfOtherLinksAreNeverOpened) {
 TEST_F(MeshTest, PackageNamesAreSearchedInEveryRoot) {
   folder_.write("roots/two/pkg/meshes/part.obj", obj_text(box_));
   std::filesystem::create_directories(folder_.path() / "roots/one");
-  const auto urdf =
-      folder_.write("robots/tiny.urdf", one_part_urdf(mesh_visual("package://pkg/meshes/part.obj")));
-  const auto robot = RobotModel::load(
-      {urdf, {folder_.path() / "roots/one", folder_.path() / "roots/two/"}, {"part"}});
+  const auto urdf = folder_.write("robots/tiny.urdf", one_part_urdf(mesh_visual("package://pkg/meshes/part.obj")));
+  const auto robot = RobotModel::load({urdf, {folder_.path() / "roots/one", folder_.path() / "roots/two/"}, {"part"}});
   EXPECT_EQ(robot->meshes()[0].mesh.triangles.size(), 12u);
 }
 
@@ -235,11 +231,10 @@ TEST(RecordingRobot, TheTwoOpenCoversAreNamed) {
   for (const char* file : {"icub_unity/robot.yaml", "icub_unity/robot_v1.yaml"}) {
     const auto robot = robot_setup(file).load();
     EXPECT_EQ(robot->meshes().size(), 21u);
-    EXPECT_THAT(robot->warnings(),
-                ElementsAre(HasSubstr("link 'r_upper_arm', mesh 'r_upper_arm.obj': not closed: 157 "
-                                      "boundary edges"),
-                            HasSubstr("link 'r_forearm', mesh 'r_forearm.obj': not closed: 110 "
-                                      "boundary edges")));
+    EXPECT_THAT(robot->warnings(), ElementsAre(HasSubstr("link 'r_upper_arm', mesh 'r_upper_arm.obj': not closed: 157 "
+                                                         "boundary edges"),
+                                               HasSubstr("link 'r_forearm', mesh 'r_forearm.obj': not closed: 110 "
+                                                         "boundary edges")));
     for (const auto& part : robot->meshes()) {
       EXPECT_EQ(part.closed, part.link != "r_upper_arm" && part.link != "r_forearm") << part.link;
       EXPECT_TRUE(part.consistent_winding) << part.link;

@@ -9,8 +9,7 @@ namespace bodyschema {
 namespace {
 
 /// The value of an attribute of the first element `element` in `xml`; empty when absent.
-std::string attribute(const std::string& xml, const std::string& element,
-                      const std::string& name) {
+std::string attribute(const std::string& xml, const std::string& element, const std::string& name) {
   auto at = xml.find("<" + element + " ");
   if (at == std::string::npos) return {};
   const std::string tag = xml.substr(at, xml.find('>', at) - at);
@@ -76,14 +75,12 @@ UrdfWalk::UrdfWalk(const std::filesystem::path& urdf) {
     const auto inertial = block.find("<inertial>");
     if (inertial == std::string::npos) continue;
     const std::string part = block.substr(inertial, block.find("</inertial>") - inertial);
-    masses_[attribute(block, "link", "name")] = {
-        number(attribute(part, "mass", "value"), 0.0),
-        vector(attribute(part, "origin", "xyz"), Eigen::Vector3d::Zero())};
+    masses_[attribute(block, "link", "name")] = {number(attribute(part, "mass", "value"), 0.0),
+                                                 vector(attribute(part, "origin", "xyz"), Eigen::Vector3d::Zero())};
   }
 }
 
-Eigen::Matrix4d UrdfWalk::pose(const std::string& link,
-                               const std::map<std::string, double>& q) const {
+Eigen::Matrix4d UrdfWalk::pose(const std::string& link, const std::map<std::string, double>& q) const {
   const auto at = joint_of_child_.find(link);
   if (at == joint_of_child_.end()) return Eigen::Matrix4d::Identity();
   const Joint& joint = at->second;
@@ -91,9 +88,7 @@ Eigen::Matrix4d UrdfWalk::pose(const std::string& link,
     const auto found = q.find(name);
     return found == q.end() ? 0.0 : found->second;
   };
-  const double angle = joint.mimic.empty()
-                           ? value(joint.name)
-                           : joint.multiplier * value(joint.mimic) + joint.offset;
+  const double angle = joint.mimic.empty() ? value(joint.name) : joint.multiplier * value(joint.mimic) + joint.offset;
   Eigen::Matrix4d X = pose(joint.parent, q);
   X = X * transform(rotation({0, 0, 1}, joint.rpy.z()) * rotation({0, 1, 0}, joint.rpy.y()) *
                         rotation({1, 0, 0}, joint.rpy.x()),
@@ -106,8 +101,7 @@ Eigen::Matrix4d UrdfWalk::pose(const std::string& link,
   return X;
 }
 
-Eigen::Vector3d UrdfWalk::centre_of_mass(const std::string& link,
-                                         const std::map<std::string, double>& q) const {
+Eigen::Vector3d UrdfWalk::centre_of_mass(const std::string& link, const std::map<std::string, double>& q) const {
   const Eigen::Vector4d p = pose(link, q) * masses_.at(link).p_L.homogeneous();
   return p.head<3>();
 }

@@ -13,11 +13,9 @@ namespace bodyschema {
 class UrdfWalk {
  public:
   explicit UrdfWalk(const std::filesystem::path& urdf);
-  [[nodiscard]] Eigen::Matrix4d pose(const std::string& link,
-                                     const std::map<std::string, double>& q) const;
+  [[nodiscard]] Eigen::Matrix4d pose(const std::string& link, const std::map<std::string, double>& q) const;
   /// Position of the link's centre of mass in the root frame, and its mass.
-  [[nodiscard]] Eigen::Vector3d centre_of_mass(const std::string& link,
-                                               const std::map<std::string, double>& q) const;
+  [[nodiscard]] Eigen::Vector3d centre_of_mass(const std::string& link, const std::map<std::string, double>& q) const;
   struct Mass {
     double kg = 0.0;
     Eigen::Vector3d p_L = Eigen::Vector3d::Zero();

@@ -16,20 +16,16 @@ using testing::HasSubstr;
 
 class Environment {
  public:
-  Environment(const char* name, const std::string& value) : name_(name) {
-    setenv(name, value.c_str(), 1);
-  }
+  Environment(const char* name, const std::string& value) : name_(name) { setenv(name, value.c_str(), 1); }
   ~Environment() { unsetenv(name_); }
 
  private:
   const char* name_;
 };
 
-std::map<std::string, CheckResult> check(const SelfTestOptions& options,
-                                         CheckLevel* worst = nullptr) {
+std::map<std::string, CheckResult> check(const SelfTestOptions& options, CheckLevel* worst = nullptr) {
   std::map<std::string, CheckResult> results;
-  const CheckLevel level =
-      run_self_test(options, [&](const CheckResult& r) { results[r.name] = r; });
+  const CheckLevel level = run_self_test(options, [&](const CheckResult& r) { results[r.name] = r; });
   if (worst != nullptr) *worst = level;
   return results;
 }
@@ -49,8 +45,7 @@ TEST(SelfTest, AGoodInstallationPasses) {
   }
   // A slow machine is a warning; a wrong estimate is not.
   EXPECT_NE(results["reach"].level, CheckLevel::kFail) << results["reach"].sentence;
-  EXPECT_THAT(results["reach"].sentence,
-              HasSubstr("a simulated reach with wrong encoders: hand off by "));
+  EXPECT_THAT(results["reach"].sentence, HasSubstr("a simulated reach with wrong encoders: hand off by "));
   EXPECT_TRUE(results.contains("opengl"));
   EXPECT_TRUE(results.contains("network"));
   EXPECT_TRUE(results.contains("lcm"));
@@ -63,8 +58,7 @@ TEST(SelfTest, MissingFilesFailAndTheRestIsStillChecked) {
   auto results = check(usual(), &worst);
   EXPECT_EQ(worst, CheckLevel::kFail);
   EXPECT_EQ(results["files"].level, CheckLevel::kFail);
-  EXPECT_THAT(results["files"].sentence,
-              HasSubstr("not in /nonexistent; install the package again"));
+  EXPECT_THAT(results["files"].sentence, HasSubstr("not in /nonexistent; install the package again"));
   EXPECT_FALSE(results.contains("robot"));
   EXPECT_FALSE(results.contains("reach"));
   EXPECT_EQ(results["engine"].level, CheckLevel::kOk);
@@ -98,14 +92,11 @@ TEST(SelfTest, WithoutANetworkItSaysSoWithTheCure) {
     auto options = usual();
     options.frames = 2;
     auto results = check(options);
-    const bool said =
-        results["network"].level == CheckLevel::kWarn &&
-        results["network"].sentence.starts_with("no multicast route to 239.255.76.67") &&
-        results["network"].sentence.find("ip route add 224.0.0.0/4") != std::string::npos &&
-        results["lcm"].level == CheckLevel::kFail;
-    if (!said)
-      std::fprintf(stderr, "%s\n%s\n", results["network"].sentence.c_str(),
-                   results["lcm"].sentence.c_str());
+    const bool said = results["network"].level == CheckLevel::kWarn &&
+                      results["network"].sentence.starts_with("no multicast route to 239.255.76.67") &&
+                      results["network"].sentence.find("ip route add 224.0.0.0/4") != std::string::npos &&
+                      results["lcm"].level == CheckLevel::kFail;
+    if (!said) std::fprintf(stderr, "%s\n%s\n", results["network"].sentence.c_str(), results["lcm"].sentence.c_str());
     _exit(said ? 0 : 1);
   }
   int status = 0;

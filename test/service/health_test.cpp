@@ -174,7 +174,8 @@ TEST(Health, FrozenPictureOnlyWhenTheArmMoves) {
   facts.cameras[0].unchanged_ms = 3000.0;
   expect(facts, HealthLevel::kOk, "converged");
   facts.cameras[0].moved_meanwhile_rad = 0.2094;
-  expect(facts, HealthLevel::kWarn, "the left camera has shown the same picture for 3.0 s while the arm moved by 12 deg");
+  expect(facts, HealthLevel::kWarn,
+         "the left camera has shown the same picture for 3.0 s while the arm moved by 12 deg");
 }
 
 TEST(Health, MaskEmptyInOneCamera) {

@@ -69,7 +69,7 @@ TEST_F(LivePageTest, RefusesOtherNamesAndOtherMethods) {
   EXPECT_THAT(get(port(), "/", "127.0.0.1:8080"), StartsWith("HTTP/1.1 200"));
   for (const char* method : {"POST", "PUT", "DELETE", "OPTIONS", "PATCH"}) {
     EXPECT_THAT(talk(port(), std::string(method) + " /state.json HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n"
-                                                       "Connection: close\r\n\r\n"),
+                                                   "Connection: close\r\n\r\n"),
                 StartsWith("HTTP/1.1 405"))
         << method;
   }
@@ -131,8 +131,7 @@ TEST_F(LivePageTest, RangesDoNotMultiplyAnAnswer) {
   const std::string whole = get(port(), "/chart.js");
   std::string ranges = "bytes=0-";
   for (int i = 0; i < 500; ++i) ranges += ",0-";
-  const std::string answer =
-      talk(port(), "GET /chart.js HTTP/1.1\r\nHost: localhost\r\nRange: " + ranges + "\r\n\r\n");
+  const std::string answer = talk(port(), "GET /chart.js HTTP/1.1\r\nHost: localhost\r\nRange: " + ranges + "\r\n\r\n");
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 200"));
   EXPECT_EQ(answer.size(), whole.size());
 }
@@ -166,9 +165,7 @@ TEST_F(LivePageTest, AClientThatDribblesIsCutAndHoldsUpNobody) {
 }
 
 TEST_F(LivePageTest, FiveHundredConnectionsTakeFewDescriptorsAndNoLastingPlace) {
-  const auto descriptors = [] {
-    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
-  };
+  const auto descriptors = [] { return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {}); };
   const auto before = descriptors();
   std::vector<PageClient> idle;
   for (int i = 0; i < 500; ++i) idle.emplace_back(port(), 100ms);

@@ -44,7 +44,9 @@ class Manager {
   int socket_;
 };
 
-std::string abstract_name() { return "@bodyschema-test-" + std::to_string(getpid()); }
+std::string abstract_name() {
+  return "@bodyschema-test-" + std::to_string(getpid());
+}
 
 TEST(Notifier, SpeaksTheProtocol) {
   const Manager manager(abstract_name());

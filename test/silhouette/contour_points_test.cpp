@@ -11,8 +11,8 @@ namespace bodyschema {
 namespace {
 
 // Whether the ray through a sub-pixel position meets any triangle: a camera of one pixel.
-bool covered(const SilhouetteModel& model, const PinholeIntrinsics& camera,
-             std::span<const Eigen::Isometry3f> X_CB, const Eigen::Vector2d& pixel) {
+bool covered(const SilhouetteModel& model, const PinholeIntrinsics& camera, std::span<const Eigen::Isometry3f> X_CB,
+             const Eigen::Vector2d& pixel) {
   PinholeIntrinsics one = camera;
   one.width = one.height = 1;
   one.cx -= pixel.x();
@@ -82,8 +82,7 @@ TEST(ContourExtractor, OutlineIsCoveredAtTheSpacingAskedFor) {
     std::size_t far_away = 0;
     for (int v = 5; v < 235; ++v) {
       for (int u = 5; u < 315; ++u) {
-        if (!mask.at(u, v) || (mask.at(u - 1, v) && mask.at(u + 1, v) && mask.at(u, v - 1) &&
-                               mask.at(u, v + 1))) {
+        if (!mask.at(u, v) || (mask.at(u - 1, v) && mask.at(u + 1, v) && mask.at(u, v - 1) && mask.at(u, v + 1))) {
           continue;
         }
         ++border;
@@ -127,18 +126,14 @@ TEST(ContourExtractor, OpenPartsWithBothCullings) {
     std::normal_distribution<float> normal;
     for (int i = 0; i < 10; ++i) {
       Eigen::Isometry3f X(Eigen::Translation3f(0.0f, 0.0f, 0.4f));
-      X.rotate(Eigen::Quaternionf(normal(random), normal(random), normal(random), normal(random))
-                   .normalized());
+      X.rotate(Eigen::Quaternionf(normal(random), normal(random), normal(random), normal(random)).normalized());
       const std::vector X_CB{X};
       std::size_t wrong = 0;
       const auto points = extractor.extract(X_CB, 0);
       for (const auto& point : points) {
         const Eigen::Vector2d out = 0.05 * point.normal.cast<double>();
         const Eigen::Vector2d pixel = point.pixel.cast<double>();
-        wrong += covered(model, camera, X_CB, pixel + out) ||
-                         !covered(model, camera, X_CB, pixel - out)
-                     ? 1
-                     : 0;
+        wrong += covered(model, camera, X_CB, pixel + out) || !covered(model, camera, X_CB, pixel - out) ? 1 : 0;
       }
       EXPECT_LE(wrong, points.size() / 20) << "seed 44, pose " << i;
     }
@@ -150,15 +145,13 @@ TEST(ContourExtractor, NothingInViewGivesNoPoints) {
   ContourExtractor extractor(scene.model, std::vector{scene.camera});
   const std::vector<Eigen::Isometry3f> behind(17, Eigen::Isometry3f(Eigen::Translation3f(0, 0, -1)));
   EXPECT_TRUE(extractor.extract(behind, 0).empty());
-  const std::vector<Eigen::Isometry3f> nan(
-      17, Eigen::Isometry3f(Eigen::Translation3f(std::nanf(""), 0, 1)));
+  const std::vector<Eigen::Isometry3f> nan(17, Eigen::Isometry3f(Eigen::Translation3f(std::nanf(""), 0, 1)));
   EXPECT_TRUE(extractor.extract(nan, 0).empty());
 }
 
 TEST(ContourExtractor, NearPlaneIsNoOutline) {
   // A tube that starts behind the camera: its cut end is not an outline, its sides are.
-  const SilhouetteModel model{{synthetic::lumpy_tube("across", 0.30f, 0.02f, 0.02f, 800)},
-                              FaceCulling::kNone};
+  const SilhouetteModel model{{synthetic::lumpy_tube("across", 0.30f, 0.02f, 0.02f, 800)}, FaceCulling::kNone};
   const auto camera = synthetic::camera(320, 240);
   Eigen::Isometry3f X(Eigen::Translation3f(0.04f, 0.0f, -0.1f));
   X.rotate(Eigen::AngleAxisf(-1.5f, Eigen::Vector3f::UnitY()));

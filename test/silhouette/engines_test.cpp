@@ -24,7 +24,9 @@ struct EngineChoice {
   AtlasOptions atlas;
 };
 
-void PrintTo(const EngineChoice& choice, std::ostream* out) { *out << choice.name; }
+void PrintTo(const EngineChoice& choice, std::ostream* out) {
+  *out << choice.name;
+}
 
 class Engine : public testing::TestWithParam<EngineChoice> {
  protected:
@@ -46,8 +48,7 @@ class Engine : public testing::TestWithParam<EngineChoice> {
     }
     const auto& options = GetParam().options;
     if (options.engine != "atlas") return make_silhouette_scorer(model, cameras, options);
-    return make_atlas_scorer(model, cameras, gl::Context::create(options.gl_platform),
-                             GetParam().atlas);
+    return make_atlas_scorer(model, cameras, gl::Context::create(options.gl_platform), GetParam().atlas);
   }
 };
 
@@ -57,39 +58,35 @@ void expect_close(std::uint32_t engine, std::uint32_t reference, const std::stri
   EXPECT_NEAR(engine, reference, allowed) << what;
 }
 
-void expect_close(const SilhouetteCounts& engine, const SilhouetteCounts& reference,
-                  const std::string& where) {
+void expect_close(const SilhouetteCounts& engine, const SilhouetteCounts& reference, const std::string& where) {
   expect_close(engine.predicted, reference.predicted, "predicted, " + where);
   expect_close(engine.intersection, reference.intersection, "intersection, " + where);
   EXPECT_EQ(engine.observed, reference.observed) << "observed, " << where;
 }
 
 // Scores all particles and compares each count with the reference.
-void expect_scores(SilhouetteScorer& scorer, const SilhouetteModel& model,
-                   std::span<const PinholeIntrinsics> cameras,
-                   std::span<const ObservedSilhouette> observed,
-                   std::span<const Eigen::Isometry3f> X_CB) {
+void expect_scores(SilhouetteScorer& scorer, const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras,
+                   std::span<const ObservedSilhouette> observed, std::span<const Eigen::Isometry3f> X_CB) {
   const std::size_t images = X_CB.size() / model.parts.size();
   std::vector<SilhouetteCounts> counts(images, SilhouetteCounts{7, 7, 7});
   scorer.set_observation(observed);
   scorer.score(X_CB, counts);
   for (std::size_t i = 0; i < images; ++i) {
     const std::size_t c = i % cameras.size();
-    const auto mask = reference::silhouette(model, cameras[c],
-                                            X_CB.subspan(i * model.parts.size(), model.parts.size()));
+    const auto mask =
+        reference::silhouette(model, cameras[c], X_CB.subspan(i * model.parts.size(), model.parts.size()));
     expect_close(counts[i], reference::compare(mask, observed[c]),
                  "particle " + std::to_string(i / cameras.size()) + " camera " + std::to_string(c));
   }
 }
 
-std::vector<ObservedSilhouette> observe(const SilhouetteModel& model,
-                                        std::span<const PinholeIntrinsics> cameras,
+std::vector<ObservedSilhouette> observe(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras,
                                         std::uint32_t seed) {
   const auto X_CB = synthetic::stereo_particles(1, cameras.size(), seed);
   std::vector<ObservedSilhouette> observed(cameras.size());
   for (std::size_t c = 0; c < cameras.size(); ++c) {
-    observed[c].mask = reference::silhouette(
-        model, cameras[c], std::span(X_CB).subspan(c * model.parts.size(), model.parts.size()));
+    observed[c].mask =
+        reference::silhouette(model, cameras[c], std::span(X_CB).subspan(c * model.parts.size(), model.parts.size()));
   }
   return observed;
 }
@@ -121,8 +118,7 @@ TEST_P(Engine, StereoHand) {
   const auto model = synthetic::hand(2000);
   const std::vector cameras{synthetic::camera(320, 240), synthetic::camera(320, 240)};
   const auto scorer = make(model, cameras);
-  expect_scores(*scorer, model, cameras, observe(model, cameras, 1),
-                synthetic::stereo_particles(20, 2, 2));
+  expect_scores(*scorer, model, cameras, observe(model, cameras, 1), synthetic::stereo_particles(20, 2, 2));
 }
 
 TEST_P(Engine, MonoHandWithValidMask) {
@@ -161,16 +157,14 @@ TEST_P(Engine, OddSizesAndDifferentCameras) {
   const auto model = synthetic::hand(2000);
   const std::vector cameras{synthetic::camera(161, 119), synthetic::camera(333, 77)};
   const auto scorer = make(model, cameras);
-  expect_scores(*scorer, model, cameras, observe(model, cameras, 5),
-                synthetic::stereo_particles(10, 2, 6));
+  expect_scores(*scorer, model, cameras, observe(model, cameras, 5), synthetic::stereo_particles(10, 2, 6));
 }
 
 TEST_P(Engine, TinyPicture) {
   const auto model = synthetic::hand(500);
   const std::vector cameras{synthetic::camera(1, 1), synthetic::camera(65, 3)};
   const auto scorer = make(model, cameras);
-  expect_scores(*scorer, model, cameras, observe(model, cameras, 5),
-                synthetic::stereo_particles(10, 2, 6));
+  expect_scores(*scorer, model, cameras, observe(model, cameras, 5), synthetic::stereo_particles(10, 2, 6));
 }
 
 TEST_P(Engine, OneAndAThousandParticles) {
@@ -179,8 +173,7 @@ TEST_P(Engine, OneAndAThousandParticles) {
   const auto scorer = make(model, cameras);
   const auto observed = observe(model, cameras, 7);
   for (const std::size_t particles : {1u, 1000u, 3u}) {
-    expect_scores(*scorer, model, cameras, observed,
-                  synthetic::stereo_particles(particles, 2, 8, 0.3f, 0.05f));
+    expect_scores(*scorer, model, cameras, observed, synthetic::stereo_particles(particles, 2, 8, 0.3f, 0.05f));
   }
 }
 
@@ -199,8 +192,7 @@ TEST_P(Engine, OpenMeshesWithBothCullings) {
     for (int i = 0; i < 20; ++i) {
       for (int part = 0; part < 3; ++part) {
         Eigen::Isometry3f X(Eigen::Translation3f(0.06f * normal(random), 0.06f * normal(random), 0.4f));
-        X.rotate(Eigen::Quaternionf(normal(random), normal(random), normal(random), normal(random))
-                     .normalized());
+        X.rotate(Eigen::Quaternionf(normal(random), normal(random), normal(random), normal(random)).normalized());
         X_CB.push_back(X);
       }
     }
@@ -278,8 +270,7 @@ TEST_P(Engine, PartsBehindAndAcrossTheNearPlane) {
       across.rotate(Eigen::AngleAxisf(normal(random), Eigen::Vector3f::UnitX()));
       X_CB.push_back(across);
       X_CB.push_back(Eigen::Isometry3f(Eigen::Translation3f(0.0f, 0.0f, -0.3f)));
-      X_CB.push_back(Eigen::Isometry3f(
-          Eigen::Translation3f(0.1f * normal(random), 0.1f * normal(random), 0.5f)));
+      X_CB.push_back(Eigen::Isometry3f(Eigen::Translation3f(0.1f * normal(random), 0.1f * normal(random), 0.5f)));
     }
     std::vector<ObservedSilhouette> observed(1);
     observed[0].mask = BinaryMask(160, 120);
@@ -292,8 +283,7 @@ TEST_P(Engine, PartsBehindAndAcrossTheNearPlane) {
 }
 
 TEST_P(Engine, CameraInsideAPart) {
-  const SilhouetteModel model{{synthetic::lumpy_tube("around", 0.30f, 0.1f, 0.1f, 800)},
-                              FaceCulling::kNone};
+  const SilhouetteModel model{{synthetic::lumpy_tube("around", 0.30f, 0.1f, 0.1f, 800)}, FaceCulling::kNone};
   const std::vector cameras{synthetic::camera(160, 120)};
   std::vector<Eigen::Isometry3f> X_CB{Eigen::Isometry3f(Eigen::Translation3f(-0.15f, 0.0f, 0.0f))};
   std::vector<ObservedSilhouette> observed(1);
@@ -391,9 +381,7 @@ TEST_P(Engine, PixelCentresLieAtIntegers) {
   // 10..20 x 5..12; moved by 0.2 px to the right, 11..20 (20.3) x 5..12.
   const PinholeIntrinsics camera{64, 32, 100.0, 100.0, 31.5, 15.5};
   TriangleMesh square;
-  const auto at = [&](double u, double v) {
-    return Eigen::Vector3f(camera.ray({u, v}).cast<float>());
-  };
+  const auto at = [&](double u, double v) { return Eigen::Vector3f(camera.ray({u, v}).cast<float>()); };
   square.vertices = {at(9.9, 4.9), at(20.1, 4.9), at(20.1, 12.1), at(9.9, 12.1)};
   square.triangles = {{0, 2, 1}, {0, 3, 2}};
   const SilhouetteModel model{{square}, FaceCulling::kNone};
@@ -482,17 +470,15 @@ EngineChoice atlas_engine(const char* name, const char* platform, AtlasPass pass
 
 INSTANTIATE_TEST_SUITE_P(
     Silhouette, Engine,
-    testing::Values(contour_engine("contour", 2, ""),
-                    contour_engine("contour_baseline", 1, "baseline"),
-                    atlas_engine("atlas_compute_egl_device", "egl_device", AtlasPass::kCompute),
-                    atlas_engine("atlas_compute_osmesa", "osmesa", AtlasPass::kCompute),
-                    atlas_engine("atlas_raster_egl_device", "egl_device", AtlasPass::kRaster),
-                    atlas_engine("atlas_raster_osmesa", "osmesa", AtlasPass::kRaster),
-                    // Room for a single tile or two, and few tiles at once: many passes.
-                    EngineChoice{"atlas_raster_many_passes",
-                                 {"atlas", "egl_surfaceless", 0}, "", {AtlasPass::kRaster, 384, 33}},
-                    EngineChoice{"atlas_compute_many_passes",
-                                 {"atlas", "egl_surfaceless", 0}, "", {AtlasPass::kCompute, 384, 33}}),
+    testing::Values(
+        contour_engine("contour", 2, ""), contour_engine("contour_baseline", 1, "baseline"),
+        atlas_engine("atlas_compute_egl_device", "egl_device", AtlasPass::kCompute),
+        atlas_engine("atlas_compute_osmesa", "osmesa", AtlasPass::kCompute),
+        atlas_engine("atlas_raster_egl_device", "egl_device", AtlasPass::kRaster),
+        atlas_engine("atlas_raster_osmesa", "osmesa", AtlasPass::kRaster),
+        // Room for a single tile or two, and few tiles at once: many passes.
+        EngineChoice{"atlas_raster_many_passes", {"atlas", "egl_surfaceless", 0}, "", {AtlasPass::kRaster, 384, 33}},
+        EngineChoice{"atlas_compute_many_passes", {"atlas", "egl_surfaceless", 0}, "", {AtlasPass::kCompute, 384, 33}}),
     [](const auto& param_info) { return param_info.param.name; });
 
 TEST(Contour, ResultsDoNotDependOnThreads) {
@@ -569,8 +555,7 @@ TEST(MakeScorer, NamesUnknownEngine) {
   } catch (const std::invalid_argument& error) {
     EXPECT_THAT(error.what(), testing::HasSubstr("contuor"));
   }
-  EXPECT_THROW(make_silhouette_scorer(model, cameras, {"contour", "auto", -1}),
-               std::invalid_argument);
+  EXPECT_THROW(make_silhouette_scorer(model, cameras, {"contour", "auto", -1}), std::invalid_argument);
 }
 
 }  // namespace

@@ -71,8 +71,7 @@ TEST(FallbackScorerAlone, WorksOnWithTheFirstWhileItLives) {
   const auto model = synthetic::hand(500);
   const std::vector cameras{synthetic::camera(64, 48)};
   const auto X_CB = synthetic::stereo_particles(4, 1, 5);
-  const auto scorer =
-      with_contour_to_fall_back_on(std::make_unique<Dying>(Dying::In::kScore, 2), model, cameras, 1);
+  const auto scorer = with_contour_to_fall_back_on(std::make_unique<Dying>(Dying::In::kScore, 2), model, cameras, 1);
   std::vector<SilhouetteCounts> counts(4);
   for (int i = 0; i < 2; ++i) {
     scorer->score(X_CB, counts, ~0u);

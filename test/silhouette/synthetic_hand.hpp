@@ -15,8 +15,8 @@ namespace bodyschema::synthetic {
 
 /// A closed, slightly lumpy tube with rounded ends along x, from x = 0 to `length_m`, made of about
 /// `triangles` triangles that wind counter-clockwise seen from outside.
-inline TriangleMesh lumpy_tube(const std::string& name, float length_m, float half_width_m,
-                               float half_height_m, int triangles, float lumps = 0.08f) {
+inline TriangleMesh lumpy_tube(const std::string& name, float length_m, float half_width_m, float half_height_m,
+                               int triangles, float lumps = 0.08f) {
   // segments * 2 * (rings - 1) triangles, with rings about twice the segments.
   const int segments = std::max(3, static_cast<int>(std::lround(std::sqrt(triangles / 4.0))));
   const int rings = std::max(2, triangles / (2 * segments) + 1);
@@ -25,8 +25,7 @@ inline TriangleMesh lumpy_tube(const std::string& name, float length_m, float ha
   const auto vertex = [&](double along, double around) {
     const double a = kPi * along;
     // Superellipse: flatter in the middle than a sphere.
-    const double profile = std::pow(std::sin(a), 0.5) *
-                           (1.0 + lumps * std::sin(7.0 * along + 3.0 * std::cos(around)));
+    const double profile = std::pow(std::sin(a), 0.5) * (1.0 + lumps * std::sin(7.0 * along + 3.0 * std::cos(around)));
     return Eigen::Vector3f(length_m * static_cast<float>(0.5 - 0.5 * std::cos(a)),
                            half_width_m * static_cast<float>(profile * std::cos(around)),
                            half_height_m * static_cast<float>(profile * std::sin(around)));
@@ -39,9 +38,7 @@ inline TriangleMesh lumpy_tube(const std::string& name, float length_m, float ha
   }
   mesh.vertices.push_back({length_m, 0.0f, 0.0f});
   const auto last = static_cast<std::uint32_t>(mesh.vertices.size() - 1);
-  const auto at = [&](int r, int s) {
-    return static_cast<std::uint32_t>(1 + (r - 1) * segments + s % segments);
-  };
+  const auto at = [&](int r, int s) { return static_cast<std::uint32_t>(1 + (r - 1) * segments + s % segments); };
   for (int s = 0; s < segments; ++s) {
     mesh.triangles.push_back({0, at(1, s + 1), at(1, s)});
     for (int r = 1; r + 1 < rings; ++r) {
@@ -62,8 +59,7 @@ inline SilhouetteModel hand(int triangles) {
   for (int finger = 0; finger < 5; ++finger) {
     for (int bone = 0; bone < 3; ++bone) {
       model.parts.push_back(lumpy_tube("finger" + std::to_string(finger) + std::to_string(bone),
-                                       0.040f - 0.006f * static_cast<float>(bone), 0.010f, 0.009f,
-                                       each));
+                                       0.040f - 0.006f * static_cast<float>(bone), 0.010f, 0.009f, each));
     }
   }
   return model;
@@ -79,11 +75,9 @@ inline std::vector<Eigen::Isometry3f> hand_posture(float curl_rad) {
   X_PB.push_back(Eigen::Isometry3f::Identity());
   for (int finger = 0; finger < 5; ++finger) {
     const bool thumb = finger == 0;
-    Eigen::Isometry3f X(Translation3f(thumb ? 0.03f : 0.085f,
-                                      thumb ? 0.035f : 0.03f - 0.02f * static_cast<float>(finger - 1),
-                                      0.0f));
-    X.rotate(AngleAxisf(thumb ? 0.9f : 0.15f - 0.08f * static_cast<float>(finger - 1),
-                        Vector3f::UnitZ()));
+    Eigen::Isometry3f X(
+        Translation3f(thumb ? 0.03f : 0.085f, thumb ? 0.035f : 0.03f - 0.02f * static_cast<float>(finger - 1), 0.0f));
+    X.rotate(AngleAxisf(thumb ? 0.9f : 0.15f - 0.08f * static_cast<float>(finger - 1), Vector3f::UnitZ()));
     for (int bone = 0; bone < 3; ++bone) {
       X.rotate(AngleAxisf(curl_rad, Vector3f::UnitY()));
       X_PB.push_back(X);
@@ -101,15 +95,13 @@ inline PinholeIntrinsics camera(int width, int height) {
 
 /// Poses [particle][camera][part] of hands about 0.3 m in front of two cameras 68 mm apart, turned
 /// by about `spread_rad` and moved by about `spread_m` around one common pose.
-inline std::vector<Eigen::Isometry3f> stereo_particles(std::size_t particles, std::size_t cameras,
-                                                       std::uint32_t seed, float spread_rad = 0.1f,
-                                                       float spread_m = 0.01f) {
+inline std::vector<Eigen::Isometry3f> stereo_particles(std::size_t particles, std::size_t cameras, std::uint32_t seed,
+                                                       float spread_rad = 0.1f, float spread_m = 0.01f) {
   std::mt19937 random(seed);
   std::normal_distribution<float> normal;
   std::vector<Eigen::Isometry3f> X_CB;
   for (std::size_t i = 0; i < particles; ++i) {
-    Eigen::Isometry3f X_LP(Eigen::Translation3f(0.01f + spread_m * normal(random),
-                                                0.0f + spread_m * normal(random),
+    Eigen::Isometry3f X_LP(Eigen::Translation3f(0.01f + spread_m * normal(random), 0.0f + spread_m * normal(random),
                                                 0.30f + spread_m * normal(random)));
     X_LP.rotate(Eigen::AngleAxisf(0.6f + spread_rad * normal(random), Eigen::Vector3f::UnitZ()));
     X_LP.rotate(Eigen::AngleAxisf(0.5f + spread_rad * normal(random), Eigen::Vector3f::UnitY()));

@@ -120,9 +120,8 @@ TEST_P(EveryFault, ChangesWhatItShouldAndNothingElse) {
   plan.output = Output::kSilhouettes;
   plan.frames = 12;
   const Pair pair(plan);
-  const auto moved = pair.largest([](const auto& a, const auto& b) {
-    return (a.truth[0].q - b.truth[0].q).cwiseAbs().maxCoeff();
-  });
+  const auto moved =
+      pair.largest([](const auto& a, const auto& b) { return (a.truth[0].q - b.truth[0].q).cwiseAbs().maxCoeff(); });
   EXPECT_EQ(moved > 5e-5, expected.joints) << moved;
   const auto misread = pair.largest([](const auto& a, const auto& b) {
     double most = 0.0;
@@ -133,8 +132,9 @@ TEST_P(EveryFault, ChangesWhatItShouldAndNothingElse) {
   });
   EXPECT_EQ(misread > 1e-5, expected.encoders) << misread;
   EXPECT_EQ(pair.largest([](const auto& a, const auto& b) {
-              return std::abs(static_cast<double>(a.truth[0].exposure_utime - b.truth[0].exposure_utime));
-            }) > 100, expected.exposure);
+    return std::abs(static_cast<double>(a.truth[0].exposure_utime - b.truth[0].exposure_utime));
+  }) > 100,
+            expected.exposure);
   // The pose that the nominal robot has at the true joints, against the true pose.
   ForwardKinematics nominal(stage.model, {stage.setup.hand_link, stage.rig.cameras[0].link, stage.rig.cameras[1].link});
   double pose_change = 0.0;
@@ -148,9 +148,10 @@ TEST_P(EveryFault, ChangesWhatItShouldAndNothingElse) {
   }
   EXPECT_EQ(pose_change > 1e-6, expected.pose) << pose_change;
   EXPECT_EQ(pair.largest([](const auto& a, const auto& b) {
-              return a.cameras[0]->coverage == b.cameras[0]->coverage &&
-                             a.cameras[1]->coverage == b.cameras[1]->coverage ? 0.0 : 1.0;
-            }) > 0.5, expected.silhouette);
+    return a.cameras[0]->coverage == b.cameras[0]->coverage && a.cameras[1]->coverage == b.cameras[1]->coverage ? 0.0
+                                                                                                                : 1.0;
+  }) > 0.5,
+            expected.silhouette);
 }
 
 INSTANTIATE_TEST_SUITE_P(Catalogue, EveryFault, ::testing::ValuesIn(kCatalogue), [](const auto& row) {
@@ -301,9 +302,10 @@ TEST(LinkLength, PutsElbowAndWristFurtherOut) {
 
 /// In the upper arm of the official iCub a sensor is fixed between two joints, and the arm hangs down its axis.
 TEST(LinkLength, IsAwayFromTheRootAlsoBehindASensor) {
-  const auto file = std::filesystem::temp_directory_path() /
-                    ("bodyschema_true_sensor_" + std::to_string(::getpid()) + ".urdf");
-  std::ofstream(file) << R"(<robot name="two"><link name="root"/><link name="one"/><link name="sensor"/><link name="two"/>
+  const auto file =
+      std::filesystem::temp_directory_path() / ("bodyschema_true_sensor_" + std::to_string(::getpid()) + ".urdf");
+  std::ofstream(file)
+      << R"(<robot name="two"><link name="root"/><link name="one"/><link name="sensor"/><link name="two"/>
     <joint name="a" type="revolute"><parent link="root"/><child link="one"/><axis xyz="0 0 1"/>
       <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
     <joint name="s" type="fixed"><parent link="one"/><child link="sensor"/><origin xyz="0 0 -0.1"/></joint>
@@ -354,7 +356,8 @@ TEST(AxisShift, MovesAllBeyondAcrossTheAxisAndAlongWithTheLinkThatCarriesIt) {
   const auto j = stage.joint("r_elbow");
   for (const int along : {1, 2}) {
     TrueBody body;
-    body.misplacements.push_back({.joint = j, .shift_1_m = along == 1 ? 0.01 : 0.0, .shift_2_m = along == 2 ? 0.01 : 0.0});
+    body.misplacements.push_back(
+        {.joint = j, .shift_1_m = along == 1 ? 0.01 : 0.0, .shift_2_m = along == 2 ? 0.01 : 0.0});
     TrueKinematics moved(stage.model, body, {"r_upper_arm", "r_elbow_1", "r_hand"});
     TrueKinematics nominal(stage.model, TrueBody{}, {"r_upper_arm", "r_elbow_1", "r_hand"});
     std::vector<Pose> a(3), b(3);
@@ -382,7 +385,8 @@ TEST(TrueKinematics, SeveralMisplacementsComposeAlongTheChain) {
   TrueBody tilted;
   tilted.misplacements.push_back({.joint = stage.joint("r_elbow"), .tilt_1_rad = radians(5.0)});
   TrueBody both = tilted;
-  both.misplacements.insert(both.misplacements.begin(), {.joint = stage.joint("r_wrist_prosup"), .lengthening_m = 0.01});
+  both.misplacements.insert(both.misplacements.begin(),
+                            {.joint = stage.joint("r_wrist_prosup"), .lengthening_m = 0.01});
   TrueKinematics one(stage.model, tilted, {"r_hand", "r_elbow_1", "r_forearm"});
   TrueKinematics two(stage.model, both, {"r_hand", "r_elbow_1", "r_forearm"});
   std::vector<Pose> a(3), b(3);

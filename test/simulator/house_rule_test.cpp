@@ -12,8 +12,8 @@ namespace {
 /// test. What it links is checked by CMake (test/simulator/CMakeLists.txt), what it includes here.
 TEST(HouseRule, TheSimulatorIncludesNothingOfTheEstimator) {
   const std::filesystem::path root = BODYSCHEMA_SOURCE_DIR;
-  const std::set<std::string> forbidden = {"effects",  "silhouette", "estimator",  "diagnosis", "filter",
-                                           "vision",   "pipeline",   "evaluation", "service",   "report"};
+  const std::set<std::string> forbidden = {"effects", "silhouette", "estimator",  "diagnosis", "filter",
+                                           "vision",  "pipeline",   "evaluation", "service",   "report"};
   const std::regex include(R"re(^\s*#\s*include\s*["<]bodyschema/([a-z_]+)/)re");
   int files = 0;
   for (const auto& folder : {root / "src/simulator", root / "include/bodyschema/simulator"}) {

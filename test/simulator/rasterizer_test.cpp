@@ -31,7 +31,8 @@ TriangleMesh disc(float radius, int corners = 720) {
   mesh.vertices.push_back(Eigen::Vector3f::Zero());
   for (int i = 0; i < corners; ++i) {
     const double a = 2.0 * kPi * i / corners;
-    mesh.vertices.emplace_back(static_cast<float>(radius * std::cos(a)), static_cast<float>(radius * std::sin(a)), 0.0f);
+    mesh.vertices.emplace_back(static_cast<float>(radius * std::cos(a)), static_cast<float>(radius * std::sin(a)),
+                               0.0f);
   }
   for (int i = 0; i < corners; ++i) {
     mesh.triangles.push_back({0, static_cast<std::uint32_t>(1 + (i + 1) % corners), static_cast<std::uint32_t>(1 + i)});
@@ -49,7 +50,9 @@ std::vector<Eigen::Isometry3f> at(float x, float y, float z) {
   return {X};
 }
 
-double area(const Rasterizer& r) { return std::accumulate(r.coverage().begin(), r.coverage().end(), 0.0); }
+double area(const Rasterizer& r) {
+  return std::accumulate(r.coverage().begin(), r.coverage().end(), 0.0);
+}
 
 TEST(Rasterizer, ASquareCoversThePixelsWhoseCentresItCovers) {
   // At 0.5 m a half side of 0.0506 m is 25.3 px: centres from 50 - 25 to 50 + 25.
@@ -155,7 +158,8 @@ TEST(Rasterizer, DistortionAgreesWithOpenCv) {
     }
     centre /= area(r);
     std::vector<cv::Point2d> pixels;
-    cv::projectPoints(std::vector<cv::Point3d>{{p.x(), p.y(), p.z()}}, cv::Vec3d(0, 0, 0), cv::Vec3d(0, 0, 0), K, d, pixels);
+    cv::projectPoints(std::vector<cv::Point3d>{{p.x(), p.y(), p.z()}}, cv::Vec3d(0, 0, 0), cv::Vec3d(0, 0, 0), K, d,
+                      pixels);
     EXPECT_NEAR(centre.x(), pixels[0].x, 0.1);
     EXPECT_NEAR(centre.y(), pixels[0].y, 0.1);
   }

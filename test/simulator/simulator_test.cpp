@@ -123,7 +123,8 @@ TEST(Simulator, PicturesShowTheHandWhereTheSilhouetteIsAndTheRoomElsewhere) {
         for (int u = 2; u < 318; ++u) {
           bool near = false;  // blur mixes neighbours
           for (int dv = -1; dv <= 1; ++dv) {
-            for (int du = -1; du <= 1; ++du) near |= camera.coverage[static_cast<std::size_t>((v + dv) * 320 + u + du)] > 0;
+            for (int du = -1; du <= 1; ++du)
+              near |= camera.coverage[static_cast<std::size_t>((v + dv) * 320 + u + du)] > 0;
           }
           for (int k = 0; k < 3; ++k) {
             const double difference = camera.image.pixel(u, v)[k] - room.pixel(u, v)[k];
@@ -198,7 +199,8 @@ TEST(Simulator, EncodersAreTrueAnglesWithOffsetNoiseAndRounding) {
       for (const auto& name : stage.setup.estimated_joints) {
         const auto j = stage.joint(name);
         const auto offset = plan.offsets_deg.find(name);
-        const double error = degrees(sample.q[j] - truth[j]) - (offset == plan.offsets_deg.end() ? 0.0 : offset->second);
+        const double error =
+            degrees(sample.q[j] - truth[j]) - (offset == plan.offsets_deg.end() ? 0.0 : offset->second);
         sum[j] += error;
         square += error * error;
       }
@@ -334,7 +336,8 @@ TEST(Simulator, StandsStillInEveryPostureOfStopAndGo) {
     const bool still = (q - before).cwiseAbs().maxCoeff() < 1e-9;
     still_s = still ? still_s + kStep_s : 0.0;
     together_s += still ? kStep_s : 0.0;
-    if (still_s > 0.9 && (postures.empty() || (q - postures.back()).cwiseAbs().maxCoeff() > 1e-6)) postures.push_back(q);
+    if (still_s > 0.9 && (postures.empty() || (q - postures.back()).cwiseAbs().maxCoeff() > 1e-6))
+      postures.push_back(q);
     before = q;
   }
   EXPECT_EQ(postures.size(), 12u);

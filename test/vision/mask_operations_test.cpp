@@ -24,8 +24,7 @@ BinaryMask brute_force(const BinaryMask& in, bool erode) {
       bool all = true, any = false;
       for (int dv = -1; dv <= 1; ++dv) {
         for (int du = -1; du <= 1; ++du) {
-          const bool bit = in.at(std::clamp(u + du, 0, in.width() - 1),
-                                 std::clamp(v + dv, 0, in.height() - 1));
+          const bool bit = in.at(std::clamp(u + du, 0, in.width() - 1), std::clamp(v + dv, 0, in.height() - 1));
           all = all && bit;
           any = any || bit;
         }
@@ -37,8 +36,7 @@ BinaryMask brute_force(const BinaryMask& in, bool erode) {
 }
 
 // Flood fill from every pixel; slow and obvious.
-std::size_t piece_size(const BinaryMask& mask, int u, int v, bool value, bool eight,
-                       bool& on_border) {
+std::size_t piece_size(const BinaryMask& mask, int u, int v, bool value, bool eight, bool& on_border) {
   BinaryMask seen(mask.width(), mask.height());
   std::vector<std::pair<int, int>> stack{{u, v}};
   seen.set(u, v);

@@ -13,8 +13,7 @@ namespace {
 class MaskPicture : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() /
-              ("bodyschema_mask_picture_" + std::to_string(::getpid()));
+    folder_ = std::filesystem::temp_directory_path() / ("bodyschema_mask_picture_" + std::to_string(::getpid()));
     std::filesystem::remove_all(folder_);
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
@@ -64,10 +63,8 @@ TEST_F(MaskPicture, ErrorsNameTheFile) {
   std::ofstream(folder_ / "broken.png") << "not a picture";
   expect_named([&] { read_picture(folder_ / "broken.png"); }, "broken.png");
   expect_named([&] { write_mask_png(folder_ / "empty.png", BinaryMask{}); }, "empty.png");
-  expect_named([&] { write_mask_png(folder_ / "mask.nosuchformat", BinaryMask(4, 4)); },
-               "mask.nosuchformat");
-  expect_named([&] { write_overlay_png(folder_ / "o.png", Image(3, 4, 3), BinaryMask(4, 4)); },
-               "o.png");
+  expect_named([&] { write_mask_png(folder_ / "mask.nosuchformat", BinaryMask(4, 4)); }, "mask.nosuchformat");
+  expect_named([&] { write_overlay_png(folder_ / "o.png", Image(3, 4, 3), BinaryMask(4, 4)); }, "o.png");
   expect_named([&] { write_coverage_png(folder_ / "c.png", 2, 2, {1}); }, "c.png");
 }
 

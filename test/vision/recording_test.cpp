@@ -54,8 +54,7 @@ class Recording : public ::testing::TestWithParam<std::string> {
   void SetUp() override {
     root_ = data_folder() / "eyehand-sim";
     SKIP_WITHOUT("eyehand-sim");
-    for (const auto& entry :
-         std::filesystem::directory_iterator(root_ / "yarp" / "images" / GetParam())) {
+    for (const auto& entry : std::filesystem::directory_iterator(root_ / "yarp" / "images" / GetParam())) {
       if (entry.path().extension() == ".ppm") files_.push_back(entry.path());
     }
     std::sort(files_.begin(), files_.end());

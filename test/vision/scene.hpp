@@ -25,8 +25,7 @@ struct Capsule {
   double distance(double u, double v) const {
     const double du = u1 - u0, dv = v1 - v0;
     const double length2 = du * du + dv * dv;
-    const double t =
-        length2 > 0 ? std::clamp(((u - u0) * du + (v - v0) * dv) / length2, 0.0, 1.0) : 0.0;
+    const double t = length2 > 0 ? std::clamp(((u - u0) * du + (v - v0) * dv) / length2, 0.0, 1.0) : 0.0;
     return std::hypot(u - u0 - t * du, v - v0 - t * dv) - radius;
   }
 };
@@ -39,15 +38,15 @@ struct Scene {
   int width = 160;
   int height = 120;
   Texture texture = Texture::kPlain;
-  double base[3] = {60, 90, 120};         ///< background colour, levels
-  double robot[3] = {200, 190, 180};      ///< robot colour, levels
-  double ambient = 1.0;                   ///< 1: flat; less: Lambert, lit from the lamp
-  double lamp[3] = {0, 0, 1};             ///< unit vector towards it: right, down, to the camera
+  double base[3] = {60, 90, 120};     ///< background colour, levels
+  double robot[3] = {200, 190, 180};  ///< robot colour, levels
+  double ambient = 1.0;               ///< 1: flat; less: Lambert, lit from the lamp
+  double lamp[3] = {0, 0, 1};         ///< unit vector towards it: right, down, to the camera
   double blur_px = 0.4;
   double noise_levels = 2.5;
   int channels = 3;
-  int supersampling = 6;                  ///< per pixel and axis
-  double shift_u = 0;                     ///< of the clutter, px: another place of the same room
+  int supersampling = 6;  ///< per pixel and axis
+  double shift_u = 0;     ///< of the clutter, px: another place of the same room
   std::vector<Capsule> shapes;
 
   double distance(double u, double v) const {
@@ -92,8 +91,7 @@ struct Scene {
       constexpr double kStep = 1e-3;  // the slope of the distance is the normal's direction
       const double nu = (top->distance(u + kStep, v) - top->distance(u - kStep, v)) / (2 * kStep);
       const double nv = (top->distance(u, v + kStep) - top->distance(u, v - kStep)) / (2 * kStep);
-      facing = lamp[0] * nu * depth + lamp[1] * nv * depth +
-               lamp[2] * std::sqrt(std::max(0.0, 1.0 - depth * depth));
+      facing = lamp[0] * nu * depth + lamp[1] * nv * depth + lamp[2] * std::sqrt(std::max(0.0, 1.0 - depth * depth));
     }
     const double light = ambient + (1.0 - ambient) * std::max(0.0, facing);
     for (int c = 0; c < 3; ++c) colour[c] = robot[c] * light;
@@ -114,9 +112,8 @@ struct Scene {
         } else {
           background_colour(u, v, colour);
         }
-        fine.at<cv::Vec3f>(y, x) = cv::Vec3f(static_cast<float>(colour[0]),
-                                             static_cast<float>(colour[1]),
-                                             static_cast<float>(colour[2]));
+        fine.at<cv::Vec3f>(y, x) =
+            cv::Vec3f(static_cast<float>(colour[0]), static_cast<float>(colour[1]), static_cast<float>(colour[2]));
       }
     }
     if (blur_px > 0) cv::GaussianBlur(fine, fine, cv::Size(0, 0), blur_px * sub);
@@ -189,9 +186,8 @@ struct Scene {
 
 /// Where the coverage passes one half along the normal, px from the point (positive: outside);
 /// false when it does not or meets an invalid pixel on the way.
-inline bool half_crossing(const EdgePoint& point, int width, int height,
-                          const std::vector<std::uint8_t>& coverage, const BinaryMask& valid,
-                          double& offset) {
+inline bool half_crossing(const EdgePoint& point, int width, int height, const std::vector<std::uint8_t>& coverage,
+                          const BinaryMask& valid, double& offset) {
   const auto at = [&](double u, double v, double& value) {
     const int iu = static_cast<int>(std::floor(u)), iv = static_cast<int>(std::floor(v));
     if (iu < 0 || iv < 0 || iu + 1 >= width || iv + 1 >= height) return false;
@@ -200,8 +196,8 @@ inline bool half_crossing(const EdgePoint& point, int width, int height,
     for (int b = 0; b < 2; ++b) {
       for (int a = 0; a < 2; ++a) {
         if (!valid.empty() && !valid.at(iu + a, iv + b)) return false;
-        value += (a ? fu : 1 - fu) * (b ? fv : 1 - fv) *
-                 coverage[static_cast<std::size_t>((iv + b) * width + iu + a)] / 255.0;
+        value += (a ? fu : 1 - fu) * (b ? fv : 1 - fv) * coverage[static_cast<std::size_t>((iv + b) * width + iu + a)] /
+                 255.0;
       }
     }
     return true;
@@ -229,8 +225,7 @@ struct EdgeStatistics {
 };
 
 inline EdgeStatistics edge_statistics(const std::vector<EdgePoint>& points, int width, int height,
-                                      const std::vector<std::uint8_t>& coverage,
-                                      const BinaryMask& valid) {
+                                      const std::vector<std::uint8_t>& coverage, const BinaryMask& valid) {
   EdgeStatistics result;
   double sum = 0.0, squares = 0.0;
   int n = 0;

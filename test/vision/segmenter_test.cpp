@@ -59,15 +59,14 @@ test::EdgeStatistics measure(Scene scene, const VisionSetup& setup, unsigned see
     scene.shapes = test::hand(78.0 + 1.37 * k, 62.0 + 0.71 * k);
     segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
     EXPECT_GT(iou(out.mask, scene.true_mask()), 0.97);
-    const auto edge = test::edge_statistics(scene.outline(), scene.width, scene.height,
-                                            out.coverage, out.valid);
+    const auto edge = test::edge_statistics(scene.outline(), scene.width, scene.height, out.coverage, out.valid);
     total.bias += edge.bias / kPlaces;
     total.sd += edge.sd / kPlaces;
     total.found += edge.found / kPlaces;
     total.worst = std::max(total.worst, edge.worst);
   }
-  std::printf("    outline: bias %+.3f px, sd %.3f px, worst %.2f px, found %.1f %%\n", total.bias,
-              total.sd, total.worst, 100.0 * total.found);
+  std::printf("    outline: bias %+.3f px, sd %.3f px, worst %.2f px, found %.1f %%\n", total.bias, total.sd,
+              total.worst, 100.0 * total.found);
   return total;
 }
 
@@ -199,8 +198,7 @@ TEST(Segmenter, LearnsBehindAMovingRobotOffline) {
     scene.shapes = test::hand(120 - 80 * t, 90 - 40 * t);
     frames.push_back(scene.picture(random));
   }
-  Segmenter segmenter(setup_for(SegmentationMethod::kLearnedBackground), "left", scene.width,
-                      scene.height);
+  Segmenter segmenter(setup_for(SegmentationMethod::kLearnedBackground), "left", scene.width, scene.height);
   segmenter.learn(frames);
   const auto& model = segmenter.background();
   std::size_t known = 0, wrong = 0;
@@ -211,8 +209,8 @@ TEST(Segmenter, LearnsBehindAMovingRobotOffline) {
       ++known;
       float worst = 0;
       for (int c = 0; c < 3; ++c) {
-        worst = std::max(worst, std::abs(model.mean[3 * i + static_cast<std::size_t>(c)] -
-                                         truth.at<cv::Vec3f>(v, u)[c]));
+        worst =
+            std::max(worst, std::abs(model.mean[3 * i + static_cast<std::size_t>(c)] - truth.at<cv::Vec3f>(v, u)[c]));
       }
       wrong += worst > 5.0f;
     }
@@ -355,8 +353,7 @@ TEST(Segmenter, RefusesPicturesThatDoNotFit) {
 }
 
 TEST(Segmenter, TinyPicturesDoNotBreakAnything) {
-  for (const auto method :
-       {SegmentationMethod::kSingleColour, SegmentationMethod::kLearnedBackground}) {
+  for (const auto method : {SegmentationMethod::kSingleColour, SegmentationMethod::kLearnedBackground}) {
     for (const auto& [width, height] : {std::pair{1, 1}, {1, 7}, {2, 2}, {65, 1}, {3, 64}}) {
       auto setup = setup_for(method);
       setup.learning_frames = 2;
@@ -388,8 +385,9 @@ TEST(Segmenter, BackgroundPictureMustBeThereAndFit) {
     large.seekp(16);
     large.write("\0\0\x40\0\0\0\x40\0", 8);
   }
-  EXPECT_THAT([&] { Segmenter(setup, "left", 10, 10); },
-              testing::ThrowsMessage<FileError>(testing::HasSubstr("background picture is 16384x16384, camera 'left'")));
+  EXPECT_THAT(
+      [&] { Segmenter(setup, "left", 10, 10); },
+      testing::ThrowsMessage<FileError>(testing::HasSubstr("background picture is 16384x16384, camera 'left'")));
   {
     std::ofstream larger(file, std::ios::binary | std::ios::in);
     larger.seekp(16);

@@ -24,7 +24,8 @@ vision:
   learning_frames: 7
   min_sightings: 4
   search_px: 9
-)", "/folder");
+)",
+                                                  "/folder");
   const auto setup = VisionSetup::from(configuration.section("vision"));
   EXPECT_EQ(setup.method, SegmentationMethod::kBackgroundPicture);
   EXPECT_EQ(setup.edges, EdgeKind::kHard);
@@ -45,13 +46,10 @@ vision:
 }
 
 TEST(VisionSetup, RefusesNonsense) {
-  for (const char* text :
-       {"vision: {method: magic}", "vision: {edges: soft}", "vision: {threshold_sigma: 0}",
-        "vision: {background_rgb: [1, 2]}", "vision: {background_rgb: [1, 2, 300]}",
-        "vision: {method: background_picture}", "vision: {learning_frames: 0}"}) {
-    EXPECT_THROW(VisionSetup::from(Configuration::parse(text).section("vision")),
-                 ConfigurationError)
-        << text;
+  for (const char* text : {"vision: {method: magic}", "vision: {edges: soft}", "vision: {threshold_sigma: 0}",
+                           "vision: {background_rgb: [1, 2]}", "vision: {background_rgb: [1, 2, 300]}",
+                           "vision: {method: background_picture}", "vision: {learning_frames: 0}"}) {
+    EXPECT_THROW(VisionSetup::from(Configuration::parse(text).section("vision")), ConfigurationError) << text;
   }
   EXPECT_NO_THROW(VisionSetup::from(Configuration::parse("{}").section("vision")));
 }

@@ -16,8 +16,7 @@ class JointAssembler {
  public:
   /// @param joint_names  RobotModel order
   /// @param resting_rad  values of joints before their first reading; others at zero
-  JointAssembler(const std::vector<std::string>& joint_names,
-                 const std::map<std::string, double>& resting_rad);
+  JointAssembler(const std::vector<std::string>& joint_names, const std::map<std::string, double>& resting_rad);
 
   /// The joints as known with this message; null when it carries none of ours or is older than the
   /// last. Head and arm with one stamp give two samples with it, the second complete. Valid until the

@@ -45,10 +45,10 @@ class JointHistory {
 
   enum class Verdict {
     kReady,
-    kNotYet,   ///< a joint has no sample at or after the instant, yet
-    kTooOld,   ///< a joint's samples begin after the instant
-    kGap,      ///< silence around the instant
-    kJump,     ///< a jump around the instant
+    kNotYet,  ///< a joint has no sample at or after the instant, yet
+    kTooOld,  ///< a joint's samples begin after the instant
+    kGap,     ///< silence around the instant
+    kJump,    ///< a jump around the instant
   };
   struct Answer {
     Verdict verdict = Verdict::kReady;

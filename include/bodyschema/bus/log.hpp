@@ -13,8 +13,8 @@ namespace bodyschema {
 
 /// One recorded message.
 struct LogEvent {
-  std::int64_t number = 0;        ///< counted by the writer from 0
-  Microseconds time_us = 0;       ///< when it was received
+  std::int64_t number = 0;   ///< counted by the writer from 0
+  Microseconds time_us = 0;  ///< when it was received
   std::string channel;
   std::vector<std::uint8_t> data;
 };

@@ -19,10 +19,10 @@
 namespace bodyschema {
 
 struct BusStatistics {
-  std::uint64_t messages = 0;           ///< on our two input channels
-  std::uint64_t messages_malformed = 0; ///< not used as a whole
-  std::uint64_t images_malformed = 0;   ///< pictures of good messages that could not be used
-  std::uint64_t lost_in_queue = 0;      ///< LostMessages, which the network's side fills in
+  std::uint64_t messages = 0;            ///< on our two input channels
+  std::uint64_t messages_malformed = 0;  ///< not used as a whole
+  std::uint64_t images_malformed = 0;    ///< pictures of good messages that could not be used
+  std::uint64_t lost_in_queue = 0;       ///< LostMessages, which the network's side fills in
   std::uint64_t lost_incomplete = 0;
   /// Messages and pictures by what was wrong with them.
   std::array<std::uint64_t, kMessageFaultCount> faults{};

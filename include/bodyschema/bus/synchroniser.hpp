@@ -52,15 +52,15 @@ inline constexpr std::size_t kDropReasonCount = 9;
 [[nodiscard]] std::string_view name_of(DropReason reason);
 
 struct SynchroniserStatistics {
-  std::uint64_t joint_messages = 0;             ///< taken in
-  std::uint64_t joint_messages_duplicate = 0;   ///< skipped
+  std::uint64_t joint_messages = 0;            ///< taken in
+  std::uint64_t joint_messages_duplicate = 0;  ///< skipped
   std::uint64_t joint_messages_out_of_order = 0;
   std::uint64_t joint_messages_without_known_joint = 0;
-  std::uint64_t images = 0;                     ///< offered; each ends up used, dropped or waiting
+  std::uint64_t images = 0;  ///< offered; each ends up used, dropped or waiting
   std::uint64_t images_used = 0;
   std::array<std::uint64_t, kDropReasonCount> images_dropped{};
-  std::uint64_t observations = 0;               ///< made, mono ones included
-  std::uint64_t mono_observations = 0;          ///< of a rig with two cameras
+  std::uint64_t observations = 0;       ///< made, mono ones included
+  std::uint64_t mono_observations = 0;  ///< of a rig with two cameras
   std::uint64_t gaps = 0;
   std::uint64_t clock_steps = 0;
   /// Newest picture's stamp minus newest encoder stamp when that picture came; positive: encoders late.
@@ -105,8 +105,8 @@ class Synchroniser {
   /// @param joint_names  order of the joint vectors (RobotModel's)
   /// @param fixed_rad  values of joints that the robot does not publish
   /// @param cameras  1 or 2
-  Synchroniser(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad,
-               int cameras, const SynchroniserOptions& options);
+  Synchroniser(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad, int cameras,
+               const SynchroniserOptions& options);
 
   void add(const JointStateMessage& message);
   /// The pictures of one message; each camera at most once, others are ignored.

@@ -31,7 +31,7 @@ struct YarpImportOptions {
   std::vector<Encoders> encoders;
   /// Columns that occur here are no joints by themselves, all others are.
   std::vector<CombinedJoint> combined_joints;
-  std::string left_images;   ///< folder; empty: no such camera
+  std::string left_images;  ///< folder; empty: no such camera
   std::string right_images;
   bool encoders_in_degrees = true;
 

@@ -14,10 +14,10 @@ namespace bodyschema {
 /// One eye: where it sits on the robot and how it maps directions to pixels. The link's frame must
 /// have OpenCV axes (x right, y down, z forward).
 struct CameraModel {
-  std::string name;                       ///< "left", "right"
-  std::string link;                       ///< URDF link with OpenCV axes
-  PinholeIntrinsics intrinsics;           ///< px
-  std::array<double, 5> distortion{};     ///< k1 k2 p1 p2 k3 as OpenCV; all zero: none
+  std::string name;                    ///< "left", "right"
+  std::string link;                    ///< URDF link with OpenCV axes
+  PinholeIntrinsics intrinsics;        ///< px
+  std::array<double, 5> distortion{};  ///< k1 k2 p1 p2 k3 as OpenCV; all zero: none
   [[nodiscard]] bool has_distortion() const;
 };
 

@@ -32,8 +32,7 @@ class Configuration {
   static constexpr std::int64_t kVersion = 1;
 
   /// Throws ConfigurationError when the file is missing, is not YAML, or includes itself.
-  static Configuration load(const std::filesystem::path& file,
-                            const std::vector<std::string>& overrides = {});
+  static Configuration load(const std::filesystem::path& file, const std::vector<std::string>& overrides = {});
   /// For tests: a document given as text; relative paths resolve against `directory`.
   static Configuration parse(std::string_view yaml, const std::filesystem::path& directory = ".");
 
@@ -58,12 +57,15 @@ class Configuration {
 
   /// The same with a value for an absent key.
   [[nodiscard]] double number_or(const std::string& key, double fallback, double min = -kInf, double max = kInf) const;
-  [[nodiscard]] std::int64_t integer_or(const std::string& key, std::int64_t fallback, std::int64_t min, std::int64_t max) const;
+  [[nodiscard]] std::int64_t integer_or(const std::string& key, std::int64_t fallback, std::int64_t min,
+                                        std::int64_t max) const;
   [[nodiscard]] bool boolean_or(const std::string& key, bool fallback) const;
   [[nodiscard]] std::string text_or(const std::string& key, const std::string& fallback) const;
-  [[nodiscard]] std::string choice_or(const std::string& key, const std::string& fallback, const std::vector<std::string>& choices) const;
+  [[nodiscard]] std::string choice_or(const std::string& key, const std::string& fallback,
+                                      const std::vector<std::string>& choices) const;
   [[nodiscard]] std::vector<double> numbers_or(const std::string& key, const std::vector<double>& fallback) const;
-  [[nodiscard]] std::vector<std::string> texts_or(const std::string& key, const std::vector<std::string>& fallback) const;
+  [[nodiscard]] std::vector<std::string> texts_or(const std::string& key,
+                                                  const std::vector<std::string>& fallback) const;
 
   /// Throws for the first key of this mapping, and of those below it, that no getter asked for, e.g.
   /// "config/a.yaml:12: unknown key 'filter.particle'; did you mean 'filter.particles'?".

@@ -20,14 +20,14 @@ using Columns = std::vector<Column>;
 /// A least-squares fit with its leave-one-block-out replicas.
 struct BlockFit {
   Eigen::VectorXd estimate;
-  Eigen::MatrixXd replicas;      ///< one column per block: the estimate without that block
-  Eigen::MatrixXd covariance;    ///< jackknife over blocks: honest under any noise within a block
-  Eigen::VectorXd model_variance;///< diagonal of the inverse information (white noise)
-  Eigen::VectorXd heldout_loss;  ///< per block: r'Wr of that block under the fit without it
-  double loss = 0.0;             ///< in the sample
+  Eigen::MatrixXd replicas;        ///< one column per block: the estimate without that block
+  Eigen::MatrixXd covariance;      ///< jackknife over blocks: honest under any noise within a block
+  Eigen::VectorXd model_variance;  ///< diagonal of the inverse information (white noise)
+  Eigen::VectorXd heldout_loss;    ///< per block: r'Wr of that block under the fit without it
+  double loss = 0.0;               ///< in the sample
   /// Of NestedFits: share of the added columns that the others cannot make up for, at the least.
   double independent = 1.0;
-  bool usable = false;           ///< false: the columns are not independent
+  bool usable = false;  ///< false: the columns are not independent
   [[nodiscard]] double heldout() const { return heldout_loss.sum(); }
 };
 
@@ -57,8 +57,7 @@ class BlockStatistics {
   [[nodiscard]] BlockFit fit(const Columns& columns, std::size_t group = 1) const;
   /// Held-out loss per block of a fit whose columns are drawn to zero: adds precision x^2 for each.
   /// With precisions above zero columns need not be independent.
-  [[nodiscard]] Eigen::VectorXd heldout_with_prior(const Columns& columns,
-                                                   const Eigen::VectorXd& precision) const;
+  [[nodiscard]] Eigen::VectorXd heldout_with_prior(const Columns& columns, const Eigen::VectorXd& precision) const;
 
  private:
   std::vector<Block> blocks_;
@@ -79,17 +78,17 @@ class NestedFits {
   struct Part {
     Eigen::LLT<Eigen::MatrixXd> factor;  ///< of the scaled information
     Eigen::VectorXd scale, estimate;
-    std::size_t first = 0, last = 0;     ///< the blocks left out
+    std::size_t first = 0, last = 0;  ///< the blocks left out
   };
-  [[nodiscard]] Part factorise(const Eigen::MatrixXd& information, const Eigen::VectorXd& vector,
-                               std::size_t first, std::size_t last) const;
+  [[nodiscard]] Part factorise(const Eigen::MatrixXd& information, const Eigen::VectorXd& vector, std::size_t first,
+                               std::size_t last) const;
 
   const BlockStatistics& statistics_;
   Columns base_;
   std::size_t group_;
   BlockFit base_fit_;
   Part total_;
-  std::vector<Part> parts_;  ///< one per group that holds anything
+  std::vector<Part> parts_;                   ///< one per group that holds anything
   std::vector<Eigen::MatrixXd> information_;  ///< of the base, per block
   std::vector<Eigen::VectorXd> vector_;
 };

@@ -60,8 +60,8 @@ struct ExclusionLimit {
 
 /// How well the model predicts blocks that its fit has not seen.
 struct HeldoutError {
-  double rms_px = 0.0;    ///< along the outline's normals
-  double hand_mm = 0.0;   ///< rms of the hand's displacement that the residuals ask for
+  double rms_px = 0.0;   ///< along the outline's normals
+  double hand_mm = 0.0;  ///< rms of the hand's displacement that the residuals ask for
   double hand_deg = 0.0;
   /// Share of the predicted outline that has a counterpart in the pictures; `rms_px` speaks of that
   /// part alone. 1 where the source knows which point belongs to which.
@@ -86,10 +86,10 @@ struct ResidualSample {
   double time_s = 0.0;
   std::size_t camera = 0;
   double rms_px_before = 0.0, rms_px_after = 0.0;
-  double mean_px_before = 0.0, mean_px_after = 0.0;  ///< mean along the outward normal
-  std::vector<double> angle_deg, velocity_deg_s, torque_nm;    ///< per arm joint
-  std::vector<double> apparent_deg_before, apparent_deg_after; ///< per arm joint
-  double image_radius_px = 0.0;  ///< of the hand's frame from the principal point
+  double mean_px_before = 0.0, mean_px_after = 0.0;             ///< mean along the outward normal
+  std::vector<double> angle_deg, velocity_deg_s, torque_nm;     ///< per arm joint
+  std::vector<double> apparent_deg_before, apparent_deg_after;  ///< per arm joint
+  double image_radius_px = 0.0;                                 ///< of the hand's frame from the principal point
   double depth_m = 0.0;
 };
 

@@ -21,8 +21,8 @@ namespace bodyschema {
 /// `threads` threads; results do not depend on their number.
 class ImageMeasurement final : public MeasurementSource {
  public:
-  ImageMeasurement(std::shared_ptr<const RobotModel> model, const RobotSetup& setup,
-                   const StereoRig& rig, int threads = 2);
+  ImageMeasurement(std::shared_ptr<const RobotModel> model, const RobotSetup& setup, const StereoRig& rig,
+                   int threads = 2);
   ~ImageMeasurement() override;
 
   /// Adds both pictures of an observation whose masks and coverage have been filled in. In order

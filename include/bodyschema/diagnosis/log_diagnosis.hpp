@@ -11,11 +11,11 @@ namespace bodyschema {
 
 struct LogDiagnosisOptions {
   std::filesystem::path log;
-  std::filesystem::path out;       ///< folder, created; empty: nothing is written
-  double picture_rate_hz = 10.0;   ///< pictures used per second and camera
+  std::filesystem::path out;      ///< folder, created; empty: nothing is written
+  double picture_rate_hz = 10.0;  ///< pictures used per second and camera
   int threads = 2;
-  bool quiet = false;              ///< no progress bars
-  DiagnosisOptions diagnosis;      ///< `nuisances` empty: the usual ones
+  bool quiet = false;          ///< no progress bars
+  DiagnosisOptions diagnosis;  ///< `nuisances` empty: the usual ones
 };
 
 /// How many of a log's pictures were not used and why, in one sentence; empty where that is at most this

@@ -11,9 +11,9 @@ namespace bodyschema {
 
 /// What the motion in a log lets a diagnosis test, before anything is estimated.
 struct LogTestability {
-  double duration_s = 0.0;          ///< between the first and the last usable pair
-  double shortest_s = 0.0;          ///< a diagnosis refuses shorter logs
-  std::size_t pictures = 0;         ///< with encoders at their exposure, at most ten a second and camera
+  double duration_s = 0.0;   ///< between the first and the last usable pair
+  double shortest_s = 0.0;   ///< a diagnosis refuses shorter logs
+  std::size_t pictures = 0;  ///< with encoders at their exposure, at most ten a second and camera
   std::vector<std::string> arm_joints;
   std::vector<CauseName> testable;
   std::vector<NotTestable> not_testable;

@@ -27,8 +27,22 @@ class CoordinateLayout {
   [[nodiscard]] Eigen::Index joint(Eigen::Index joint) const;
 
   enum class Kind {
-    kJoint, kAlong, kTilt1, kTilt2, kShift1, kShift2, kBaseX, kBaseY, kBaseZ,
-    kCameraX, kFocal, kCx, kCy, kK1, kScale, kDilation
+    kJoint,
+    kAlong,
+    kTilt1,
+    kTilt2,
+    kShift1,
+    kShift2,
+    kBaseX,
+    kBaseY,
+    kBaseZ,
+    kCameraX,
+    kFocal,
+    kCx,
+    kCy,
+    kK1,
+    kScale,
+    kDilation
   };
   struct Entry {
     Kind kind;
@@ -61,26 +75,25 @@ struct CompressedView {
 
 /// One outline point with its residual.
 struct OutlinePoint {
-  std::size_t link = 0;     ///< position in the kinematics' list of links
-  Eigen::Vector3d p_C;      ///< m
-  Eigen::Vector2d normal;   ///< unit, image
-  double residual_px = 0.0; ///< observed minus predicted, along the normal
-  double weight = 1.0;      ///< robust weight
+  std::size_t link = 0;      ///< position in the kinematics' list of links
+  Eigen::Vector3d p_C;       ///< m
+  Eigen::Vector2d normal;    ///< unit, image
+  double residual_px = 0.0;  ///< observed minus predicted, along the normal
+  double weight = 1.0;       ///< robust weight
 };
 
 /// Derivatives of outline points with respect to the coordinates, by finite differences of the
 /// kinematics (so mimic joints and tilted axes need no special care). One per thread.
 class ViewCompressor {
  public:
-  ViewCompressor(std::shared_ptr<const RobotModel> model, const JointRoles& roles,
-                 std::vector<std::string> links, std::vector<std::string> camera_links);
+  ViewCompressor(std::shared_ptr<const RobotModel> model, const JointRoles& roles, std::vector<std::string> links,
+                 std::vector<std::string> camera_links);
 
   /// Poses of the links in the camera at a view. Valid until the next call.
-  std::span<const Pose> set_view(const Eigen::Ref<const Eigen::VectorXd>& encoder,
-                                 const Corrections& corrections, std::size_t camera);
+  std::span<const Pose> set_view(const Eigen::Ref<const Eigen::VectorXd>& encoder, const Corrections& corrections,
+                                 std::size_t camera);
   /// Compresses points of the view set last.
-  void compress(std::span<const OutlinePoint> points, const PinholeIntrinsics& intrinsics,
-                CompressedView& out);
+  void compress(std::span<const OutlinePoint> points, const PinholeIntrinsics& intrinsics, CompressedView& out);
   /// Motion of a link per unit of each coordinate: 6 x coordinates (translation of its frame in m,
   /// rotation vector in rad; camera frame), for errors of the hand in mm and degrees.
   [[nodiscard]] Eigen::MatrixXd link_jacobian(std::size_t link) const;
@@ -127,8 +140,7 @@ class MeasurementSource {
     return false;
   }
   /// Compresses every view's residuals about a prediction with these corrections (one per view).
-  virtual void compress(std::span<const Corrections> corrections,
-                        std::vector<CompressedView>& out) = 0;
+  virtual void compress(std::span<const Corrections> corrections, std::vector<CompressedView>& out) = 0;
   /// Motion of the hand per coordinate at a view, as ViewCompressor::link_jacobian.
   virtual Eigen::MatrixXd hand_jacobian(std::size_t view, const Corrections& corrections) = 0;
 };

@@ -11,21 +11,21 @@ namespace bodyschema {
 /// A possible cause: an effect of the catalogue, or a generic feature that stands for "something
 /// that follows this variable on this joint".
 struct Candidate {
-  std::string name;        ///< the effect's name; "unexplained" for a generic feature
+  std::string name;  ///< the effect's name; "unexplained" for a generic feature
   EffectTarget target;
-  std::string variable;    ///< generic features: what the residual follows ("velocity")
+  std::string variable;  ///< generic features: what the residual follows ("velocity")
   Columns columns;
   /// Which fitted parameter of the effect each column is; a parameter that this log cannot tell from
   /// the offsets has none.
   std::vector<std::size_t> parameters;
-  bool nuisance = false;   ///< part of the baseline fit; reported when it is significant
+  bool nuisance = false;  ///< part of the baseline fit; reported when it is significant
   /// In units of its column: a nuisance below this is not worth a word; a slip below it is hardly one, unless it
   /// takes away much.
   double tolerance = 0.0;
   /// In units of its columns: what is found at all in a log with nothing else wrong; 0: not known. In a crowd of
   /// small errors what is smaller is one of them, however clearly it shows.
   double detectable = 0.0;
-  bool slip = false;       ///< `columns` has one entry, switched on at its block
+  bool slip = false;  ///< `columns` has one entry, switched on at its block
   /// Whether it is a matter of time, which slow noise looks like.
   [[nodiscard]] bool temporal() const { return slip || name == "drift" || variable == "time"; }
   [[nodiscard]] bool generic() const { return name == "unexplained"; }
@@ -37,25 +37,25 @@ struct SelectionOptions {
   /// What z is asked for holds for so many blocks; fewer know their spread worse. (A minute with a rest has 24,
   /// so 4.7 is asked instead of 4.5; a minute of slow noise ten.)
   std::size_t usual_blocks = 30;
-  double gain_floor = 0.006;   ///< of the held-out loss that the model so far leaves
+  double gain_floor = 0.006;  ///< of the held-out loss that the model so far leaves
   /// By this share of its size (one sigma) a cause's true shape differs from its column; beside a large one that
   /// looks like a small cause of another kind.
   double shape_error = 0.0;
   double generic_gain_floor = 0.015;  ///< a free curve has more ways to follow noise
-  double t_enter = 1.5;        ///< paired over blocks
-  std::size_t far_group = 3;   ///< blocks held out together for causes in time: noise may be slow
-  double z_far = 3.5;          ///< ... and the z they must keep then
-  double gain_large = 0.25;    ///< what takes away that much of the loss is there ...
-  double z_large = 3.0;        ///< ... even if its shape fits badly, as a walk's does
-  double gain_far = 0.15;      ///< slow noise never takes away that much: no need to last
-  double z_wander = 2.5;       ///< of a free curve in time beside a slip or drift of its joint
+  double t_enter = 1.5;               ///< paired over blocks
+  std::size_t far_group = 3;          ///< blocks held out together for causes in time: noise may be slow
+  double z_far = 3.5;                 ///< ... and the z they must keep then
+  double gain_large = 0.25;           ///< what takes away that much of the loss is there ...
+  double z_large = 3.0;               ///< ... even if its shape fits badly, as a walk's does
+  double gain_far = 0.15;             ///< slow noise never takes away that much: no need to last
+  double z_wander = 2.5;              ///< of a free curve in time beside a slip or drift of its joint
   /// A cause that has less of its own than this beside another (square, of itself) differs from it
   /// by no more than encoder noise: what tells them apart is not the cause.
   double alike = 1e-4;
-  double z_same = 2.8;         ///< below it a cause counts as explained away by another
-  double t_same = 2.0;         ///< an alternative worse by more than this is not in the class
-  double least_worse = 1e-3;   ///< ... provided the loss grows by this share of the baseline's
-  double t_generic = 2.0;      ///< a generic feature must beat named causes by this much
+  double z_same = 2.8;        ///< below it a cause counts as explained away by another
+  double t_same = 2.0;        ///< an alternative worse by more than this is not in the class
+  double least_worse = 1e-3;  ///< ... provided the loss grows by this share of the baseline's
+  double t_generic = 2.0;     ///< a generic feature must beat named causes by this much
   int max_causes = 6;
   /// Many small errors may live together where so many causes were found, or several of which the largest is below
   /// Candidate::detectable, or where all others together, each a little, would still take away held-out loss (paired
@@ -86,7 +86,7 @@ struct CandidateScore {
   /// Held-out loss it takes away, as a share of the baseline's; of a selected cause, of the loss of the
   /// baseline without nuisances that are selected.
   double gain = 0.0;
-  double t = 0.0;     ///< the same over its standard error between blocks
+  double t = 0.0;  ///< the same over its standard error between blocks
   bool testable = true;
 };
 
@@ -94,20 +94,20 @@ struct SelectedCause {
   std::size_t candidate = 0;
   CandidateScore score;
   std::vector<std::size_t> same;  ///< other candidates that this log cannot tell apart from it
-  bool wanders = false;  ///< a slip or drift whose joint also moves otherwise over time
+  bool wanders = false;           ///< a slip or drift whose joint also moves otherwise over time
 };
 
 struct Selection {
   std::vector<SelectedCause> causes;
-  std::vector<std::size_t> model;  ///< candidates in the final fit: nuisances, then causes
+  std::vector<std::size_t> model;            ///< candidates in the final fit: nuisances, then causes
   std::vector<CandidateScore> first_scores;  ///< all candidates against the baseline
   std::vector<CandidateScore> last_scores;   ///< all candidates against the final model
   std::vector<std::size_t> not_testable;     ///< candidates without independent information
   /// Held-out loss, as a share of the baseline's, that all other causes together would take away,
   /// each a little: small errors that live together. With its paired t.
   double rest_gain = 0.0, rest_t = 0.0;
-  bool crowded = false;            ///< many small errors live together, and not only in theory
-  double gain_floor = 0.0;         ///< the least gain that was asked of a cause, but for a crowd
+  bool crowded = false;                  ///< many small errors live together, and not only in theory
+  double gain_floor = 0.0;               ///< the least gain that was asked of a cause, but for a crowd
   std::vector<SelectedCause> set_aside;  ///< causes that did not stand out from the crowd
 };
 
@@ -116,7 +116,6 @@ struct Selection {
 /// Throws DataError saying what to record where even the baseline cannot be fitted.
 /// @param always  columns of the baseline that are not candidates (joint offsets)
 Selection select_causes(const BlockStatistics& statistics, const Columns& always,
-                        const std::vector<Candidate>& candidates,
-                        const SelectionOptions& options = {});
+                        const std::vector<Candidate>& candidates, const SelectionOptions& options = {});
 
 }  // namespace bodyschema

@@ -23,8 +23,8 @@ struct TrialRobot {
 /// A fault hidden in a synthetic log. Values are in the units of the catalogue (deg, mm, ms, %, px,
 /// kg, deg/Nm).
 struct TrialFault {
-  CauseName cause;      ///< of the catalogue, or outside it: wobble, velocity_lag,
-                        ///< acceleration_lag, local_kink, random_walk
+  CauseName cause;  ///< of the catalogue, or outside it: wobble, velocity_lag,
+                    ///< acceleration_lag, local_kink, random_walk
   double value = 0.0;
   double second = 0.0;  ///< cosine of eccentricity, second tilt, cy of a principal point, y of
                         ///< a base shift; time share of a slip, period of a wobble in s
@@ -32,13 +32,13 @@ struct TrialFault {
 };
 
 struct TrialOptions {
-  double duration_s = 60.0;     ///< of which a sixth is a rest
-  double picture_rate_hz = 5.0; ///< instants per second, two pictures each
-  int points = 100;             ///< outline points a picture
+  double duration_s = 60.0;      ///< of which a sixth is a rest
+  double picture_rate_hz = 5.0;  ///< instants per second, two pictures each
+  int points = 100;              ///< outline points a picture
   bool noise_burst = false;
-  double mesh_pattern_px = 0.0;   ///< sd of a residual that stays with each point of the surface
+  double mesh_pattern_px = 0.0;      ///< sd of a residual that stays with each point of the surface
   double noise_correlation_s = 0.0;  ///< of the shared noise; 0: drawn between 0.1 and 0.35 s
-  bool one_way = false;           ///< one long move, never turning back
+  bool one_way = false;              ///< one long move, never turning back
   std::vector<std::string> frozen_joints;
   /// Joints of which the second only moves with the first, half as far; empty: none.
   std::pair<std::string, std::string> locked;
@@ -54,8 +54,7 @@ class SyntheticMeasurement : public MeasurementSource {
   /// What the arm's joints really were, minus the encoders, rad: views x arm joints.
   [[nodiscard]] virtual const Eigen::MatrixXd& true_corrections() const = 0;
 };
-std::unique_ptr<SyntheticMeasurement> make_synthetic_log(const TrialRobot& robot,
-                                                      const TrialOptions& options,
-                                                      std::uint64_t seed);
+std::unique_ptr<SyntheticMeasurement> make_synthetic_log(const TrialRobot& robot, const TrialOptions& options,
+                                                         std::uint64_t seed);
 
 }  // namespace bodyschema

@@ -15,8 +15,8 @@ namespace bodyschema {
 
 /// The rows of the table in docs/diagnose.md.
 enum class TrialRow { kNull, kBackground, kSingle, kLimit, kTwo, kOutside, kOutsideHard };
-inline constexpr std::array<const char*, 7> kTrialRowNames = {
-    "null", "background", "single", "limit", "two", "outside", "outside_hard"};
+inline constexpr std::array<const char*, 7> kTrialRowNames = {"null", "background", "single",      "limit",
+                                                              "two",  "outside",    "outside_hard"};
 inline constexpr std::size_t kTrialRows = kTrialRowNames.size();
 /// Logs per row.
 using TrialCounts = std::array<int, kTrialRows>;
@@ -27,8 +27,7 @@ TrialCounts trial_counts(int singles);
 std::vector<TrialFault> trial_faults(const TrialRobot& robot, bool outside_catalogue);
 /// The log of one row with hidden faults drawn from a seed. Every second null log has a burst of
 /// noise, by its `number` in the row.
-TrialOptions draw_trial(const TrialRobot& robot, TrialRow row, std::uint64_t seed,
-                        std::size_t number);
+TrialOptions draw_trial(const TrialRobot& robot, TrialRow row, std::uint64_t seed, std::size_t number);
 
 /// A log with hidden faults, diagnosed without their knowledge.
 class TrialLog {
@@ -41,8 +40,7 @@ class TrialLog {
   virtual const Eigen::MatrixXd* true_corrections() const { return nullptr; }
 };
 /// Makes logs; called from several threads.
-using TrialLogMaker =
-    std::function<std::unique_ptr<TrialLog>(const TrialOptions& options, std::uint64_t seed)>;
+using TrialLogMaker = std::function<std::unique_ptr<TrialLog>(const TrialOptions& options, std::uint64_t seed)>;
 /// Logs at the level of silhouettes (SyntheticMeasurement).
 TrialLogMaker silhouette_logs(const TrialRobot& robot);
 
@@ -63,8 +61,7 @@ struct TrialOutcome {
 /// Runs trials of all rows on `threads` threads; results do not depend on their number. `each` is
 /// called for every finished trial, in order.
 std::vector<TrialOutcome> run_diagnosis_trials(
-    const TrialRobot& robot, const TrialCounts& counts, std::uint64_t seed, int threads,
-    const TrialLogMaker& make_log,
+    const TrialRobot& robot, const TrialCounts& counts, std::uint64_t seed, int threads, const TrialLogMaker& make_log,
     const std::function<void(const TrialOutcome&, std::size_t done, std::size_t total)>& each = {});
 
 /// The rates of the table in docs/diagnose.md. A rate without trials is NaN.

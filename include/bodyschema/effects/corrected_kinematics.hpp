@@ -26,8 +26,8 @@ class CorrectedKinematics {
   /// @param q  encoder readings (plus a particle's own correction, where there is one), radians
   /// @param corrections  `dq` is added to q, joint adjustments and the camera's shift are applied
   /// @param X_CB  out, one per link
-  void compute(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
-               std::size_t camera, std::span<Pose> X_CB);
+  void compute(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera,
+               std::span<Pose> X_CB);
 
   /// Pose of the camera in the root frame at the last `compute`, with its and the base's shift.
   [[nodiscard]] const Pose& X_WC() const { return X_WC_; }

@@ -21,8 +21,8 @@ struct EffectParameter {
   std::string unit;          ///< "deg/Nm"
   double si_per_unit = 1.0;  ///< value_si = value_in_unit * si_per_unit
   double value = 0.0;        ///< SI
-  bool fitted = true;    ///< false: a setting (a time, a reference), not estimated by least squares
-  double typical = 0.0;  ///< SI; a plausible size, the step of secants and the scale of columns
+  bool fitted = true;        ///< false: a setting (a time, a reference), not estimated by least squares
+  double typical = 0.0;      ///< SI; a plausible size, the step of secants and the scale of columns
   [[nodiscard]] double in_unit() const { return value / si_per_unit; }
 };
 
@@ -47,8 +47,7 @@ struct JointRoles {
   /// Fingers are the joints that turn a rendered link but not the hand's frame, about an axis within 45
   /// deg of their finger's last one: joints that spread the fingers, oppose the thumb or slide are none.
   /// Throws ConfigurationError naming the nearest joint.
-  static JointRoles of(std::shared_ptr<const RobotModel> model, const RobotSetup& setup,
-                       const StereoRig& rig);
+  static JointRoles of(std::shared_ptr<const RobotModel> model, const RobotSetup& setup, const StereoRig& rig);
   [[nodiscard]] bool has_pans() const { return left_pan >= 0 && right_pan >= 0; }
   /// Throws ConfigurationError naming the nearest joint.
   [[nodiscard]] Eigen::Index index(const std::string& name) const;

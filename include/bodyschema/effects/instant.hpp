@@ -35,8 +35,8 @@ class InstantBuilder {
 
   /// Sets the acceleration to zero; who knows it fills it in.
   /// @param offsets  believed joint offsets (encoder = true + offset), radians, RobotModel order
-  void build(const JointSample& sample, std::size_t camera,
-             const Eigen::Ref<const Eigen::VectorXd>& offsets, Instant& out);
+  void build(const JointSample& sample, std::size_t camera, const Eigen::Ref<const Eigen::VectorXd>& offsets,
+             Instant& out);
 
  private:
   std::shared_ptr<const RobotModel> model_;

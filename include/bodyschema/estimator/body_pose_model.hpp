@@ -27,8 +27,8 @@ namespace bodyschema {
 class BodyPoseModel {
  public:
   /// Throws ConfigurationError when a link of the set-up or rig does not exist.
-  BodyPoseModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
-                const StereoRig& rig, std::vector<Parameter> parameters);
+  BodyPoseModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                std::vector<Parameter> parameters);
 
   [[nodiscard]] std::span<const Parameter> parameters() const { return parameters_; }
   [[nodiscard]] std::size_t part_count() const { return part_count_; }
@@ -37,15 +37,13 @@ class BodyPoseModel {
   /// @param at  encoder readings at the camera's exposure, and what is known beyond them
   /// @param x  state, one value per parameter
   /// @param X_CB  out, one transform per part
-  void compute(const Exposure& at, const Eigen::VectorXd& x, std::size_t camera,
-               std::span<Eigen::Isometry3f> X_CB);
+  void compute(const Exposure& at, const Eigen::VectorXd& x, std::size_t camera, std::span<Eigen::Isometry3f> X_CB);
 
   /// Pose of the hand base in a camera, metres, with the state's joint and vergence corrections
   /// (size and intrinsics corrections change the picture, not where the hand is).
   [[nodiscard]] Pose hand_pose(const Exposure& at, const Eigen::VectorXd& x, std::size_t camera);
   /// Positions of the fingertips in a camera, metres.
-  void fingertips(const Exposure& at, const Eigen::VectorXd& x, std::size_t camera,
-                  std::vector<Eigen::Vector3d>& p_C);
+  void fingertips(const Exposure& at, const Eigen::VectorXd& x, std::size_t camera, std::vector<Eigen::Vector3d>& p_C);
 
  private:
   void evaluate(const Exposure& at, const Eigen::VectorXd& x, std::size_t camera);

@@ -13,8 +13,8 @@
 namespace bodyschema {
 
 struct ContourAlignmentOptions {
-  float spacing_px = 3.0f;    ///< along the outline
-  double huber_px = 1.0;      ///< residuals beyond this count linearly, not squared
+  float spacing_px = 3.0f;  ///< along the outline
+  double huber_px = 1.0;    ///< residuals beyond this count linearly, not squared
 };
 
 /// The picture's evidence about the state near one point of it, as a quadratic in pixels:
@@ -22,9 +22,9 @@ struct ContourAlignmentOptions {
 struct ContourEvidence {
   Eigen::MatrixXd A;
   Eigen::VectorXd b;
-  double cost = 0.0;         ///< sum of robust squared residuals, px^2
-  std::size_t matched = 0;   ///< outline points that found an observed edge
-  std::size_t sampled = 0;   ///< outline points that were looked at
+  double cost = 0.0;        ///< sum of robust squared residuals, px^2
+  std::size_t matched = 0;  ///< outline points that found an observed edge
+  std::size_t sampled = 0;  ///< outline points that were looked at
   /// Root mean square of the matched residuals, px.
   [[nodiscard]] double rms_px() const;
   [[nodiscard]] double matched_share() const;
@@ -40,18 +40,16 @@ struct ContourEvidence {
 /// surface points do. One per thread; allocates nothing once warm.
 class ContourAlignment {
  public:
-  ContourAlignment(BodyPoseModel& body, const SilhouetteModel& silhouettes,
-                   std::span<const PinholeIntrinsics> cameras,
+  ContourAlignment(BodyPoseModel& body, const SilhouetteModel& silhouettes, std::span<const PinholeIntrinsics> cameras,
                    const ContourAlignmentOptions& options);
 
   /// Adds every present camera's evidence about the state near `x`.
   /// @param search_px  how far along the normal an edge is looked for
-  void linearise(const Observation& observation, const Eigen::VectorXd& x, double search_px,
-                 ContourEvidence& evidence);
+  void linearise(const Observation& observation, const Eigen::VectorXd& x, double search_px, ContourEvidence& evidence);
 
  private:
-  void add_camera(const CameraObservation& seen, const Eigen::VectorXd& x, std::size_t camera,
-                  double search_px, ContourEvidence& evidence);
+  void add_camera(const CameraObservation& seen, const Eigen::VectorXd& x, std::size_t camera, double search_px,
+                  ContourEvidence& evidence);
 
   BodyPoseModel& body_;
   ContourExtractor extractor_;

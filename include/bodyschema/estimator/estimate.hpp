@@ -15,10 +15,10 @@ namespace bodyschema {
 /// What the estimator is doing; `to_string` gives the name used in messages and files.
 enum class EstimatorState {
   kLearningBackground,  ///< no masks yet: the background is being learned
-  kHandNotInView,  ///< the observed silhouette is empty: no update, the last offsets are kept
-  kConverging,     ///< updating, not yet to be relied on
-  kConverged,      ///< pictures fit, `hand_sd_m` is small; mode paper: the spread is at its smallest, no more
-  kDiverged,       ///< the best prediction no longer fits the pictures; searching again
+  kHandNotInView,       ///< the observed silhouette is empty: no update, the last offsets are kept
+  kConverging,          ///< updating, not yet to be relied on
+  kConverged,           ///< pictures fit, `hand_sd_m` is small; mode paper: the spread is at its smallest, no more
+  kDiverged,            ///< the best prediction no longer fits the pictures; searching again
 };
 const char* to_string(EstimatorState state);
 
@@ -46,14 +46,14 @@ struct Estimate {
   double best_likelihood = 0.0;             ///< 1 - Hammoude distance of the estimate, both images
   double contour_rms_px = 0.0;              ///< outline residual, 0 when not computed
   WeakestDirection weakest;
-  double hand_sd_m = 0.0;                   ///< hand base in the eye frame: root of the summed variances of x, y, z
-  std::string stalled_joint;                ///< its encoder stands although the pictures show it move;
-                                            ///< empty: none. The state is never kConverged then
-  double stalled_motion_rad = 0.0;          ///< how far it has been seen to move
-  bool cameras_swapped = false;             ///< the left picture shows what the right eye sees and the other way
-                                            ///< round; nothing is learned from them, state kDiverged. Mode best
-  std::vector<Pose> X_CP;                   ///< hand base in each camera of the rig, corrected
-  std::vector<Pose> X_CP_nominal;           ///< the same with encoders and model as they are
+  double hand_sd_m = 0.0;           ///< hand base in the eye frame: root of the summed variances of x, y, z
+  std::string stalled_joint;        ///< its encoder stands although the pictures show it move;
+                                    ///< empty: none. The state is never kConverged then
+  double stalled_motion_rad = 0.0;  ///< how far it has been seen to move
+  bool cameras_swapped = false;     ///< the left picture shows what the right eye sees and the other way
+                                    ///< round; nothing is learned from them, state kDiverged. Mode best
+  std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected
+  std::vector<Pose> X_CP_nominal;   ///< the same with encoders and model as they are
   StageTimes times;
 };
 

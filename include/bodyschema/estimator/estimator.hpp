@@ -36,17 +36,14 @@ class Estimator {
 
   /// Likelihood 1 - d (equation 4) of joint offsets, one hypothesis per column, all else nominal.
   /// Zero where the hand is not in view. Leaves the estimate as it is.
-  [[nodiscard]] Eigen::VectorXd likelihood(const Observation& observation,
-                                           const Eigen::MatrixXd& offsets_rad);
+  [[nodiscard]] Eigen::VectorXd likelihood(const Observation& observation, const Eigen::MatrixXd& offsets_rad);
   /// Outline of the robot predicted with a set of corrections, for overlays.
   /// @param corrected  with the current estimate and the observation's known corrections, otherwise
   ///   with the encoders and the model as they are
-  [[nodiscard]] BinaryMask predicted_silhouette(const Observation& observation,
-                                                std::size_t camera, bool corrected);
+  [[nodiscard]] BinaryMask predicted_silhouette(const Observation& observation, std::size_t camera, bool corrected);
   /// Where the model puts hand and fingertips; `corrected` as above.
   [[nodiscard]] Pose hand_pose(const Exposure& at, std::size_t camera, bool corrected);
-  [[nodiscard]] std::vector<Eigen::Vector3d> fingertips(const Exposure& at, std::size_t camera,
-                                                        bool corrected);
+  [[nodiscard]] std::vector<Eigen::Vector3d> fingertips(const Exposure& at, std::size_t camera, bool corrected);
   [[nodiscard]] std::string engine_description() const;
 
  private:

@@ -33,16 +33,16 @@ struct EstimatorOptions {
   SilhouetteOptions silhouette;
   ContourAlignmentOptions contour;
   NuisancePriors priors;
-  double temperature = 0.02;         ///< best: weight = exp(-(d - d_min) / temperature)
-  bool refine_outline = true;        ///< best: without it the estimate is one of the particles
-  double residual_sd_px = 0.5;       ///< best: sd of one outline residual, correlation included
-  double encoder_sd_rad = 0.0006;    ///< best: one encoder reading's noise and rounding
-  double correlated_frames = 6.0;    ///< best: neighbouring frames that err alike count as one
-  double memory_frames = 300.0;      ///< best: frames after which a picture counts 1/e
-  double lock_distance = 0.15;       ///< best: Hammoude distance below which frames are fused
-  double lock_rms_px = 1.5;          ///< best: outline residual below which frames are fused
-  double converged_hand_sd_m = 1e-3; ///< best: state `converged` below this; as Estimate::hand_sd_m
-  std::size_t min_mask_px = 150;     ///< fewer observed pixels in all: hand not in view
+  double temperature = 0.02;          ///< best: weight = exp(-(d - d_min) / temperature)
+  bool refine_outline = true;         ///< best: without it the estimate is one of the particles
+  double residual_sd_px = 0.5;        ///< best: sd of one outline residual, correlation included
+  double encoder_sd_rad = 0.0006;     ///< best: one encoder reading's noise and rounding
+  double correlated_frames = 6.0;     ///< best: neighbouring frames that err alike count as one
+  double memory_frames = 300.0;       ///< best: frames after which a picture counts 1/e
+  double lock_distance = 0.15;        ///< best: Hammoude distance below which frames are fused
+  double lock_rms_px = 1.5;           ///< best: outline residual below which frames are fused
+  double converged_hand_sd_m = 1e-3;  ///< best: state `converged` below this; as Estimate::hand_sd_m
+  std::size_t min_mask_px = 150;      ///< fewer observed pixels in all: hand not in view
 
   /// Reads the sections `estimator`, `filter` and `silhouette`. Throws ConfigurationError.
   static EstimatorOptions from(const Configuration& configuration);

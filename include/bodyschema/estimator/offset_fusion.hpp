@@ -25,8 +25,7 @@ class OffsetFusion {
   /// frame's own encoder error is integrated out: however sharp a picture, it says no more about an
   /// offset than the encoder reading it is compared with.
   /// @param share  of the frame's say that is its own: 1 / number of frames that err alike
-  void add(const ContourEvidence& evidence, const Eigen::VectorXd& x0, double variance_px2,
-           double share);
+  void add(const ContourEvidence& evidence, const Eigen::VectorXd& x0, double variance_px2, double share);
 
   /// The state in one frame: the fused one plus that frame's encoder error, given the frame's
   /// evidence at x0. What the hand's pose follows from.
@@ -40,8 +39,8 @@ class OffsetFusion {
   [[nodiscard]] FrameState frame_state() const;
 
   /// Solves for the best state given everything fused plus one more frame's evidence at x0.
-  [[nodiscard]] Eigen::VectorXd solve_with(const ContourEvidence& evidence,
-                                           const Eigen::VectorXd& x0, double variance_px2) const;
+  [[nodiscard]] Eigen::VectorXd solve_with(const ContourEvidence& evidence, const Eigen::VectorXd& x0,
+                                           double variance_px2) const;
   [[nodiscard]] Eigen::VectorXd mean() const;
   [[nodiscard]] Eigen::MatrixXd covariance() const;
   [[nodiscard]] double frames() const { return frames_; }

@@ -41,8 +41,7 @@ struct Parameter {
 /// What an estimator with these options estimates: the offsets of the arm's joints and, in mode best,
 /// every nuisance whose prior is not zero. Of the head's joints those that move all cameras; one that
 /// turns one eye alone is the vergence.
-std::vector<Parameter> estimated_parameters(const std::shared_ptr<const RobotModel>& robot,
-                                            const RobotSetup& setup, const StereoRig& rig,
-                                            const EstimatorOptions& options);
+std::vector<Parameter> estimated_parameters(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                                            const StereoRig& rig, const EstimatorOptions& options);
 
 }  // namespace bodyschema

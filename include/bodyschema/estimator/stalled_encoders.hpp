@@ -45,12 +45,14 @@ class StalledEncoders {
   /// The joint that stalls, -1 if none; of several, the one seen to move most.
   [[nodiscard]] Eigen::Index joint() const { return joint_; }
   /// How far it has been seen to move under its reading, to and fro added up, radians.
-  [[nodiscard]] double moved_rad() const { return joint_ < 0 ? 0.0 : tracks_[static_cast<std::size_t>(joint_)].moved_rad; }
+  [[nodiscard]] double moved_rad() const {
+    return joint_ < 0 ? 0.0 : tracks_[static_cast<std::size_t>(joint_)].moved_rad;
+  }
 
  private:
-  static constexpr std::size_t kRecent = 30;    ///< frames
-  static constexpr std::size_t kBriefly = 5;    ///< frames; enough where a memory was dropped besides
-  static constexpr std::size_t kTaught = 300;   ///< frames for which a dropped memory casts doubt on the next
+  static constexpr std::size_t kRecent = 30;   ///< frames
+  static constexpr std::size_t kBriefly = 5;   ///< frames; enough where a memory was dropped besides
+  static constexpr std::size_t kTaught = 300;  ///< frames for which a dropped memory casts doubt on the next
   /// Since the reading last changed.
   struct Track {
     double reading_rad = 0.0;
@@ -64,10 +66,10 @@ class StalledEncoders {
     double moved_rad = 0.0;
     std::array<double, kRecent> recent_rad{};  ///< settled offsets, round and round
     std::size_t recent = 0;                    ///< how many there were
-    double since_s = 0.0;             ///< the first frame with this reading
-    double step_rad_s = 0.0;          ///< from the reading before to this one
-    double deceleration_rad_s2 = 0.0; ///< from step to step, 0 while it gets faster
-    double run_rad = 0.0;             ///< of all steps the same way
+    double since_s = 0.0;                      ///< the first frame with this reading
+    double step_rad_s = 0.0;                   ///< from the reading before to this one
+    double deceleration_rad_s2 = 0.0;          ///< from step to step, 0 while it gets faster
+    double run_rad = 0.0;                      ///< of all steps the same way
     [[nodiscard]] bool moved_to(double reading_rad) const;
     /// What follows upon it.
     [[nodiscard]] Track moved_on(double time_s, double reading_rad) const;
@@ -78,8 +80,8 @@ class StalledEncoders {
   Eigen::VectorXd drift_rad_;
   bool doubtful_ = false;
   bool dropped_while_standing_ = false;
-  bool began_ = false;                        ///< there has been a frame
-  bool remembered_ = false;                   ///< there has been a memory
+  bool began_ = false;       ///< there has been a frame
+  bool remembered_ = false;  ///< there has been a memory
   std::size_t frames_since_drop_ = kTaught;
   Eigen::Index joint_ = -1;
 };

@@ -18,7 +18,6 @@ struct WeakestDirection {
 /// @param covariance_rad2  of the joint offsets, as wide as `joints`
 /// @return the direction of its largest eigenvalue, the largest component positive; joints with less
 ///   than 0.3 of it are left out of the text
-WeakestDirection weakest_direction(const Eigen::MatrixXd& covariance_rad2,
-                                   const std::vector<std::string>& joints);
+WeakestDirection weakest_direction(const Eigen::MatrixXd& covariance_rad2, const std::vector<std::string>& joints);
 
 }  // namespace bodyschema

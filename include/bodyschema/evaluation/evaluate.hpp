@@ -12,10 +12,10 @@ namespace bodyschema {
 struct EvaluationOptions {
   /// "paper" (experiment 1 with the published filter), one experiment by name, or "all".
   std::string experiment = "all";
-  std::filesystem::path out;         ///< folder for summary.json and report.html, created
+  std::filesystem::path out;  ///< folder for summary.json and report.html, created
   int trials = 30;
   std::uint64_t seed = 7;
-  int threads = 0;                   ///< trials run side by side; 0: one per core
+  int threads = 0;  ///< trials run side by side; 0: one per core
   /// The recording eyehand-sim and the official models; experiments that need them are skipped
   /// where the folder is absent.
   std::filesystem::path data;

@@ -14,9 +14,9 @@ namespace bodyschema {
 
 /// One way of estimating, run beside others on the same simulated pictures.
 struct Contestant {
-  std::string name;             ///< "best.stereo", "paper.mono", ...
+  std::string name;  ///< "best.stereo", "paper.mono", ...
   EstimatorOptions options;
-  bool mono = false;            ///< left camera only
+  bool mono = false;  ///< left camera only
 };
 
 /// What one contestant did with one frame.
@@ -48,17 +48,16 @@ struct TrialRecord {
 
 /// The robot, rig, segmentation and simulator settings shared by the trials of one experiment.
 struct TrialSetting {
-  Configuration estimator;                ///< complete estimator configuration
+  Configuration estimator;  ///< complete estimator configuration
   simulator::SimulatorSettings simulator;
-  simulator::SimulationPlan plan;         ///< its seed is replaced by the trial's
+  simulator::SimulationPlan plan;  ///< its seed is replaced by the trial's
   /// Called with each contestant after each frame of the motion, counted from 0.
-  std::function<void(Estimator& estimator, const Observation& observation, const TrialRecord& trial,
-                     int frame)>
+  std::function<void(Estimator& estimator, const Observation& observation, const TrialRecord& trial, int frame)>
       on_frame{};
   /// Called with each contestant when its last frame is done: what a robot would do with the result.
   /// @param q  encoder readings of the left camera's last picture
-  std::function<void(Estimator& estimator, const RobotModel& robot, const Eigen::VectorXd& q,
-                     TrialRecord& trial, std::size_t contestant)>
+  std::function<void(Estimator& estimator, const RobotModel& robot, const Eigen::VectorXd& q, TrialRecord& trial,
+                     std::size_t contestant)>
       on_end{};
 };
 
@@ -66,7 +65,7 @@ struct TrialSetting {
 /// frames before the arm comes in), and lets every contestant estimate. Truth is only used for the
 /// errors. Contestant seeds derive from `seed`.
 /// @param progress  called at each frame with the share of the trial that is done; may be empty
-TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>& contestants,
-                      std::uint64_t seed, const std::function<void(double)>& progress = {});
+TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>& contestants, std::uint64_t seed,
+                      const std::function<void(double)>& progress = {});
 
 }  // namespace bodyschema

@@ -14,6 +14,8 @@ constexpr double hammoude_distance(std::uint64_t union_count, std::uint64_t inte
 }
 
 /// Image likelihood up to a factor, equation (4): 1 - d.
-constexpr double hammoude_likelihood(double distance) { return 1.0 - distance; }
+constexpr double hammoude_likelihood(double distance) {
+  return 1.0 - distance;
+}
 
 }  // namespace bodyschema

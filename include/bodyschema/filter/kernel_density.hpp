@@ -16,11 +16,10 @@ double kernel(double squared_distance_deg2, double sd_deg, Eigen::Index dimensio
 /// @param kde  out, one per particle
 /// Pairs further apart than `kCutoffSd` standard deviations contribute less than 1e-10 of the peak
 /// and are skipped.
-void kernel_density(const Eigen::MatrixXd& states_rad, const Eigen::VectorXd& likelihood,
-                    double sd_deg, Eigen::VectorXd& kde);
+void kernel_density(const Eigen::MatrixXd& states_rad, const Eigen::VectorXd& likelihood, double sd_deg,
+                    Eigen::VectorXd& kde);
 
 /// The particle with the largest W_i = L_i + alpha KDE_i, equation (5).
-Eigen::Index densest_particle(const Eigen::VectorXd& likelihood, const Eigen::VectorXd& kde,
-                              double alpha);
+Eigen::Index densest_particle(const Eigen::VectorXd& likelihood, const Eigen::VectorXd& kde, double alpha);
 
 }  // namespace bodyschema

@@ -55,7 +55,6 @@ std::vector<FleetRobot> gather_fleet(const std::filesystem::path& results);
 
 /// Writes one page for people (report.html) and the same for programs (fleet.json) into `out`.
 /// Returns a line per robot. Throws FileError.
-std::string write_fleet_report(const std::vector<FleetRobot>& robots,
-                               const std::filesystem::path& out);
+std::string write_fleet_report(const std::vector<FleetRobot>& robots, const std::filesystem::path& out);
 
 }  // namespace bodyschema

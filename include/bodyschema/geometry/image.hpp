@@ -21,12 +21,12 @@ struct Image {
 
   [[nodiscard]] bool empty() const { return data.empty(); }
   [[nodiscard]] const std::uint8_t* pixel(int u, int v) const {
-    return data.data() + (static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
-                          static_cast<std::size_t>(u)) * static_cast<std::size_t>(channels);
+    return data.data() + (static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u)) *
+                             static_cast<std::size_t>(channels);
   }
   [[nodiscard]] std::uint8_t* pixel(int u, int v) {
-    return data.data() + (static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
-                          static_cast<std::size_t>(u)) * static_cast<std::size_t>(channels);
+    return data.data() + (static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u)) *
+                             static_cast<std::size_t>(channels);
   }
 };
 

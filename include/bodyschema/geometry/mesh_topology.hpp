@@ -21,11 +21,11 @@ namespace bodyschema {
 /// are matched in pairs.
 struct MeshTopology {
   struct Edge {
-    std::uint32_t from, to;        ///< vertices; triangle `left` runs from -> to
-    std::uint32_t left, right;     ///< triangles; `right` runs to -> from
+    std::uint32_t from, to;     ///< vertices; triangle `left` runs from -> to
+    std::uint32_t left, right;  ///< triangles; `right` runs to -> from
   };
   struct OpenEdge {
-    std::uint32_t from, to;        ///< vertices in the order of the triangle
+    std::uint32_t from, to;  ///< vertices in the order of the triangle
     std::uint32_t triangle;
   };
 
@@ -33,8 +33,8 @@ struct MeshTopology {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<Edge> edges;
   std::vector<OpenEdge> open_edges;
-  std::vector<std::uint32_t> component;   ///< per triangle: its connected surface
-  std::vector<bool> component_closed;     ///< per component: no open edge
+  std::vector<std::uint32_t> component;  ///< per triangle: its connected surface
+  std::vector<bool> component_closed;    ///< per component: no open edge
 
   [[nodiscard]] bool closed() const { return open_edges.empty(); }
 };
@@ -70,8 +70,7 @@ inline MeshTopology build_topology(const TriangleMesh& mesh) {
     welded[order[i]] = static_cast<std::uint32_t>(topology.vertices.size()) - 1;
   }
   for (const auto& triangle : mesh.triangles) {
-    const std::array<std::uint32_t, 3> t{welded[triangle[0]], welded[triangle[1]],
-                                         welded[triangle[2]]};
+    const std::array<std::uint32_t, 3> t{welded[triangle[0]], welded[triangle[1]], welded[triangle[2]]};
     if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) topology.triangles.push_back(t);
   }
 
@@ -100,8 +99,7 @@ inline MeshTopology build_topology(const TriangleMesh& mesh) {
   for (std::size_t begin = 0; begin < halves.size();) {
     std::size_t end = begin;
     std::size_t middle = begin;  // first descending half-edge of the group
-    while (end < halves.size() && halves[end].low == halves[begin].low &&
-           halves[end].high == halves[begin].high) {
+    while (end < halves.size() && halves[end].low == halves[begin].low && halves[end].high == halves[begin].high) {
       if (halves[end].ascending) middle = end + 1;
       const auto a = detail::find_root(parent, halves[begin].triangle);
       const auto b = detail::find_root(parent, halves[end].triangle);
@@ -111,8 +109,7 @@ inline MeshTopology build_topology(const TriangleMesh& mesh) {
     std::size_t up = begin;
     std::size_t down = middle;
     for (; up < middle && down < end; ++up, ++down) {
-      topology.edges.push_back({halves[up].low, halves[up].high, halves[up].triangle,
-                                halves[down].triangle});
+      topology.edges.push_back({halves[up].low, halves[up].high, halves[up].triangle, halves[down].triangle});
     }
     for (; up < middle; ++up) {
       topology.open_edges.push_back({halves[up].low, halves[up].high, halves[up].triangle});

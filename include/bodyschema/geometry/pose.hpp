@@ -27,7 +27,11 @@ inline double rotation_distance(const Eigen::Matrix3d& R_a, const Eigen::Matrix3
 }
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double radians(double degrees) { return degrees * (kPi / 180.0); }
-constexpr double degrees(double radians) { return radians * (180.0 / kPi); }
+constexpr double radians(double degrees) {
+  return degrees * (kPi / 180.0);
+}
+constexpr double degrees(double radians) {
+  return radians * (180.0 / kPi);
+}
 
 }  // namespace bodyschema

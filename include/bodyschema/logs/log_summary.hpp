@@ -12,8 +12,8 @@ namespace bodyschema {
 /// How regularly something came: from its own stamps where it has some, else from the log's.
 struct Regularity {
   std::uint64_t count = 0;
-  double rate_hz = 0.0;    ///< over the time between the first and the last; 0 for fewer than two
-  std::uint64_t gaps = 0;  ///< intervals of more than three times the usual (median) one
+  double rate_hz = 0.0;         ///< over the time between the first and the last; 0 for fewer than two
+  std::uint64_t gaps = 0;       ///< intervals of more than three times the usual (median) one
   double longest_gap_s = 0.0;   ///< longest interval of all
   std::uint64_t backwards = 0;  ///< stamps before the one before
 };
@@ -57,14 +57,13 @@ struct LogSummary {
   std::uint64_t bytes = 0;
   std::uint64_t messages = 0;
   std::uint64_t damaged_places = 0;
-  Microseconds begin = 0;                ///< arrival of the first message, us since the Unix epoch
-  double duration_s = 0.0;               ///< between the first and the last message
-  std::vector<ChannelSummary> channels;  ///< by name
-  std::vector<PicturesSummary>
-      pictures;  ///< by channel and camera; one entry per size and encoding
+  Microseconds begin = 0;                 ///< arrival of the first message, us since the Unix epoch
+  double duration_s = 0.0;                ///< between the first and the last message
+  std::vector<ChannelSummary> channels;   ///< by name
+  std::vector<PicturesSummary> pictures;  ///< by channel and camera; one entry per size and encoding
   std::vector<std::string> joint_channels;
   std::vector<EncodersSummary> encoders;  ///< in the order of their first appearance
-  std::vector<JointMotion> joints;  ///< in the order of their first appearance
+  std::vector<JointMotion> joints;        ///< in the order of their first appearance
 
   /// For people.
   [[nodiscard]] std::string text() const;

@@ -15,9 +15,9 @@ struct McapExportOptions {
 
 struct McapExportSummary {
   std::map<std::string, std::uint64_t> messages;  ///< written, by topic
-  std::uint64_t unreadable = 0;  ///< messages and pictures left out because they do not decode
-  std::uint64_t unknown = 0;     ///< messages of types this project does not know, left out
-  std::uint64_t bytes = 0;       ///< of the file written
+  std::uint64_t unreadable = 0;                   ///< messages and pictures left out because they do not decode
+  std::uint64_t unknown = 0;                      ///< messages of types this project does not know, left out
+  std::uint64_t bytes = 0;                        ///< of the file written
 };
 
 /// Rewrites a log as MCAP for Foxglove and PlotJuggler: joint states, offsets and status as JSON

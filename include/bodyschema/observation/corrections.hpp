@@ -42,8 +42,7 @@ struct Corrections {
   double dilation_px = 0.0;  ///< the observed outline lies this far outside the predicted one
 
   explicit Corrections(Eigen::Index joint_count = 0)
-      : dq(Eigen::VectorXd::Zero(joint_count)),
-        adjustments(static_cast<std::size_t>(joint_count)) {}
+      : dq(Eigen::VectorXd::Zero(joint_count)), adjustments(static_cast<std::size_t>(joint_count)) {}
   /// Back to zero; allocates nothing.
   void clear() {
     dq.setZero();

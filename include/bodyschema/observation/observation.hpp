@@ -41,8 +41,7 @@ struct Exposure {
   const Eigen::VectorXd& q;                  ///< encoders, RobotModel order, radians
   const Corrections* corrections = nullptr;  ///< beyond the joint offsets; null: none
   // Implicit: encoders alone, or a picture that brings both, are an exposure.
-  Exposure(const Eigen::VectorXd& encoders, const Corrections* known = nullptr)
-      : q(encoders), corrections(known) {}
+  Exposure(const Eigen::VectorXd& encoders, const Corrections* known = nullptr) : q(encoders), corrections(known) {}
   Exposure(const CameraObservation& seen)
       : q(seen.joints.q), corrections(seen.corrections ? &*seen.corrections : nullptr) {}
 };

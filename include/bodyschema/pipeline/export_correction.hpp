@@ -15,9 +15,9 @@ namespace bodyschema {
 /// A joint that sits elsewhere than the URDF has it.
 struct JointPlacement {
   std::string joint;
-  double along_m = 0.0;                             ///< moved along its own axis
-  Eigen::Vector3d shift_m = Eigen::Vector3d::Zero(); ///< moved, parent frame
-  Eigen::Vector3d tilt = Eigen::Vector3d::Zero();   ///< its axis turned; rotation vector, parent frame
+  double along_m = 0.0;                               ///< moved along its own axis
+  Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();  ///< moved, parent frame
+  Eigen::Vector3d tilt = Eigen::Vector3d::Zero();     ///< its axis turned; rotation vector, parent frame
 };
 
 /// A result in the forms in which people apply it.
@@ -33,7 +33,7 @@ struct Correction {
   // What an extended model adds that a URDF can hold.
   std::vector<std::pair<std::string, double>> known_offsets_rad;  ///< encoder - true, by joint
   std::vector<JointPlacement> placements;
-  std::vector<std::pair<std::string, double>> camera_shifts_m;    ///< along x of the camera, by link
+  std::vector<std::pair<std::string, double>> camera_shifts_m;  ///< along x of the camera, by link
 };
 
 /// One effect of an extended model and what the exported files make of it.
@@ -50,10 +50,8 @@ Correction read_correction(const std::filesystem::path& summary, bool anyway = f
 
 /// Adds to `correction` what a URDF can hold of an extended model, and says of every effect where it
 /// went. Joint offsets are left out: those of the replay count.
-std::vector<AppliedEffect> add_extended_model(const ErrorModel& model,
-                                              const std::shared_ptr<const RobotModel>& robot,
-                                              const RobotSetup& setup, const StereoRig& rig,
-                                              Correction& correction);
+std::vector<AppliedEffect> add_extended_model(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
+                                              const RobotSetup& setup, const StereoRig& rig, Correction& correction);
 
 /// A copy of the URDF that is right when it is fed the encoders as they are: every corrected joint's
 /// origin is turned back by its offset about its axis (moved, for a sliding joint) and its limits
@@ -66,12 +64,11 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
 
 /// Writes `offsets.yaml` (by joint, deg), `corrected.urdf` and `calibration_delta.txt` (what to add
 /// to each joint's calibrationDelta in an iCub's calibrator file, deg) into `out`, head joints that
-/// were estimated included: arm and head offsets hold together. With an extended model in `setup` also `cameras.yaml` (where it changes intrinsics) and `what_was_applied.txt`:
-/// which of its effects these files hold, and which only work where the model itself is loaded.
-/// Throws as read_correction does, and ConfigurationError when the summary was made with another
-/// extended model than `setup` has. Returns warnings and files, for people.
-std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup,
-                              const StereoRig& rig, const std::filesystem::path& out,
-                              bool anyway = false);
+/// were estimated included: arm and head offsets hold together. With an extended model in `setup` also `cameras.yaml`
+/// (where it changes intrinsics) and `what_was_applied.txt`: which of its effects these files hold, and which only work
+/// where the model itself is loaded. Throws as read_correction does, and ConfigurationError when the summary was made
+/// with another extended model than `setup` has. Returns warnings and files, for people.
+std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup, const StereoRig& rig,
+                              const std::filesystem::path& out, bool anyway = false);
 
 }  // namespace bodyschema

@@ -34,8 +34,8 @@ struct OverlayNames {
 };
 
 /// Left and right side by side, enlarged, with a legend (none for an empty caption). RGB.
-Image draw_overlay(const std::vector<OverlayView>& views, const std::string& caption,
-                   int enlargement = 2, const OverlayNames& names = {});
+Image draw_overlay(const std::vector<OverlayView>& views, const std::string& caption, int enlargement = 2,
+                   const OverlayNames& names = {});
 /// Throws FileError when the picture cannot be written.
 void write_png(const std::filesystem::path& file, const Image& image);
 

@@ -10,10 +10,10 @@ namespace bodyschema {
 
 struct ReplayOptions {
   std::filesystem::path log;
-  std::filesystem::path out;                    ///< folder, created
-  std::optional<std::filesystem::path> truth;   ///< adds errors; never seen by the estimator
-  int overlays = 3;                             ///< overlay pictures spread over the log
-  bool masks = false;                           ///< write the masks beside them
+  std::filesystem::path out;                   ///< folder, created
+  std::optional<std::filesystem::path> truth;  ///< adds errors; never seen by the estimator
+  int overlays = 3;                            ///< overlay pictures spread over the log
+  bool masks = false;                          ///< write the masks beside them
   /// Learn the background (`vision.method: learned_background`) from the first pictures, as the daemon
   /// does, which cannot look ahead: with the arm in them it would be learned as background. Otherwise it
   /// is learned from all pictures of the log before the first estimate.

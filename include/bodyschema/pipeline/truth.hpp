@@ -14,8 +14,8 @@ namespace bodyschema {
 struct TruthInstant {
   Microseconds begin = 0;  ///< first and last exposure time it holds for
   Microseconds end = 0;
-  std::vector<Pose> X_CP;                      ///< hand base in each true camera
-  std::vector<Eigen::Vector3d> fingertips_P;   ///< metres, hand frame; may be empty
+  std::vector<Pose> X_CP;                     ///< hand base in each true camera
+  std::vector<Eigen::Vector3d> fingertips_P;  ///< metres, hand frame; may be empty
 };
 
 /// Ground truth of a log, read only after the estimate is made: the simulator's `--truth` file or
@@ -24,8 +24,7 @@ class Truth {
  public:
   /// @param cameras  names of the robot's cameras, in its order
   /// Throws FileError naming file and key.
-  static Truth load(const std::filesystem::path& file,
-                    const std::vector<std::string>& cameras = {"left", "right"});
+  static Truth load(const std::filesystem::path& file, const std::vector<std::string>& cameras = {"left", "right"});
   /// The instant that holds at `utime`, or nothing within 60 ms.
   [[nodiscard]] const TruthInstant* at(Microseconds utime) const;
   [[nodiscard]] const std::vector<TruthInstant>& instants() const { return instants_; }

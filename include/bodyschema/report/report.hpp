@@ -29,8 +29,8 @@ struct Chart {
   Kind kind = Kind::kLine;
   std::vector<std::string> labels;  ///< names of the bars
   std::vector<ChartSeries> series;
-  bool logarithmic_y = false;       ///< the axis of values: x for horizontal bars
-  bool horizontal = false;          ///< bars lie, their names beside them; as high as they need
+  bool logarithmic_y = false;  ///< the axis of values: x for horizontal bars
+  bool horizontal = false;     ///< bars lie, their names beside them; as high as they need
   /// Bars: a line across all of them at this value.
   std::optional<double> threshold{};
   std::string threshold_name{};

@@ -22,8 +22,7 @@ class GravityTorques {
   /// @return torque of gravity on each joint about its axis, Nm, RobotModel order. Positive torque
   ///         pushes the joint towards larger angles (minus the holding torque of the motor); N for
   ///         prismatic joints. Valid until the next call.
-  const Eigen::VectorXd& compute(const Eigen::Ref<const Eigen::VectorXd>& q,
-                                 const Eigen::Vector3d& gravity_W);
+  const Eigen::VectorXd& compute(const Eigen::Ref<const Eigen::VectorXd>& q, const Eigen::Vector3d& gravity_W);
 
  private:
   struct Impl;

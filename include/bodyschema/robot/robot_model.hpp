@@ -18,7 +18,7 @@ struct JointInfo {
   std::string name;
   double lower_rad = 0.0;  ///< nominal limit (m for a sliding joint); -inf for continuous joints
   double upper_rad = 0.0;
-  bool slides = false;     ///< prismatic: positions are m, not rad
+  bool slides = false;  ///< prismatic: positions are m, not rad
   std::string parent_link;
   std::string child_link;
 };

@@ -33,7 +33,6 @@ struct SelfTestOptions {
 /// on account of what it checks.
 /// @param report  called with each result as it is known
 /// @return the worst level
-CheckLevel run_self_test(const SelfTestOptions& options,
-                         const std::function<void(const CheckResult&)>& report);
+CheckLevel run_self_test(const SelfTestOptions& options, const std::function<void(const CheckResult&)>& report);
 
 }  // namespace bodyschema

@@ -29,7 +29,8 @@ struct DaemonOptions {
 /// used is refused and work goes on as before.
 ///
 /// Three threads of its own: one receives (Receiver), the calling one estimates and publishes, one says
-/// how things are once a second; scorer, look-ahead, recorder and page have theirs. Changes the process's signal handlers while it runs. Throws Error.
+/// how things are once a second; scorer, look-ahead, recorder and page have theirs. Changes the process's signal
+/// handlers while it runs. Throws Error.
 void run_daemon(const std::function<Configuration()>& load_configuration, const DaemonOptions& options);
 
 }  // namespace bodyschema

@@ -39,8 +39,8 @@ class DurationHistogram {
 class StageDurations {
  public:
   /// Waiting is arrival to start; latency is all of it.
-  static constexpr std::array<const char*, 8> kNames = {
-      "waiting", "segmentation", "kinematics", "scoring", "filter", "refinement", "publishing", "latency"};
+  static constexpr std::array<const char*, 8> kNames = {"waiting", "segmentation", "kinematics", "scoring",
+                                                        "filter",  "refinement",   "publishing", "latency"};
   using Frame = std::array<double, kNames.size()>;  ///< ms
 
   /// @param window  frames that medians are taken over

@@ -13,10 +13,10 @@ namespace bodyschema {
 
 /// One sample of the outline of a predicted silhouette.
 struct ContourPoint {
-  Eigen::Vector2f pixel;    ///< on the outline, px, OpenCV convention, sub-pixel
-  Eigen::Vector2f normal;   ///< unit, in the image, pointing out of the silhouette
-  Eigen::Vector3f p_C;      ///< the surface point that makes the outline, camera frame, metres
-  std::uint32_t part = 0;   ///< the part it belongs to
+  Eigen::Vector2f pixel;   ///< on the outline, px, OpenCV convention, sub-pixel
+  Eigen::Vector2f normal;  ///< unit, in the image, pointing out of the silhouette
+  Eigen::Vector3f p_C;     ///< the surface point that makes the outline, camera frame, metres
+  std::uint32_t part = 0;  ///< the part it belongs to
 };
 
 /// Samples the outline of the union of all parts: points of occluding edges (between a triangle

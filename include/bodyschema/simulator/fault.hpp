@@ -36,9 +36,9 @@ struct FaultSpec {
 /// The robot that a fault befalls: what it is nominally and what it is about to do.
 struct FaultSite {
   std::shared_ptr<const RobotModel> model;
-  std::vector<Eigen::Index> arm;      ///< shoulder to wrist, as in RobotSetup::estimated_joints
-  std::vector<Eigen::Index> head;     ///< RobotSetup::head_joints that move both cameras
-  std::vector<Eigen::Index> fingers;  ///< joints that curl a finger
+  std::vector<Eigen::Index> arm;                    ///< shoulder to wrist, as in RobotSetup::estimated_joints
+  std::vector<Eigen::Index> head;                   ///< RobotSetup::head_joints that move both cameras
+  std::vector<Eigen::Index> fingers;                ///< joints that curl a finger
   std::optional<Eigen::Index> left_pan, right_pan;  ///< joints that move one camera only
   std::string hand_link;
   Eigen::Vector3d gravity_W{0, 0, -9.81};

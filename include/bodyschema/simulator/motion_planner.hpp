@@ -21,13 +21,13 @@ struct MotionSettings {
   /// Hand centre to the middle between the eyes; 0: where the cameras see the hand of this robot.
   double distance_min_m = 0.0;
   double distance_max_m = 0.0;
-  double border_px = 6.0;        ///< hand base and fingertips stay this far inside the pictures
-  double hand_radius_m = 0.075;  ///< room kept around the hand's centre when targets are chosen
+  double border_px = 6.0;                     ///< hand base and fingertips stay this far inside the pictures
+  double hand_radius_m = 0.075;               ///< room kept around the hand's centre when targets are chosen
   std::map<std::string, double> posture_deg;  ///< head and fingers; joints left out: RobotSetup's
-  double head_motion_deg = 4.0;  ///< a moving head turns each joint by up to this
-  double slow_deg_s = 18.0;      ///< mean speed of the fastest joint in slow moves
-  double fast_deg_s = 55.0;      ///< ... and in fast ones
-  double hold_s = 15.0;          ///< standing still within a long babble, to measure noise
+  double head_motion_deg = 4.0;               ///< a moving head turns each joint by up to this
+  double slow_deg_s = 18.0;                   ///< mean speed of the fastest joint in slow moves
+  double fast_deg_s = 55.0;                   ///< ... and in fast ones
+  double hold_s = 15.0;                       ///< standing still within a long babble, to measure noise
 };
 
 /// Finds motions of the nominal robot that the cameras can see: postures by inverse kinematics
@@ -57,9 +57,9 @@ class MotionPlanner {
 
   /// What the cameras see of the nominal robot.
   struct View {
-    bool whole_hand = false;      ///< hand base and fingertips inside both pictures
-    bool forearm = false;         ///< the forearm next to the wrist is inside both pictures
-    double distance_m = 0.0;      ///< hand centre to the middle between the eyes
+    bool whole_hand = false;                 ///< hand base and fingertips inside both pictures
+    bool forearm = false;                    ///< the forearm next to the wrist is inside both pictures
+    double distance_m = 0.0;                 ///< hand centre to the middle between the eyes
     std::vector<Eigen::Vector2d> centre_px;  ///< hand centre in each camera
   };
   View view(const Eigen::VectorXd& q);

@@ -43,9 +43,7 @@ class Random {
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1.0p-53; }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
   /// In 0 .. count-1; count > 0.
-  std::size_t below(std::size_t count) {
-    return static_cast<std::size_t>(uniform() * static_cast<double>(count));
-  }
+  std::size_t below(std::size_t count) { return static_cast<std::size_t>(uniform() * static_cast<double>(count)); }
   double sign() { return (bits() >> 63) != 0 ? 1.0 : -1.0; }
 
   /// Standard normal (Marsaglia's polar method).

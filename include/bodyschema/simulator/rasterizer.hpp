@@ -75,17 +75,17 @@ class Rasterizer {
   std::vector<std::vector<Eigen::Vector3f>> corner_normals_;  // three per triangle, part frame
   int width_, height_, samples_;
   int sample_width_, sample_height_;
-  std::vector<float> inverse_depth_;     // per sample, 0: background
-  std::vector<std::uint8_t> part_;       // per sample
-  std::vector<float> shade_;             // per sample
-  std::vector<float> weight_;            // per sample, 1 but where a dilated outline passes
+  std::vector<float> inverse_depth_;  // per sample, 0: background
+  std::vector<std::uint8_t> part_;    // per sample
+  std::vector<float> shade_;          // per sample
+  std::vector<float> weight_;         // per sample, 1 but where a dilated outline passes
   struct Change {
     std::size_t to, from;
     float weight;
   };
-  std::vector<Change> changes_;          // what dilate did to the present picture
-  std::vector<float> distance_;          // scratch of dilate
-  std::vector<int> nearest_;             // scratch of dilate
+  std::vector<Change> changes_;  // what dilate did to the present picture
+  std::vector<float> distance_;  // scratch of dilate
+  std::vector<int> nearest_;     // scratch of dilate
   std::vector<Eigen::Vector3f> points_C_;
   std::vector<Corner> projected_;
   int s0_ = 0, t0_ = 0, s1_ = 0, t1_ = 0;  // touched samples, half open

@@ -40,7 +40,7 @@ struct SimulationPlan {
   std::optional<Trajectory> given;
   std::map<std::string, double> offsets_deg;  ///< encoder = true + offset, by joint
   std::vector<FaultSpec> faults;
-  std::vector<std::string> frozen_joints;     ///< arm joints that never move
+  std::vector<std::string> frozen_joints;  ///< arm joints that never move
   /// Seconds after the motion begins at which a camera (0 left, 1 right) dies.
   std::optional<std::pair<std::size_t, double>> camera_dies;
   Output output = Output::kPictures;
@@ -49,29 +49,29 @@ struct SimulationPlan {
 
 /// What was true when one camera's picture was taken.
 struct CameraTruth {
-  Microseconds exposure_utime = 0;  ///< differs from the stamp by latency and skew
-  Eigen::VectorXd q;                ///< true joint angles, radians, RobotModel order
-  Pose X_CP = Pose::Identity();     ///< hand in the true camera
-  Pose X_WC = Pose::Identity();     ///< true camera in the root frame
-  std::vector<Eigen::Vector3d> fingertips_C;  ///< metres, RobotSetup::fingertip_links
-  std::vector<Eigen::Vector2d> fingertips_px; ///< by the true lens
-  double visible_share = 0.0;       ///< of the picture's pixels that show the robot; 0 without pictures
+  Microseconds exposure_utime = 0;             ///< differs from the stamp by latency and skew
+  Eigen::VectorXd q;                           ///< true joint angles, radians, RobotModel order
+  Pose X_CP = Pose::Identity();                ///< hand in the true camera
+  Pose X_WC = Pose::Identity();                ///< true camera in the root frame
+  std::vector<Eigen::Vector3d> fingertips_C;   ///< metres, RobotSetup::fingertip_links
+  std::vector<Eigen::Vector2d> fingertips_px;  ///< by the true lens
+  double visible_share = 0.0;                  ///< of the picture's pixels that show the robot; 0 without pictures
 };
 
 /// One picture as a camera delivers it.
 struct CameraFrame {
-  std::string name;                     ///< the rig's: "left", "right"
-  Microseconds utime = 0;               ///< stamp
-  Image image;                          ///< RGB; empty unless Output::kPictures
-  BinaryMask silhouette;                ///< exact; empty with Output::kJoints
-  std::vector<std::uint8_t> coverage;   ///< share of each pixel that is robot, 0-255, row order
+  std::string name;                    ///< the rig's: "left", "right"
+  Microseconds utime = 0;              ///< stamp
+  Image image;                         ///< RGB; empty unless Output::kPictures
+  BinaryMask silhouette;               ///< exact; empty with Output::kJoints
+  std::vector<std::uint8_t> coverage;  ///< share of each pixel that is robot, 0-255, row order
 };
 
 /// One instant of the cameras and the encoder samples up to it.
 struct SimulatedFrame {
   int index = 0;
   Phase phase = Phase::kMotion;
-  Microseconds utime = 0;  ///< stamp of the first camera present
+  Microseconds utime = 0;                           ///< stamp of the first camera present
   std::vector<std::optional<CameraFrame>> cameras;  ///< absent: the camera is dead
   std::vector<CameraTruth> truth;                   ///< one per camera, dead ones included
   /// Encoder readings since the last frame, oldest first: they reach at least one sample beyond the
@@ -120,8 +120,8 @@ class Simulator {
 };
 
 /// The site of a run's faults, without running it: for drawing hidden faults.
-FaultSite fault_site(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup,
-                     const StereoRig& rig, const SimulatorSettings& settings, const SimulationPlan& plan);
+FaultSite fault_site(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup, const StereoRig& rig,
+                     const SimulatorSettings& settings, const SimulationPlan& plan);
 
 /// A frame as the estimator takes it in: encoders interpolated linearly to each stamp. `history`
 /// are the encoder samples received so far, oldest first, this frame's included.

@@ -34,8 +34,8 @@ namespace bodyschema {
 /// A picture of another number of channels than before starts all learning anew.
 ///
 /// Throws DataError for an empty picture, one of another size, or one of another number of channels than
-/// a given background has; otherwise `segment` and `adapt` neither throw nor allocate once warm. One segmenter per camera and
-/// thread.
+/// a given background has; otherwise `segment` and `adapt` neither throw nor allocate once warm. One segmenter per
+/// camera and thread.
 class Segmenter {
  public:
   /// @param camera  name under which the background picture of this camera is configured
@@ -57,8 +57,8 @@ class Segmenter {
   [[nodiscard]] bool ready() const;
 
   /// @param predicted  where the robot is thought to be: `statistics` needs it, others do not look
-  void segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
-               std::vector<std::uint8_t>& coverage, const BinaryMask* predicted = nullptr);
+  void segment(const Image& image, BinaryMask& mask, BinaryMask& valid, std::vector<std::uint8_t>& coverage,
+               const BinaryMask* predicted = nullptr);
 
   /// `learned_background`: follows slow changes of the background, once `segment` has found `mask` in
   /// this picture and before the next one is segmented. No effect with other methods and while still

@@ -16,9 +16,8 @@ FaultKind acceleration_lag() {
   kind.make = [](const FaultArguments& arguments, const FaultSite&) {
     const auto joint = arguments.joint();
     const double lag = radians(arguments.number("value", 0.0, 45.0));
-    return transmission_fault([=](const MotorStep& step, Eigen::VectorXd& q) {
-      q[joint] -= lag * step.acceleration[joint];
-    });
+    return transmission_fault(
+        [=](const MotorStep& step, Eigen::VectorXd& q) { q[joint] -= lag * step.acceleration[joint]; });
   };
   kind.targets = [](const FaultSite& site) {
     return on_arm_joints(site, "acceleration_lag", {0.2, 0.2, 0.25, 0.25, 0.5, 0.4, 0.4});

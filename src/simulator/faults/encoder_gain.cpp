@@ -15,9 +15,8 @@ FaultKind encoder_gain() {
     const auto joint = arguments.joint();
     const double gain = 0.01 * arguments.number("value", -50.0, 50.0);
     const double reference = radians(arguments.number_or("reference_deg", 0.0, -360.0, 360.0));
-    return encoder_fault([=](Eigen::VectorXd& encoder) {
-      encoder[joint] = reference + (encoder[joint] - reference) / (1.0 + gain);
-    });
+    return encoder_fault(
+        [=](Eigen::VectorXd& encoder) { encoder[joint] = reference + (encoder[joint] - reference) / (1.0 + gain); });
   };
   kind.targets = [](const FaultSite& site) {
     return on_arm_joints(site, "encoder_gain", {0.5, 0.6, 0.8, 0.8, 1.2, 2.0, 2.0});

@@ -19,9 +19,7 @@ FaultKind joint_coupling() {
   kind.targets = [](const FaultSite& site) {
     constexpr std::array<double, 7> kDetectable = {0.5, 0.6, 0.7, 0.7, 1.2, 1.8, 1.8};
     std::vector<FaultTarget> targets;
-    const auto name = [&](std::size_t i) {
-      return site.model->joints()[static_cast<std::size_t>(site.arm[i])].name;
-    };
+    const auto name = [&](std::size_t i) { return site.model->joints()[static_cast<std::size_t>(site.arm[i])].name; };
     for (std::size_t i = 0; i < site.arm.size(); ++i) {
       for (const std::size_t j : {i - 1, i + 1}) {  // tendons pass the neighbours
         if (j >= site.arm.size()) continue;

@@ -11,8 +11,9 @@ FaultKind local_kink() {
   kind.name = "local_kink";
   kind.parameter = "height";
   kind.unit = "deg";
-  kind.meaning = "true - motor is a bump of this height around `at_deg` (default: middle of the joint's "
-                 "motion) of standard width `width_deg` (default: a tenth of it)";
+  kind.meaning =
+      "true - motor is a bump of this height around `at_deg` (default: middle of the joint's "
+      "motion) of standard width `width_deg` (default: a tenth of it)";
   kind.keys = {"joint", "at_deg", "width_deg"};
   kind.in_catalogue = false;
   kind.make = [](const FaultArguments& arguments, const FaultSite& site) {

@@ -8,8 +8,9 @@ FaultKind principal_point() {
   kind.name = "principal_point";
   kind.parameter = "shift";
   kind.unit = "px";
-  kind.meaning = "true - nominal principal point along axis=x|y of source=left|right|common|difference "
-                 "(difference: left by half, right by minus half)";
+  kind.meaning =
+      "true - nominal principal point along axis=x|y of source=left|right|common|difference "
+      "(difference: left by half, right by minus half)";
   kind.keys = {"source", "axis"};
   kind.make = [](const FaultArguments& arguments, const FaultSite&) {
     const double shift = arguments.number("value", -200.0, 200.0);

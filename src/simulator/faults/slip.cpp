@@ -19,9 +19,7 @@ FaultKind slip() {
       if (step.t_s >= at) q[joint] += step_rad;
     });
   };
-  kind.targets = [](const FaultSite& site) {
-    return on_arm_joints(site, "slip", {0.2, 0.2, 0.3, 0.3, 0.8, 0.6, 0.6});
-  };
+  kind.targets = [](const FaultSite& site) { return on_arm_joints(site, "slip", {0.2, 0.2, 0.3, 0.3, 0.8, 0.6, 0.6}); };
   return kind;
 }
 

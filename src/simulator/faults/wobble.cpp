@@ -19,9 +19,8 @@ FaultKind wobble() {
     const double amplitude = radians(arguments.number("value", 0.0, 45.0));
     const double omega = 2.0 * kPi / arguments.number_or("period", 7.0, 0.05, 1e4);
     const double phase = Random(site.seed, "wobble").uniform(0.0, 2.0 * kPi);
-    return transmission_fault([=](const MotorStep& step, Eigen::VectorXd& q) {
-      q[joint] += amplitude * std::sin(omega * step.t_s + phase);
-    });
+    return transmission_fault(
+        [=](const MotorStep& step, Eigen::VectorXd& q) { q[joint] += amplitude * std::sin(omega * step.t_s + phase); });
   };
   kind.targets = [](const FaultSite& site) {
     return on_arm_joints(site, "wobble", {0.2, 0.2, 0.2, 0.2, 0.4, 0.35, 0.35});

@@ -15,8 +15,7 @@ int main(int argc, char** argv) {
     std::vector<bodyschema::Pose> X_WB(1);
     kinematics.compute(Eigen::VectorXd::Zero(robot->joint_count()), X_WB);
     const Eigen::Vector3d p_WB = X_WB.front().translation();
-    std::printf("%s: %s at (%.3f, %.3f, %.3f) m\n", robot->name().c_str(), argv[2], p_WB.x(),
-                p_WB.y(), p_WB.z());
+    std::printf("%s: %s at (%.3f, %.3f, %.3f) m\n", robot->name().c_str(), argv[2], p_WB.x(), p_WB.y(), p_WB.z());
   } catch (const bodyschema::Error& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;
