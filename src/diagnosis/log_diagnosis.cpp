@@ -71,7 +71,7 @@ class LogDiagnosis {
   }
 
   void look() {
-    if (!pipeline_.masks_need_estimates()) learn();  // such masks learn nothing
+    if (pipeline_.learns_background()) learn();
     read();
     // Said at once: it may well be why the log is refused.
     if (const auto turn = describe(pipeline_.background_turn()); !turn.empty()) {
