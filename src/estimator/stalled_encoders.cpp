@@ -73,7 +73,7 @@ void StalledEncoders::look(double time_s, const Eigen::VectorXd& reading_rad, co
   frames_since_drop_ = remembered_ && !remembers ? 0 : frames_since_drop_ + 1;
   for (Eigen::Index k = 0; k < reading_rad.size(); ++k) {
     Track& track = tracks_[static_cast<std::size_t>(k)];
-    if (!began_) {
+    if (track.stood == 0) {
       track.reading_rad = reading_rad(k);
       track.since_s = time_s;
     } else if (track.moved_to(reading_rad(k))) {
@@ -108,7 +108,6 @@ void StalledEncoders::look(double time_s, const Eigen::VectorXd& reading_rad, co
     doubtful_ = doubtful_ || (track.moves > 0 && track.frames_since < kRecent);
     if (track.moves >= kMoves && (joint_ < 0 || track.moved_rad > moved_rad())) joint_ = k;
   }
-  began_ = true;
 }
 
 }  // namespace bodyschema

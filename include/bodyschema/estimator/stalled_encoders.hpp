@@ -61,7 +61,7 @@ class StalledEncoders {
     double sd_rad = 0.0;      ///< of that
     int away = 0;             ///< frames in a row that saw it elsewhere
     int moves = 0;
-    std::size_t stood = 0;         ///< frames
+    std::size_t stood = 0;         ///< frames; 0: there has been none
     std::size_t frames_since = 0;  ///< the last move
     double moved_rad = 0.0;
     std::array<double, kRecent> recent_rad{};  ///< settled offsets, round and round
@@ -71,8 +71,9 @@ class StalledEncoders {
     double deceleration_rad_s2 = 0.0;          ///< from step to step, 0 while it gets faster
     double run_rad = 0.0;                      ///< of all steps the same way
     [[nodiscard]] bool moved_to(double reading_rad) const;
-    /// What follows upon it.
+    /// The track of the reading that follows upon this one.
     [[nodiscard]] Track moved_on(double time_s, double reading_rad) const;
+    /// How far the joint has come by now if its encoder, and not it, has stopped.
     [[nodiscard]] double gone_on_rad(double time_s) const;
     [[nodiscard]] double drift_rad() const;
   };
@@ -80,7 +81,6 @@ class StalledEncoders {
   Eigen::VectorXd drift_rad_;
   bool doubtful_ = false;
   bool dropped_while_standing_ = false;
-  bool began_ = false;       ///< there has been a frame
   bool remembered_ = false;  ///< there has been a memory
   std::size_t frames_since_drop_ = kTaught;
   Eigen::Index joint_ = -1;
