@@ -243,6 +243,28 @@ bool Listener::wait_offsets(std::size_t count, Seconds limit) {
   return arrived_.wait_for(lock, limit * patience(), [&] { return offsets_.size() >= count; });
 }
 
+std::int64_t counter(const offsets_status_t& status, const std::string& name) {
+  for (std::size_t i = 0; i < status.counter_name.size(); ++i) {
+    if (status.counter_name[i] == name) return status.counter_value[i];
+  }
+  ADD_FAILURE() << "the status has no counter " << name;
+  return 0;
+}
+
+std::int64_t counters_with(const offsets_status_t& status, const std::string& prefix) {
+  std::int64_t sum = 0;
+  for (std::size_t i = 0; i < status.counter_name.size(); ++i) {
+    if (status.counter_name[i].starts_with(prefix)) sum += status.counter_value[i];
+  }
+  return sum;
+}
+
+std::int64_t pictures_unaccounted_for(const offsets_status_t& status) {
+  const std::int64_t frames =
+      status.frames_estimated + counter(status, "shed.queue") + counter(status, "failed") + counter(status, "left");
+  return counter(status, "pictures.used") + counter(status, "mono") - 2 * frames;
+}
+
 Player::Player(const std::string& lcm_url, fs::path log, double speed, Change change)
     : link_(lcm_url), log_(std::move(log)), speed_(speed), change_(std::move(change)),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
@@ -390,16 +412,9 @@ std::map<Microseconds, std::string> estimates_by_utime(const fs::path& file) {
 std::map<Microseconds, std::string> replay_estimates(const fs::path& log, const fs::path& out,
                                                      const std::vector<std::string>& more) {
   fs::create_directories(out);
-  std::vector<std::string> command = {"bodyschema",
-                                      "replay",
-                                      log.string(),
-                                      "--config",
-                                      reach_configuration(),
-                                      "--overlays",
-                                      "0",
-                                      "--learn-background-online",
-                                      "--out",
-                                      out.string()};
+  std::vector<std::string> command = {"bodyschema", "replay", log.string()};
+  command.insert(command.end(), {"--config", reach_configuration(), "--out", out.string()});
+  command.insert(command.end(), {"--overlays", "0", "--learn-background-online"});
   command.insert(command.end(), more.begin(), more.end());
   Process replay(command, out);
   const auto status = replay.wait(Seconds(200));

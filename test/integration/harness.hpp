@@ -117,6 +117,14 @@ class Listener {
   std::jthread thread_;
 };
 
+/// A counter of a status; a failure where there is none of this name.
+std::int64_t counter(const offsets_status_t& status, const std::string& name);
+/// The sum of those whose names begin so.
+std::int64_t counters_with(const offsets_status_t& status, const std::string& prefix);
+/// Of the last status: pictures, one of each camera a frame, used in frames that were neither estimated nor shed, did
+/// not fail and were not left. Zero, if the service counts right.
+std::int64_t pictures_unaccounted_for(const offsets_status_t& status);
+
 /// Plays a log in real time (or faster), from a thread of its own. `change` sees every message
 /// before it goes out and may alter it, drop it (false), or publish more through the link.
 class Player {
