@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -54,24 +55,33 @@ Process::Process(std::vector<std::string> arguments, const fs::path& scratch,
                  const std::map<std::string, std::string>& environment) {
   const fs::path built = fs::path(BODYSCHEMA_BINARY_DIR) / "bin" / arguments.front();
   if (fs::exists(built)) arguments.front() = built.string();
-  static int count = 0;
+  static std::atomic<int> count = 0;
   const std::string name = std::to_string(++count) + "-" + fs::path(arguments.front()).filename().string();
   out_ = scratch / (name + ".out");
   err_ = scratch / (name + ".err");
   std::vector<char*> argv;
   for (auto& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
+  // Made before the fork: a child of a program with several threads may not allocate memory.
+  std::vector<std::string> variables;
+  for (const auto& [key, value] : environment) variables.push_back(key + "=" + value);
+  for (char** inherited = environ; *inherited != nullptr; ++inherited) {
+    const std::string variable = *inherited;
+    if (!environment.contains(variable.substr(0, variable.find('=')))) variables.push_back(variable);
+  }
+  std::vector<char*> envp;
+  for (auto& variable : variables) envp.push_back(variable.data());
+  envp.push_back(nullptr);
   pid_ = fork();
   if (pid_ < 0) throw std::runtime_error("fork failed");
   if (pid_ == 0) {
-    for (const auto& [key, value] : environment) setenv(key.c_str(), value.c_str(), 1);
     const int in = open("/dev/null", O_RDONLY);
     const int out = open(out_.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0644);
     const int err = open(err_.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0644);
     dup2(in, 0);
     dup2(out, 1);
     dup2(err, 2);
-    execvp(argv[0], argv.data());
+    execvpe(argv[0], argv.data(), envp.data());
     _exit(127);
   }
 }
@@ -148,7 +158,7 @@ Scratch::~Scratch() {
 // --- network ---------------------------------------------------------------------------------------
 
 std::string private_lcm_url() {
-  static int count = 0;
+  static std::atomic<int> count = 0;
   const int port = 20'000 + (getpid() * 7 + ++count) % 12'000;
   return "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
 }
