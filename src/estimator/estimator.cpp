@@ -75,7 +75,7 @@ const char* to_string(EstimatorState state) {
 struct Estimator::Impl {
   Impl(std::shared_ptr<const RobotModel> robot_model, const RobotSetup& robot_setup, const StereoRig& stereo_rig,
        const EstimatorOptions& estimator_options)
-      : options(estimator_options), setup(robot_setup), rig(stereo_rig),
+      : options(estimator_options), setup(robot_setup), rig(stereo_rig), own_correction(rig.cameras.size()),
         parameters(estimated_parameters(robot_model, setup, rig, options)),
         silhouettes(make_silhouette_model(*robot_model, setup)), intrinsics(rig.intrinsics()),
         body(robot_model, setup, rig, parameters), alignment(body, silhouettes, intrinsics, options.contour),
@@ -445,19 +445,12 @@ struct Estimator::Impl {
     estimate.cameras_swapped = cameras_swapped;
     look_for_stalls(observation, estimate);
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-      const CameraObservation* seen = nullptr;
-      if (c < observation.cameras.size() && observation.cameras[c]) {
-        seen = &*observation.cameras[c];
-      } else {
-        for (const auto& other : observation.cameras) {
-          if (other) seen = &*other;
-        }
-      }
-      if (seen == nullptr) continue;
-      estimate.X_CP.push_back(body.hand_pose(*seen, frame_state.x, c));
-      estimate.X_CP_nominal.push_back(body.hand_pose(seen->joints.q, uncorrected(), c));
+      const std::optional<Exposure> at = exposure(observation, c);
+      if (!at) continue;
+      estimate.X_CP.push_back(body.hand_pose(*at, frame_state.x, c));
+      estimate.X_CP_nominal.push_back(body.hand_pose(at->q, uncorrected(), c));
       if (c == 0 || estimate.hand_sd_m == 0.0) {
-        estimate.hand_sd_m = hand_sd(*seen, c);
+        estimate.hand_sd_m = hand_sd(*at, c);
       }
     }
     estimate.weakest = weakest_direction(estimate.covariance_rad2, setup.estimated_joints);
@@ -469,12 +462,31 @@ struct Estimator::Impl {
     estimate.state = current;
   }
 
-  /// Encoders of the estimated joints at the exposure of the first camera that saw something.
-  bool read_encoders(const Observation& observation) {
+  /// The first camera that saw something; null: none did.
+  static const CameraObservation* first_seen(const Observation& observation) {
     const auto seen = std::find_if(observation.cameras.begin(), observation.cameras.end(),
                                    [](const auto& camera) { return camera.has_value(); });
-    if (seen == observation.cameras.end()) return false;
-    for (Eigen::Index k = 0; k < joints; ++k) reading(k) = (*seen)->joints.q(joint_index[static_cast<std::size_t>(k)]);
+    return seen == observation.cameras.end() ? nullptr : &**seen;
+  }
+
+  /// What the hand's pose in a camera is predicted from; none where no camera saw anything. A camera that is absent
+  /// borrows the arm of one that is not, but where it sits itself only its own pictures have told.
+  std::optional<Exposure> exposure(const Observation& observation, std::size_t camera) {
+    const bool present = camera < observation.cameras.size() && observation.cameras[camera];
+    const CameraObservation* seen = present ? &*observation.cameras[camera] : first_seen(observation);
+    if (seen == nullptr) return std::nullopt;
+    if (present) own_correction[camera] = seen->corrections ? seen->corrections->camera : CameraCorrection{};
+    if (present || !seen->corrections) return Exposure(*seen);
+    borrowed = *seen->corrections;
+    borrowed.camera = own_correction[camera];
+    return Exposure(seen->joints.q, &borrowed);
+  }
+
+  /// Encoders of the estimated joints at the exposure of the first camera that saw something.
+  bool read_encoders(const Observation& observation) {
+    const CameraObservation* seen = first_seen(observation);
+    if (seen == nullptr) return false;
+    for (Eigen::Index k = 0; k < joints; ++k) reading(k) = seen->joints.q(joint_index[static_cast<std::size_t>(k)]);
     return true;
   }
 
@@ -533,6 +545,7 @@ struct Estimator::Impl {
     best_likelihood = effective_size = contour_rms_px = 0.0;
     contradicted = false;
     eye_order = {};
+    own_correction.assign(rig.cameras.size(), {});
   }
 
   /// Nothing that was learned holds.
@@ -557,6 +570,8 @@ struct Estimator::Impl {
   EstimatorOptions options;
   RobotSetup setup;
   StereoRig rig;
+  std::vector<CameraCorrection> own_correction;  ///< of each camera, when it was last seen
+  Corrections borrowed;                          ///< what `exposure` last made for a camera that is absent
   std::vector<Parameter> parameters;
   SilhouetteModel silhouettes;
   std::vector<PinholeIntrinsics> intrinsics;

@@ -52,7 +52,8 @@ struct Estimate {
   double stalled_motion_rad = 0.0;  ///< how far it has been seen to move
   bool cameras_swapped = false;     ///< the left picture shows what the right eye sees and the other way
                                     ///< round; nothing is learned from them, state kDiverged. Mode best
-  std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected
+  std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected. In one that is absent: for
+                                    ///< the encoders of another, the camera where it was known to be when last seen
   std::vector<Pose> X_CP_nominal;   ///< the same with encoders and model as they are
   StageTimes times;
 };
