@@ -90,6 +90,7 @@ struct Estimator::Impl {
     reading.resize(joints);
     first_guesses = filter.states();
     stalled = StalledEncoders(joints);
+    cloud_covariance = filter.covariance();
     frame_state = fusion.frame_state();
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
     weights.resize(static_cast<Eigen::Index>(options.filter.particles));
@@ -107,12 +108,12 @@ struct Estimator::Impl {
     const bool in_view = scorer.observe(observation, options.min_mask_px);
     explained = false;
     cameras_swapped = false;
+    best_likelihood = effective_size = contour_rms_px = 0.0;
     if (!in_view) {
-      frame_state = fusion.frame_state();
-      if (particles_only() || fusion.frames() < 0.5) frame_state.x = state;
+      frame_state = particles_only() ? OffsetFusion::FrameState{state, cloud_covariance} : fusion.frame_state();
+      if (fusion.frames() < 0.5) frame_state.x = state;
       current = EstimatorState::kHandNotInView;
       contradicted = false;
-      best_likelihood = 0.0;
     } else {
       const bool swapped = starts_swapped(observation);
       if (!swapped) score_particles();
@@ -431,7 +432,7 @@ struct Estimator::Impl {
     estimate.best_likelihood = best_likelihood;
     estimate.contour_rms_px = contour_rms_px;
     if (particles_only()) {
-      estimate.covariance_rad2 = cloud_covariance.size() > 0 ? cloud_covariance : filter.covariance();
+      estimate.covariance_rad2 = cloud_covariance;
     } else {
       const Eigen::MatrixXd covariance = contradicted ? frame_state.covariance : fusion.covariance();
       estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
@@ -541,8 +542,7 @@ struct Estimator::Impl {
     filter = ParticleFilter(joints, options.filter);
     frame_state = fusion.frame_state();
     current = EstimatorState::kHandNotInView;
-    cloud_covariance.resize(0, 0);
-    best_likelihood = effective_size = contour_rms_px = 0.0;
+    cloud_covariance = filter.covariance();
     contradicted = false;
     eye_order = {};
     own_correction.assign(rig.cameras.size(), {});
@@ -605,8 +605,8 @@ struct Estimator::Impl {
   EyeOrder eye_order;
   PullJudge pulls;
   StalledEncoders stalled{0};
-  bool explained = false;  ///< the last frame's pictures, by its estimate
-  Eigen::MatrixXd cloud_covariance;
+  bool explained = false;            ///< the last frame's pictures, by its estimate
+  Eigen::MatrixXd cloud_covariance;  ///< of the particles as they were last weighed
   StageTimes times;
 
   Eigen::VectorXd distance;  ///< Hammoude, of the particles
