@@ -17,6 +17,7 @@ class EstimatorOnOwnRobot : public OwnRobot {
   EstimatorOnOwnRobot() : offset_rad_(paper_offsets_rad()) {
     reach_ = std::make_unique<SyntheticReach>(robot_, setup_, rig_, offset_rad_);
     options_ = EstimatorOptions::from(configuration_);
+    options_.priors = {};  // the joint offsets alone
     options_.silhouette.engine = "contour";
   }
 
