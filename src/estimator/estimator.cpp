@@ -14,6 +14,7 @@
 #include "bodyschema/estimator/offset_fusion.hpp"
 #include "bodyschema/estimator/pull_judge.hpp"
 #include "bodyschema/estimator/stalled_encoders.hpp"
+#include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/filter/particle_filter.hpp"
 #include "eye_order.hpp"
 #include "hypothesis_scorer.hpp"
@@ -121,7 +122,7 @@ struct Estimator::Impl {
         begin_again();
         learn_nothing();
       } else if (options.mode == EstimatorMode::kPaper) {
-        weights = 1.0 - distance.array();  // equation (4)
+        weights = distance.unaryExpr(&hammoude_likelihood);
         particle_step();
       } else {
         weights = (-(distance.array() - distance.minCoeff()) / options.temperature).exp();
@@ -158,7 +159,7 @@ struct Estimator::Impl {
     if (weights.maxCoeff() <= 0.0) weights.setConstant(1.0);
     filter.update(weights);
     state.head(joints) = filter.estimate();
-    best_likelihood = 1.0 - distance(filter.estimate_index());
+    best_likelihood = hammoude_likelihood(distance(filter.estimate_index()));
     effective_size = filter.effective_sample_size();
     cloud_covariance = filter.covariance();
     frame_state = {state, cloud_covariance};
@@ -180,7 +181,7 @@ struct Estimator::Impl {
         x.head(joints) = offsets.col(begin + i);
         scorer.place(x, static_cast<std::size_t>(i));
       }
-      result.segment(begin, n) = 1.0 - scorer.score(static_cast<std::size_t>(n)).head(n).array();
+      result.segment(begin, n) = scorer.score(static_cast<std::size_t>(n)).head(n).unaryExpr(&hammoude_likelihood);
     }
     return result;
   }
@@ -243,7 +244,7 @@ struct Estimator::Impl {
     state = x;
     frame_state = first_look.frame_state();
     frame_state.x = state;
-    best_likelihood = 1.0 - scorer.distance(state);
+    best_likelihood = hammoude_likelihood(scorer.distance(state));
   }
 
   /// Whether a search has run off from masks that are not the arm's: further than any arm whose joints are all
@@ -352,7 +353,7 @@ struct Estimator::Impl {
     contradicted = fusion.frames() > 0.5 && (pulls.doubting() || surprised_frames > 0);
     frame_state = (contradicted ? first_look : fusion).frame_state(best.evidence, best.x, variance);
     contour_rms_px = best.evidence.rms_px();
-    best_likelihood = 1.0 - scorer.distance(frame_state.x);
+    best_likelihood = hammoude_likelihood(scorer.distance(frame_state.x));
     explained = fitter.fits(best.evidence) && 1.0 - best_likelihood < options.lock_distance;
     times.refinement_ms += elapsed_ms(start);
 
