@@ -12,11 +12,12 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/estimator/body_pose_model.hpp"
 #include "bodyschema/estimator/offset_fusion.hpp"
-#include "bodyschema/estimator/pull_judge.hpp"
 #include "bodyschema/estimator/stalled_encoders.hpp"
+#include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/filter/particle_filter.hpp"
 #include "eye_order.hpp"
 #include "hypothesis_scorer.hpp"
+#include "offset_memory.hpp"
 #include "outline_fitter.hpp"
 
 namespace bodyschema {
@@ -75,14 +76,15 @@ const char* to_string(EstimatorState state) {
 struct Estimator::Impl {
   Impl(std::shared_ptr<const RobotModel> robot_model, const RobotSetup& robot_setup, const StereoRig& stereo_rig,
        const EstimatorOptions& estimator_options)
-      : options(estimator_options), setup(robot_setup), rig(stereo_rig),
+      : options(estimator_options), setup(robot_setup), rig(stereo_rig), own_correction(rig.cameras.size()),
         parameters(estimated_parameters(robot_model, setup, rig, options)),
         silhouettes(make_silhouette_model(*robot_model, setup)), intrinsics(rig.intrinsics()),
         body(robot_model, setup, rig, parameters), alignment(body, silhouettes, intrinsics, options.contour),
         scorer(body, silhouettes, intrinsics, options.silhouette, options.filter.particles),
         filter(static_cast<Eigen::Index>(setup.estimated_joints.size()), options.filter),
-        fusion(prior_sds(parameters), encoder_sds(parameters, setup.estimated_joints.size(), options.encoder_sd_rad)),
-        first_look(fusion),
+        first_look(prior_sds(parameters),
+                   encoder_sds(parameters, setup.estimated_joints.size(), options.encoder_sd_rad)),
+        memory(first_look, options.memory_frames, options.correlated_frames),
         fitter(alignment, scorer, first_look, static_cast<Eigen::Index>(setup.estimated_joints.size()), options) {
     for (const auto& name : setup.estimated_joints) joint_index.push_back(robot_model->joint_index(name));
     joints = static_cast<Eigen::Index>(setup.estimated_joints.size());
@@ -90,7 +92,8 @@ struct Estimator::Impl {
     reading.resize(joints);
     first_guesses = filter.states();
     stalled = StalledEncoders(joints);
-    frame_state = fusion.frame_state();
+    cloud_covariance = filter.covariance();
+    frame_state = memory.fusion().frame_state();
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
     weights.resize(static_cast<Eigen::Index>(options.filter.particles));
   }
@@ -107,12 +110,13 @@ struct Estimator::Impl {
     const bool in_view = scorer.observe(observation, options.min_mask_px);
     explained = false;
     cameras_swapped = false;
+    best_likelihood = effective_size = contour_rms_px = 0.0;
     if (!in_view) {
-      frame_state = fusion.frame_state();
-      if (particles_only() || fusion.frames() < 0.5) frame_state.x = state;
+      frame_state =
+          particles_only() ? OffsetFusion::FrameState{state, cloud_covariance} : memory.fusion().frame_state();
+      if (memory.empty()) frame_state.x = state;
       current = EstimatorState::kHandNotInView;
       contradicted = false;
-      best_likelihood = 0.0;
     } else {
       const bool swapped = starts_swapped(observation);
       if (!swapped) score_particles();
@@ -120,7 +124,7 @@ struct Estimator::Impl {
         begin_again();
         learn_nothing();
       } else if (options.mode == EstimatorMode::kPaper) {
-        weights = 1.0 - distance.array();  // equation (4)
+        weights = distance.unaryExpr(&hammoude_likelihood);
         particle_step();
       } else {
         weights = (-(distance.array() - distance.minCoeff()) / options.temperature).exp();
@@ -157,7 +161,7 @@ struct Estimator::Impl {
     if (weights.maxCoeff() <= 0.0) weights.setConstant(1.0);
     filter.update(weights);
     state.head(joints) = filter.estimate();
-    best_likelihood = 1.0 - distance(filter.estimate_index());
+    best_likelihood = hammoude_likelihood(distance(filter.estimate_index()));
     effective_size = filter.effective_sample_size();
     cloud_covariance = filter.covariance();
     frame_state = {state, cloud_covariance};
@@ -179,19 +183,17 @@ struct Estimator::Impl {
         x.head(joints) = offsets.col(begin + i);
         scorer.place(x, static_cast<std::size_t>(i));
       }
-      result.segment(begin, n) = 1.0 - scorer.score(static_cast<std::size_t>(n)).head(n).array();
+      result.segment(begin, n) = scorer.score(static_cast<std::size_t>(n)).head(n).unaryExpr(&hammoude_likelihood);
     }
     return result;
   }
 
-  // --- mode best ------------------------------------------------------------------------------
-
-  // --- pictures of the wrong eye --------------------------------------------------------------
+  // --- mode best: pictures of the wrong eye ---------------------------------------------------
 
   /// With a memory: whether it explains the pictures once they are exchanged, and only then.
   bool turned_swapped(const Observation& observation) {
     if (!scorer.can_be_exchanged()) return false;
-    const Eigen::VectorXd known = fusion.mean();
+    const Eigen::VectorXd known = memory.fusion().mean();
     const Observation exchanged = with_eyes_exchanged(observation);
     scorer.observe(exchanged, options.min_mask_px);
     const double other_distance = scorer.distance(known);
@@ -232,8 +234,8 @@ struct Estimator::Impl {
   /// From pictures that seem to be exchanged.
   void learn_nothing() {
     cameras_swapped = true;
-    contradicted = fusion.frames() > 0.5;
-    fall_back_on(fusion.frames() > 0.5 ? fusion.mean() : state, EstimatorState::kDiverged);
+    contradicted = !memory.empty();
+    fall_back_on(memory.empty() ? state : memory.fusion().mean(), EstimatorState::kDiverged);
   }
 
   /// A frame that said nothing of the offsets: reports `x` in doubt.
@@ -242,7 +244,7 @@ struct Estimator::Impl {
     state = x;
     frame_state = first_look.frame_state();
     frame_state.x = state;
-    best_likelihood = 1.0 - scorer.distance(state);
+    best_likelihood = hammoude_likelihood(scorer.distance(state));
   }
 
   /// Whether a search has run off from masks that are not the arm's: further than any arm whose joints are all
@@ -251,28 +253,16 @@ struct Estimator::Impl {
     return offsets.norm() > 3.0 * std::sqrt(static_cast<double>(joints)) * options.filter.initial_sd_rad;
   }
 
-  // --- mode best ------------------------------------------------------------------------------
+  // --- mode best: memory and search -----------------------------------------------------------
 
-  /// The memory is about to be dropped for a frame that contradicts it. If it is the frame that is
-  /// wrong, the next ones will agree with the memory again.
-  void shelve(const PullJudge& usual) {
-    if (stalled.suspected()) return;  // what was learned then may be wrong itself
-    if (fusion.frames() >= kYoungMemory_frames) shelf = {fusion, usual, kShelf_frames};
-  }
+  using Verdict = OffsetMemory::Verdict;
 
-  /// Takes the memory back from the shelf once a frame agrees with it.
+  /// Takes a memory back from the shelf once a frame agrees with it.
   void reconsider(const Observation& observation) {
-    if (stalled.suspected()) shelf.reset();
-    if (!shelf) return;
-    const OutlineFit fit = fitter.follow(observation, shelf->fusion);
-    if (shelf->pulls.judge(fitter.pull_of(fit)) == PullJudge::Verdict::kAgrees && fitter.fits(fit.evidence)) {
-      fusion = shelf->fusion;
-      pulls = shelf->pulls;
-      surprised_frames = 0;
-      shelf.reset();
-    } else if (--shelf->frames_left == 0) {
-      shelf.reset();
-    }
+    if (stalled.suspected()) memory.clear_shelf();  // what was learned then may be wrong itself
+    if (memory.shelved() == nullptr) return;
+    const OutlineFit fit = fitter.follow(observation, *memory.shelved());
+    memory.reconsider(fitter.pull_of(fit), fitter.fits(fit.evidence));
   }
 
   void best_step(const Observation& observation) {
@@ -283,84 +273,74 @@ struct Estimator::Impl {
 
     start = Clock::now();
     const double variance = fitter.variance_px2();
-    OutlineFit best;
-    std::optional<OutlineFit> found;
-    bool accepted = false;
-    double gain = 0.0;
     forget_a_stall(observation);
     reconsider(observation);
-    const PullJudge usual = pulls;
-    if (fusion.frames() > 0.5) {
-      best = fitter.follow(observation, fusion);
-      gain = fitter.pull_of(best);
-      accepted = pulls.judge(gain) != PullJudge::Verdict::kContradicts && fitter.fits(best.evidence);
-      if (accepted && fusion.frames() < kYoungMemory_frames) {
-        // A memory of so few frames may hold a wrong minimum, or a frame whose two pictures saw the
-        // arm before and after a slip: it must not fit worse than what a new search finds.
+    OutlineFit best;
+    std::optional<OutlineFit> found;
+    double pull = 0.0;
+    Verdict verdict = Verdict::kNothingKnown;
+    if (!memory.empty()) {
+      best = fitter.follow(observation, memory.fusion());
+      pull = fitter.pull_of(best);
+      verdict = memory.judge(pull, fitter.fits(best.evidence));
+      if (verdict != Verdict::kContradicts && memory.young()) {
+        // So few frames must not fit worse than what a new search finds.
         found = search(observation);
-        accepted = found->distance > kClearlyBetter * scorer.distance(best.x) || !fitter.fits(found->evidence);
+        const bool holds = found->distance > kClearlyBetter * scorer.distance(best.x) || !fitter.fits(found->evidence);
+        if (!holds) verdict = Verdict::kContradicts;
       }
     }
-    if (!accepted && fusion.frames() > 0.5 && turned_swapped(observation)) {
+    if (verdict == Verdict::kContradicts && turned_swapped(observation)) {
       times.refinement_ms += elapsed_ms(start);
       learn_nothing();
       return;
     }
-    if (accepted && pulls.doubting()) {
-      // Not believed yet: the memory stays as it is.
-    } else if (accepted) {
-      surprised_frames = 0;
-      // What no constant offset explains (an error that is not in the model) shows as frames that
-      // keep pulling away; then only recent ones are worth remembering.
-      const double pull = std::max(1.0, gain / kUsualPull);
-      fusion.fade(std::exp(-pull / options.memory_frames));
-      fusion.add(best.evidence, best.x, variance, 1.0 / options.correlated_frames);
-    } else {
-      // Nothing known yet, or what is known no longer fits: look again from the best particles.
-      pulls.forget();
-      if (!found) {
-        if (fusion.frames() > 0.5) suspect_slips();
-        found = search(observation);
-      }
-      const bool good = fitter.fits(found->evidence) && found->distance < options.lock_distance;
-      if (fusion.frames() > 0.5) {
-        ++surprised_frames;
-        if (good || surprised_frames > 5) {
-          shelve(usual);
-          fusion.forget_all();
-          surprised_frames = good ? 0 : surprised_frames;
-          if (!good) filter.reset(state.head(joints));
+    switch (verdict) {
+      case Verdict::kAgrees: memory.learn(best.evidence, best.x, variance, pull); break;
+      case Verdict::kDoubtful: break;
+      case Verdict::kContradicts:
+        if (!found) suspect_slips();
+        [[fallthrough]];
+      case Verdict::kNothingKnown:
+        if (!found) found = search(observation);
+        if (!begin_with(*found)) {
+          times.refinement_ms += elapsed_ms(start);
+          return;
         }
-      }
-      if (!good && fusion.frames() < 0.5 && strayed(found->x.head(joints))) {
-        times.refinement_ms += elapsed_ms(start);
-        const bool lost = surprised_frames > 0;
-        begin_again();
-        contradicted = false;
-        fall_back_on(state, lost ? EstimatorState::kDiverged : EstimatorState::kConverging);
-        return;
-      }
-      best = std::move(*found);
-      if (good) {
-        fusion.forget_all();
-        fusion.add(best.evidence, best.x, variance, 1.0 / options.correlated_frames);
-      }
+        best = std::move(*found);
     }
-    state = fusion.frames() > 0.5 ? fusion.mean() : best.x;
+    state = memory.empty() ? best.x : memory.fusion().mean();
     // A frame that the memory contradicts speaks for itself alone, with the uncertainty that has.
-    contradicted = fusion.frames() > 0.5 && (pulls.doubting() || surprised_frames > 0);
-    frame_state = (contradicted ? first_look : fusion).frame_state(best.evidence, best.x, variance);
+    contradicted = memory.doubted();
+    frame_state = (contradicted ? first_look : memory.fusion()).frame_state(best.evidence, best.x, variance);
     contour_rms_px = best.evidence.rms_px();
-    best_likelihood = 1.0 - scorer.distance(frame_state.x);
+    best_likelihood = hammoude_likelihood(scorer.distance(frame_state.x));
     explained = fitter.fits(best.evidence) && 1.0 - best_likelihood < options.lock_distance;
     times.refinement_ms += elapsed_ms(start);
 
     start = Clock::now();
-    const bool locked = fusion.frames() > 0.5;
-    current = locked ? EstimatorState::kConverging
-                     : (surprised_frames > 0 ? EstimatorState::kDiverged : EstimatorState::kConverging);
-    spread(locked);
+    const bool lost = memory.empty() && memory.surprised();
+    current = lost ? EstimatorState::kDiverged : EstimatorState::kConverging;
+    spread(!memory.empty());
     times.filter_ms += elapsed_ms(start);
+  }
+
+  /// What a search found where nothing is known, or where the frame contradicts what is: becomes the memory if it
+  /// fits. False when the search has run off; then everything begins again.
+  bool begin_with(const OutlineFit& found) {
+    const bool good = fitter.fits(found.evidence) && found.distance < options.lock_distance;
+    const bool given_up = memory.contradict(good, !stalled.suspected());
+    if (good) {
+      memory.begin(found.evidence, found.x, fitter.variance_px2());
+      return true;
+    }
+    if (given_up) filter.reset(state.head(joints));
+    if (!memory.empty() || !strayed(found.x.head(joints))) return true;
+    const bool lost = memory.surprised();
+    begin_again();
+    contradicted = false;
+    fall_back_on(state, lost ? EstimatorState::kDiverged : EstimatorState::kConverging);
+    return false;
   }
 
   /// What was known until now no longer fits: most likely one joint slipped. The worse half of the
@@ -408,7 +388,7 @@ struct Estimator::Impl {
     const Eigen::Index n = filter.states().cols();
     Eigen::VectorXd sd(joints);
     if (locked) {
-      sd = fusion.covariance().diagonal().head(joints).cwiseSqrt();
+      sd = memory.fusion().covariance().diagonal().head(joints).cwiseSqrt();
       sd = sd.cwiseMax(options.filter.spread_min_rad);
     } else {
       sd.setConstant(filter.spread_rad());
@@ -431,9 +411,9 @@ struct Estimator::Impl {
     estimate.best_likelihood = best_likelihood;
     estimate.contour_rms_px = contour_rms_px;
     if (particles_only()) {
-      estimate.covariance_rad2 = cloud_covariance.size() > 0 ? cloud_covariance : filter.covariance();
+      estimate.covariance_rad2 = cloud_covariance;
     } else {
-      const Eigen::MatrixXd covariance = contradicted ? frame_state.covariance : fusion.covariance();
+      const Eigen::MatrixXd covariance = contradicted ? frame_state.covariance : memory.fusion().covariance();
       estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
       for (std::size_t k = static_cast<std::size_t>(joints); k < parameters.size(); ++k) {
         estimate.nuisance_names.push_back(parameters[k].name);
@@ -445,53 +425,61 @@ struct Estimator::Impl {
     estimate.cameras_swapped = cameras_swapped;
     look_for_stalls(observation, estimate);
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-      const CameraObservation* seen = nullptr;
-      if (c < observation.cameras.size() && observation.cameras[c]) {
-        seen = &*observation.cameras[c];
-      } else {
-        for (const auto& other : observation.cameras) {
-          if (other) seen = &*other;
-        }
-      }
-      if (seen == nullptr) continue;
-      estimate.X_CP.push_back(body.hand_pose(*seen, frame_state.x, c));
-      estimate.X_CP_nominal.push_back(body.hand_pose(seen->joints.q, uncorrected(), c));
+      const std::optional<Exposure> at = exposure(observation, c);
+      if (!at) continue;
+      estimate.X_CP.push_back(body.hand_pose(*at, frame_state.x, c));
+      estimate.X_CP_nominal.push_back(body.hand_pose(at->q, uncorrected(), c));
       if (c == 0 || estimate.hand_sd_m == 0.0) {
-        estimate.hand_sd_m = hand_sd(*seen, c);
+        estimate.hand_sd_m = hand_sd(*at, c);
       }
     }
     estimate.weakest = weakest_direction(estimate.covariance_rad2, setup.estimated_joints);
-    if (!particles_only() && !contradicted && current == EstimatorState::kConverging &&
-        fusion.frames() > kSettled_frames && !stalled.suspected() && !stalled.dropped_while_standing() &&
-        estimate.hand_sd_m < options.converged_hand_sd_m) {
+    if (!particles_only() && !contradicted && current == EstimatorState::kConverging && memory.settled() &&
+        !stalled.suspected() && !stalled.dropped_while_standing() && estimate.hand_sd_m < options.converged_hand_sd_m) {
       current = EstimatorState::kConverged;
     }
     estimate.state = current;
   }
 
-  /// Encoders of the estimated joints at the exposure of the first camera that saw something.
-  bool read_encoders(const Observation& observation) {
+  /// The first camera that saw something; null: none did.
+  static const CameraObservation* first_seen(const Observation& observation) {
     const auto seen = std::find_if(observation.cameras.begin(), observation.cameras.end(),
                                    [](const auto& camera) { return camera.has_value(); });
-    if (seen == observation.cameras.end()) return false;
-    for (Eigen::Index k = 0; k < joints; ++k) reading(k) = (*seen)->joints.q(joint_index[static_cast<std::size_t>(k)]);
+    return seen == observation.cameras.end() ? nullptr : &**seen;
+  }
+
+  /// What the hand's pose in a camera is predicted from; none where no camera saw anything. A camera that is absent
+  /// borrows the arm of one that is not, but where it sits itself only its own pictures have told.
+  std::optional<Exposure> exposure(const Observation& observation, std::size_t camera) {
+    const bool present = camera < observation.cameras.size() && observation.cameras[camera];
+    const CameraObservation* seen = present ? &*observation.cameras[camera] : first_seen(observation);
+    if (seen == nullptr) return std::nullopt;
+    if (present) own_correction[camera] = seen->corrections ? seen->corrections->camera : CameraCorrection{};
+    if (present || !seen->corrections) return Exposure(*seen);
+    borrowed = *seen->corrections;
+    borrowed.camera = own_correction[camera];
+    return Exposure(seen->joints.q, &borrowed);
+  }
+
+  /// Encoders of the estimated joints at the exposure of the first camera that saw something.
+  bool read_encoders(const Observation& observation) {
+    const CameraObservation* seen = first_seen(observation);
+    if (seen == nullptr) return false;
+    for (Eigen::Index k = 0; k < joints; ++k) reading(k) = seen->joints.q(joint_index[static_cast<std::size_t>(k)]);
     return true;
   }
 
   /// An encoder that stalled reads on: nothing that its dead reading taught may outlive it.
   void forget_a_stall(const Observation& observation) {
     if (!read_encoders(observation) || !stalled.ends(reading)) return;
-    fusion.forget_all();
-    pulls.forget();
-    shelf.reset();
-    surprised_frames = 0;
+    memory.forget_all();
   }
 
   /// An encoder that stands while its joint moves: what the estimate lags behind is added to its
   /// uncertainty, and once it is certain, nothing is called converged.
   void look_for_stalls(const Observation& observation, Estimate& estimate) {
     if (particles_only() || !read_encoders(observation)) return;
-    const bool remembers = fusion.frames() > kSettled_frames;
+    const bool remembers = memory.settled();
     const bool settled = remembers && !contradicted;
     stalled.look(1e-6 * static_cast<double>(observation.utime), reading, estimate.offset_rad,
                  estimate.covariance_rad2.diagonal().cwiseMax(0.0).cwiseSqrt(), explained, settled, remembers);
@@ -527,36 +515,31 @@ struct Estimator::Impl {
   void reset() {
     begin_again();
     filter = ParticleFilter(joints, options.filter);
-    frame_state = fusion.frame_state();
+    frame_state = memory.fusion().frame_state();
     current = EstimatorState::kHandNotInView;
-    cloud_covariance.resize(0, 0);
-    best_likelihood = effective_size = contour_rms_px = 0.0;
+    cloud_covariance = filter.covariance();
     contradicted = false;
     eye_order = {};
+    own_correction.assign(rig.cameras.size(), {});
   }
 
   /// Nothing that was learned holds.
   void begin_again() {
     filter.reset(Eigen::VectorXd::Zero(joints));
-    fusion.forget_all();
+    memory.forget_all();
     state.setZero();
-    surprised_frames = 0;
-    pulls.forget();
     stalled = StalledEncoders(joints);
-    shelf.reset();
   }
 
   static constexpr double kSearchSpread_rad = 0.0349066;  ///< 2 deg
   static constexpr double kLargestSlip_rad = 0.2094395;   ///< 12 deg; larger ones take more frames
-  static constexpr double kUsualPull = 20.0;              ///< chi-square of a frame that agrees with the memory
-  static constexpr double kYoungMemory_frames = 3.5;
-  static constexpr double kSettled_frames = 4.5;  ///< fewer may still hold a wrong minimum
-  static constexpr int kShelf_frames = 30;
-  static constexpr double kClearlyBetter = 0.8;  ///< Hammoude distance against that of the memory
+  static constexpr double kClearlyBetter = 0.8;           ///< Hammoude distance against that of the memory
 
   EstimatorOptions options;
   RobotSetup setup;
   StereoRig rig;
+  std::vector<CameraCorrection> own_correction;  ///< of each camera, when it was last seen
+  Corrections borrowed;                          ///< what `exposure` last made for a camera that is absent
   std::vector<Parameter> parameters;
   SilhouetteModel silhouettes;
   std::vector<PinholeIntrinsics> intrinsics;
@@ -564,14 +547,8 @@ struct Estimator::Impl {
   ContourAlignment alignment;
   HypothesisScorer scorer;
   ParticleFilter filter;
-  OffsetFusion fusion;
-  struct Shelf {
-    OffsetFusion fusion;
-    PullJudge pulls;  ///< what was usual for it
-    int frames_left;
-  };
-  std::optional<Shelf> shelf;     ///< the memory that the last contradiction cost
   const OffsetFusion first_look;  ///< the prior alone
+  OffsetMemory memory;
   OutlineFitter fitter;
 
   Eigen::Index joints = 0;
@@ -583,15 +560,13 @@ struct Estimator::Impl {
   double best_likelihood = 0.0;
   double effective_size = 0.0;
   double contour_rms_px = 0.0;
-  int surprised_frames = 0;
   bool contradicted = false;
   bool cameras_swapped = false;   ///< the last frame's pictures
   Eigen::MatrixXd first_guesses;  ///< of the joint offsets: the first particles
   EyeOrder eye_order;
-  PullJudge pulls;
   StalledEncoders stalled{0};
-  bool explained = false;  ///< the last frame's pictures, by its estimate
-  Eigen::MatrixXd cloud_covariance;
+  bool explained = false;            ///< the last frame's pictures, by its estimate
+  Eigen::MatrixXd cloud_covariance;  ///< of the particles as they were last weighed
   StageTimes times;
 
   Eigen::VectorXd distance;  ///< Hammoude, of the particles

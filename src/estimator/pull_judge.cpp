@@ -3,8 +3,9 @@
 namespace bodyschema {
 namespace {
 
-constexpr double kSurprise = 400.0;  // contradicts, whatever is usual
-constexpr double kDoubt = 80.0;      // a smaller pull is never doubted ...
+// Pulls, chi-square; where they come from is said in the header.
+constexpr double kSurprise = 400.0;  // 20 sd in one direction: contradicts, whatever is usual
+constexpr double kDoubt = 80.0;      // 9 sd in one direction: a smaller pull is never doubted ...
 constexpr double kDoubtRatio = 8.0;  // ... nor one of fewer times the usual
 constexpr double kUsualFrames = 30.0;
 

@@ -44,41 +44,6 @@ void write_mask_png(const std::filesystem::path& file, const BinaryMask& mask, c
   write(file, picture);
 }
 
-void write_coverage_png(const std::filesystem::path& file, int width, int height,
-                        const std::vector<std::uint8_t>& coverage) {
-  if (coverage.empty() || coverage.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
-    throw FileError(file.string() + ": there is no coverage of this size to write");
-  }
-  cv::Mat picture(height, width, CV_8UC1);
-  for (int v = 0; v < height; ++v) {
-    std::copy_n(coverage.data() + static_cast<std::ptrdiff_t>(v) * width, width, picture.ptr<std::uint8_t>(v));
-  }
-  write(file, picture);
-}
-
-void write_overlay_png(const std::filesystem::path& file, const Image& image, const BinaryMask& mask,
-                       const BinaryMask& valid) {
-  if (image.empty() || mask.width() != image.width || mask.height() != image.height) {
-    throw FileError(file.string() + ": picture and mask differ in size");
-  }
-  cv::Mat picture(image.height, image.width, CV_8UC3);
-  for (int v = 0; v < image.height; ++v) {
-    for (int u = 0; u < image.width; ++u) {
-      const auto* in = image.pixel(u, v);
-      auto& out = picture.at<cv::Vec3b>(v, u);
-      out = image.channels == 3 ? cv::Vec3b(in[2], in[1], in[0]) : cv::Vec3b(in[0], in[0], in[0]);
-      if (!valid.empty() && !valid.at(u, v)) {
-        out[2] = static_cast<std::uint8_t>((out[2] + 255) / 2);
-      }
-      if (!mask.at(u, v)) continue;
-      const bool inner = u > 0 && v > 0 && u + 1 < image.width && v + 1 < image.height && mask.at(u - 1, v) &&
-                         mask.at(u + 1, v) && mask.at(u, v - 1) && mask.at(u, v + 1);
-      if (!inner) out = cv::Vec3b(0, 255, 0);
-    }
-  }
-  write(file, picture);
-}
-
 Image read_picture(const std::filesystem::path& file, const std::function<void(PictureSize)>& check_size) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) throw FileError(file.string() + ": no such file");

@@ -3,7 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/geometry/pose.hpp"
@@ -22,6 +27,35 @@ TEST(EstimatorOptions, ShippedFileHoldsKnownKeysAndUnitsAreConverted) {
   EXPECT_DOUBLE_EQ(options.filter.spread_rad, radians(2.0));
   EXPECT_DOUBLE_EQ(options.converged_hand_sd_m, 3e-3);
   EXPECT_GT(options.priors.head_rad, 0.0);
+}
+
+/// What is in force once the options have been read, by key with dots; numbers however they are written.
+std::map<std::string, std::string> in_force(const Configuration& configuration) {
+  EstimatorOptions::from(configuration);
+  std::map<std::string, std::string> values;
+  std::vector<std::string> sections = {""};
+  std::istringstream text(configuration.print());
+  for (std::string line; std::getline(text, line);) {
+    const std::size_t indent = line.find_first_not_of(' '), colon = line.find(':');
+    sections.resize(indent / 2 + 1);
+    const std::string key = sections.back() + line.substr(indent, colon - indent);
+    if (colon + 1 == line.size()) {
+      sections.push_back(key + ".");
+      continue;
+    }
+    const std::string value = line.substr(colon + 2);
+    char* end = nullptr;
+    const double number = std::strtod(value.c_str(), &end);
+    values[key] = *end == '\0' ? std::to_string(number) : value;
+  }
+  return values;
+}
+
+// Who leaves config/estimator.yaml out gets the same estimator.
+TEST(EstimatorOptions, WhatAConfigurationLeavesOutIsAsShipped) {
+  const auto shipped = in_force(Configuration::load(kShipped));
+  EXPECT_GT(shipped.size(), 30u);
+  EXPECT_EQ(in_force(Configuration::parse("{}")), shipped);
 }
 
 TEST(EstimatorOptions, WhatCannotBeIsAnErrorThatNamesTheKey) {

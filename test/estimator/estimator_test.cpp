@@ -17,6 +17,7 @@ class EstimatorOnOwnRobot : public OwnRobot {
   EstimatorOnOwnRobot() : offset_rad_(paper_offsets_rad()) {
     reach_ = std::make_unique<SyntheticReach>(robot_, setup_, rig_, offset_rad_);
     options_ = EstimatorOptions::from(configuration_);
+    options_.priors = {};  // the joint offsets alone
     options_.silhouette.engine = "contour";
   }
 
@@ -43,6 +44,15 @@ BinaryMask inverted(const BinaryMask& mask) {
     for (int u = 0; u < mask.width(); ++u) result.set(u, v, !mask.at(u, v));
   }
   return result;
+}
+
+/// The same instant with the hand out of view.
+Observation emptied(Observation seen) {
+  for (auto& camera : seen.cameras) {
+    camera->mask = BinaryMask(camera->mask.width(), camera->mask.height());
+    camera->coverage.assign(camera->coverage.size(), 0);
+  }
+  return seen;
 }
 
 double position_error_m(const Estimate& estimate, const Pose& truth) {
@@ -134,17 +144,26 @@ TEST_F(EstimatorOnOwnRobot, PaperModeReducesTheError) {
 TEST_F(EstimatorOnOwnRobot, HandNotInViewKeepsTheOffsetsAndComesBack) {
   Estimator estimator(robot_, setup_, rig_, options_);
   const Estimate before = follow(estimator, *reach_, 0, 6, 20.0);
-  Observation empty = reach_->observe(pose(0.3), 200'000);
-  for (auto& seen : empty.cameras) {
-    seen->mask = BinaryMask(seen->mask.width(), seen->mask.height());
-    seen->coverage.assign(seen->coverage.size(), 0);
-  }
-  const Estimate away = estimator.step(empty);
+  EXPECT_GT(before.contour_rms_px, 0.0);
+  EXPECT_GT(before.effective_sample_size, 0.0);
+  const Estimate away = estimator.step(emptied(reach_->observe(pose(0.3), 200'000)));
   EXPECT_EQ(away.state, EstimatorState::kHandNotInView);
   EXPECT_TRUE(away.offset_rad == before.offset_rad);
+  EXPECT_EQ(away.contour_rms_px, 0.0);
+  EXPECT_EQ(away.effective_sample_size, 0.0);
   const Estimate back = estimator.step(reach_->observe(pose(0.4), 233'333));
   EXPECT_NE(back.state, EstimatorState::kHandNotInView);
   EXPECT_LT(position_error_m(back, reach_->true_hand(pose(0.4), 0)), 5e-4);
+}
+
+TEST_F(EstimatorOnOwnRobot, InPaperModeTheUncertaintyIsTheCloudsAlsoOutOfView) {
+  options_.mode = EstimatorMode::kPaper;
+  Estimator estimator(robot_, setup_, rig_, options_);
+  const Estimate before = follow(estimator, *reach_, 0, 10, 20.0);
+  const Estimate away = estimator.step(emptied(seen(*reach_, 9, 20.0)));
+  EXPECT_EQ(away.state, EstimatorState::kHandNotInView);
+  EXPECT_DOUBLE_EQ(away.hand_sd_m, before.hand_sd_m);
+  EXPECT_TRUE(away.covariance_rad2 == before.covariance_rad2);
 }
 
 TEST_F(EstimatorOnOwnRobot, OneCameraIsEnough) {
@@ -156,6 +175,25 @@ TEST_F(EstimatorOnOwnRobot, OneCameraIsEnough) {
     estimate = estimator.step(observation);
   }
   EXPECT_LT(position_error_m(estimate, reach_->true_hand(pose(1.0), 0)), 1e-3);
+}
+
+// The extended model says that one eye sits 3 mm further out. An eye that goes blind is where it was: it borrows the
+// other's encoders, not its place.
+TEST_F(EstimatorOnOwnRobot, ABlindCameraStaysWhereItIsKnownToBe) {
+  constexpr int kBlind = 10;
+  reach_->shift_camera(1, 3e-3);
+  for (const std::size_t blind : {0u, 1u}) {
+    SCOPED_TRACE("camera " + std::to_string(blind));
+    Estimator estimator(robot_, setup_, rig_, options_);
+    ASSERT_EQ(follow(estimator, *reach_, 0, kBlind, 20.0).state, EstimatorState::kConverged);
+    Observation one_eye = seen(*reach_, kBlind, 20.0);
+    one_eye.cameras[blind].reset();
+    const Estimate estimate = estimator.step(one_eye);
+    for (std::size_t c = 0; c < 2; ++c) {
+      const Pose truth = reach_->true_hand(pose(kBlind / 20.0), c);
+      EXPECT_LT((estimate.X_CP[c].translation() - truth.translation()).norm(), 1e-3) << c;
+    }
+  }
 }
 
 TEST_F(EstimatorOnOwnRobot, SameSeedSameEstimatesWhateverTheThreads) {
@@ -304,6 +342,7 @@ TEST_F(EstimatorOnOwnRobot, PicturesThatGetExchangedAreNoticedAtOnceAndTeachNoth
     EXPECT_TRUE(estimate.cameras_swapped) << frame;
     EXPECT_EQ(estimate.state, EstimatorState::kDiverged) << frame;
     EXPECT_EQ(estimate.offset_rad, before.offset_rad) << frame;
+    EXPECT_EQ(estimate.contour_rms_px, 0.0) << frame;
   }
   const Estimate after = follow(estimator, *reach_, kRight, kRight + 1, kFrames);
   EXPECT_FALSE(after.cameras_swapped);

@@ -36,6 +36,12 @@ class SyntheticReach {
     renderer_ = make_silhouette_scorer(model, fine, options);
   }
 
+  /// From now on a camera lies further along its own x axis than the rig says, and observations say so.
+  void shift_camera(std::size_t camera, double shift_x_m) {
+    known_.resize(rig_.cameras.size(), Corrections(robot_->joint_count()));
+    known_[camera].camera.shift_x_m = shift_x_m;
+  }
+
   /// @param q_true  RobotModel order
   Observation observe(const Eigen::VectorXd& q_true, Microseconds utime) {
     Observation observation;
@@ -51,7 +57,8 @@ class SyntheticReach {
       seen.joints.utime = utime;
       seen.joints.q = q_encoder;
       seen.joints.qdot = Eigen::VectorXd::Zero(q_encoder.size());
-      body_.compute(q_true, Eigen::VectorXd(), c, X_CB);
+      if (!known_.empty()) seen.corrections = known_[c];
+      body_.compute(exposure(q_true, c), Eigen::VectorXd(), c, X_CB);
       const BinaryMask fine = renderer_->render(X_CB, c);
       const int width = rig_.cameras[c].intrinsics.width;
       const int height = rig_.cameras[c].intrinsics.height;
@@ -75,15 +82,20 @@ class SyntheticReach {
   }
 
   [[nodiscard]] Pose true_hand(const Eigen::VectorXd& q_true, std::size_t camera) {
-    return body_.hand_pose(q_true, Eigen::VectorXd(), camera);
+    return body_.hand_pose(exposure(q_true, camera), Eigen::VectorXd(), camera);
   }
 
  private:
+  [[nodiscard]] Exposure exposure(const Eigen::VectorXd& q_true, std::size_t camera) const {
+    return {q_true, known_.empty() ? nullptr : &known_[camera]};
+  }
+
   static constexpr int kFine = 4;
   std::shared_ptr<const RobotModel> robot_;
   RobotSetup setup_;
   StereoRig rig_;
   Eigen::VectorXd offset_;
+  std::vector<Corrections> known_;  ///< by camera; empty: nothing differs
   BodyPoseModel body_;
   std::unique_ptr<SilhouetteScorer> renderer_;
 };

@@ -407,8 +407,10 @@ TEST(Segmenter, GivenCleanPictureAndNoisyFrames) {
   auto clean = scene.without_robot();
   clean.noise_levels = 0;
   const Image background = clean.picture(random);
-  const auto file = std::filesystem::temp_directory_path() / "bodyschema_segmenter_clean.png";
-  write_overlay_png(file, background, BinaryMask(scene.width, scene.height));
+  const auto file = std::filesystem::temp_directory_path() / "bodyschema_segmenter_clean.ppm";
+  std::ofstream(file, std::ios::binary) << "P6\n"
+                                        << scene.width << ' ' << scene.height << "\n255\n"
+                                        << std::string(background.data.begin(), background.data.end());
   auto setup = setup_for(SegmentationMethod::kBackgroundPicture);
   setup.background_pictures["left"] = file;
   Segmenter segmenter(setup, "left", scene.width, scene.height);

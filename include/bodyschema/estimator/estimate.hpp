@@ -42,9 +42,9 @@ struct Estimate {
   std::vector<std::string> nuisance_units;  ///< "rad", "px" or "1" (relative), one per name
   Eigen::VectorXd nuisance;                 ///< in that unit
   Eigen::VectorXd nuisance_sd;              ///< in that unit
-  double effective_sample_size = 0.0;       ///< particles
-  double best_likelihood = 0.0;             ///< 1 - Hammoude distance of the estimate, both images
-  double contour_rms_px = 0.0;              ///< outline residual, 0 when not computed
+  double effective_sample_size = 0.0;       ///< particles, 0 when not computed from this frame
+  double best_likelihood = 0.0;             ///< 1 - Hammoude distance of the estimate, both images; 0 when not in view
+  double contour_rms_px = 0.0;              ///< outline residual, 0 when not computed from this frame
   WeakestDirection weakest;
   double hand_sd_m = 0.0;           ///< hand base in the eye frame: root of the summed variances of x, y, z
   std::string stalled_joint;        ///< its encoder stands although the pictures show it move;
@@ -52,7 +52,8 @@ struct Estimate {
   double stalled_motion_rad = 0.0;  ///< how far it has been seen to move
   bool cameras_swapped = false;     ///< the left picture shows what the right eye sees and the other way
                                     ///< round; nothing is learned from them, state kDiverged. Mode best
-  std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected
+  std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected. In one that is absent: for
+                                    ///< the encoders of another, the camera where it was known to be when last seen
   std::vector<Pose> X_CP_nominal;   ///< the same with encoders and model as they are
   StageTimes times;
 };

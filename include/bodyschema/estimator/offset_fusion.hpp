@@ -6,11 +6,12 @@
 
 namespace bodyschema {
 
-/// Everything all frames said so far about the state, as one quadratic: offsets stay while the arm
-/// moves, so directions that one pose cannot see are seen by another.
+/// An information filter for a constant state, with exponential forgetting.
 ///
-/// cost(x) = x' information x - 2 x' vector, plus the prior (x / sd)^2. Old frames fade
-/// exponentially so that slow changes are followed.
+/// Holds everything all frames said so far about the state as one quadratic: offsets stay while the arm
+/// moves, so directions that one pose cannot see are seen by another.
+/// cost(x) = x' information x - 2 x' vector, plus the prior (x / sd)^2, which does not fade. There is no process noise:
+/// old frames fade exponentially instead, so that slow changes are followed.
 class OffsetFusion {
  public:
   /// @param prior_sd  of each parameter

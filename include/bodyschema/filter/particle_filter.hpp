@@ -10,10 +10,10 @@ namespace bodyschema {
 /// Parameters of the paper's filter (section VI), here in radians unless the name says otherwise.
 struct ParticleFilterOptions {
   std::size_t particles = 200;
-  double initial_sd_rad = 0.0872665;   ///< 5 deg
-  double spread_rad = 0.0523599;       ///< sigma_s at the first resampling, 3 deg
-  double spread_decay = 0.8;           ///< factor per frame
-  double spread_min_rad = 0.00174533;  ///< 0.10 deg
+  double initial_sd_rad = 0.08726646259971647;    ///< 5 deg
+  double spread_rad = 0.05235987755982989;        ///< sigma_s at the first resampling, 3 deg
+  double spread_decay = 0.8;                      ///< factor per frame
+  double spread_min_rad = 0.0017453292519943296;  ///< 0.10 deg
   double kde_sd_deg = 1.0;
   double kde_alpha = 500.0;
   std::uint64_t seed = 1;
