@@ -1,6 +1,8 @@
 #include "bodyschema/logs/mcap_export.hpp"
 
 #include <cmath>
+#include <filesystem>
+#include <system_error>
 
 #include <nlohmann/json.hpp>
 
@@ -246,3 +248,14 @@ McapExportSummary export_mcap(const McapExportOptions& options) {
 }
 
 }  // namespace bodyschema
+/// What is written must not be what is read, by whatever name: the log would be lost.
+void refuse_to_overwrite(const McapExportOptions& options) {
+  for (const std::filesystem::path& written : {options.out, McapWriter::unfinished(options.out)}) {
+    std::error_code none;  // what does not exist is no log
+    if (!std::filesystem::equivalent(options.log, written, none)) continue;
+    throw FileError(options.out.string() + ": would overwrite the log " + options.log.string() +
+                    "; expected another file");
+  }
+}
+
+  refuse_to_overwrite(options);

@@ -60,7 +60,11 @@ class McapWriter::Fields {
   std::string bytes_;
 };
 
-McapWriter::McapWriter(std::filesystem::path file) : file_(std::move(file)), part_(file_.string() + ".part") {
+std::filesystem::path McapWriter::unfinished(const std::filesystem::path& file) {
+  return file.string() + ".part";
+}
+
+McapWriter::McapWriter(std::filesystem::path file) : file_(std::move(file)), part_(unfinished(file_)) {
   stream_.open(part_, std::ios::binary | std::ios::trunc);
   if (!stream_) throw FileError(file_.string() + ": cannot be created");
   put(kMagic);

@@ -18,7 +18,9 @@ class McapWriter {
   using SchemaId = std::uint16_t;
   using ChannelId = std::uint16_t;
 
-  /// Writes to `file` with ".part" added until close(). Throws FileError.
+  /// Where what becomes `file` is written until close(): ".part" added.
+  static std::filesystem::path unfinished(const std::filesystem::path& file);
+  /// Throws FileError.
   explicit McapWriter(std::filesystem::path file);
   ~McapWriter();  ///< removes what was not closed
   McapWriter(const McapWriter&) = delete;

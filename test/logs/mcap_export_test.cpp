@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <vector>
+
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/logs/log_summary.hpp"
 #include "recorded_log.hpp"
@@ -59,6 +62,26 @@ TEST(McapExport, FailsWithOneClearErrorAndLeavesNothing) {
   EXPECT_FALSE(fs::exists(out.string() + ".part"));
   EXPECT_THROW(export_mcap({"/nonexistent.lcmlog", out}), FileError);
   EXPECT_THROW(export_mcap({testing_logs::swinging_log("unwritten.lcmlog"), "/nonexistent/a.mcap"}), FileError);
+}
+
+TEST(McapExport, NeverOverwritesTheLog) {
+  const auto log = testing_logs::swinging_log("kept.lcmlog.part");
+  const auto bytes = [&] {
+    std::ifstream stream(log, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  const std::string before = bytes();
+  const auto link = testing_logs::scratch_file("link.lcmlog");
+  fs::remove(link);
+  fs::create_symlink(log, link);
+  const auto becomes_it = testing_logs::scratch_file("kept.lcmlog");  // ".part" is added while it is written
+  const std::vector<McapExportOptions> wrong = {{log, log}, {link, log}, {log, link}, {log, becomes_it}};
+  for (const auto& options : wrong) {
+    EXPECT_THAT([&] { (void)export_mcap(options); },
+                testing::ThrowsMessage<FileError>(testing::AllOf(testing::HasSubstr(options.log.string()),
+                                                                 testing::HasSubstr(options.out.string()))));
+    EXPECT_EQ(bytes(), before) << options.log << " to " << options.out;
+  }
 }
 
 }  // namespace

@@ -24,7 +24,8 @@ struct McapExportSummary {
 /// with a schema (angles in degrees, by joint name), pictures as JPEG in foxglove.CompressedImage.
 /// A topic is "/" and the channel's name, with "/left" or "/right" for pictures. Log time is when a
 /// message was recorded, publish time its own stamp. The file appears under its name when it is
-/// complete. Throws FileError, DataError when there is nothing to write.
+/// complete. Throws FileError, also where `out` is the log itself, DataError when there is nothing to
+/// write, DeviceError when the disk is full.
 McapExportSummary export_mcap(const McapExportOptions& options);
 
 }  // namespace bodyschema
