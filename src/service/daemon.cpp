@@ -195,14 +195,16 @@ class Daemon {
   }
 
   void open_files() {
-    if (options_.record) {
-      const auto file = free_name(*options_.record);
-      try_to_create(file);
-      recorder_ = std::make_unique<Recorder>(file);
+    std::filesystem::path record_file;
+    if (options_.record) try_to_create(record_file = free_name(*options_.record));
+    if (options_.estimates) try_to_create(estimates_file_ = free_name(*options_.estimates));
+    std::error_code none;  // where one of them is not asked for, or cannot be created
+    if (std::filesystem::equivalent(record_file, estimates_file_, none)) {
+      throw ConfigurationError("--record and --estimates would both write to " + record_file.string() +
+                               "; expected two files");
     }
+    if (options_.record) recorder_ = std::make_unique<Recorder>(record_file);
     if (!options_.estimates) return;
-    estimates_file_ = free_name(*options_.estimates);
-    try_to_create(estimates_file_);
     estimates_.open(estimates_file_);
     if (!estimates_) throw FileError(estimates_file_.string() + ": cannot be written");
   }

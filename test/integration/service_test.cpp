@@ -558,6 +558,8 @@ TEST_F(Service, WrongInputEndsWithOneClearErrorAndStatusTwo) {
       {{"--config", good, "--engine", "magic"}, "--engine"},
       {{"--config", good, "--record", "/nowhere/at/all.lcmlog"}, "/nowhere/at/all.lcmlog"},
       {{"--config", good, "--estimates", "/nowhere/at/all.jsonl"}, "/nowhere/at/all.jsonl"},
+      {{"--config", good, "--record", (scratch_ / "one").string(), "--estimates", (scratch_ / "one").string()},
+       "--record and --estimates would both write to " + (scratch_ / "one").string()},
       {{"--config", good, "--stop-after-idle", "soon"}, "--stop-after-idle"},
   };
   for (const auto& [arguments, words] : cases) {
