@@ -116,8 +116,10 @@ void try_to_create(const std::filesystem::path& file) {
 struct Session {
   Session(std::unique_ptr<Pipeline> loaded, const std::string& lcm_url, Recorder* recorder)
       : pipeline(std::move(loaded)), queue(static_cast<std::size_t>(pipeline->bus().queue_frames)),
-        link(lcm_url, pipeline->bus().one_source_silence_s), receiver(link, pipeline->make_stream(), queue, recorder),
-        picture_since_us(pipeline->rig().cameras.size(), -1) {}
+        link(lcm_url, pipeline->bus().one_source_silence_s,
+             pipeline->bus().longest_message_bytes(pipeline->rig().cameras.size())),
+        receiver(link, pipeline->make_stream(), queue, recorder), picture_since_us(pipeline->rig().cameras.size(), -1) {
+  }
 
   std::unique_ptr<Pipeline> pipeline;
   ObservationQueue queue;

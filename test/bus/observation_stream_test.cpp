@@ -274,6 +274,16 @@ TEST(BusOptions, ShippedFileHoldsTheDefaultsAndOnlyKnownKeys) {
   EXPECT_NEAR(options.synchroniser.joints.max_speed_rad_s, defaults.synchroniser.joints.max_speed_rad_s, 0.01);
 }
 
+TEST(BusOptions, MessagesMayBeAsLongAsThePicturesTheyAllow) {
+  constexpr std::size_t kMiB = 1u << 20;
+  BusOptions options;
+  options.limits.max_width_px = options.limits.max_height_px = 2448;
+  EXPECT_EQ(options.longest_message_bytes(2), 2u * 3u * 2448u * 2448u + kMiB);
+  EXPECT_EQ(options.longest_message_bytes(1), 32 * kMiB);
+  options.limits.max_width_px = options.limits.max_height_px = 32'768;
+  EXPECT_EQ(options.longest_message_bytes(2), 256 * kMiB) << "what LCM carries";
+}
+
 TEST(LcmUrl, ComesFromCommandLineThenEnvironmentThenDefault) {
   unsetenv("LCM_DEFAULT_URL");
   EXPECT_EQ(resolve_lcm_url(std::nullopt), "udpm://239.255.76.67:7667?ttl=0");
