@@ -32,7 +32,6 @@ std::atomic<bool> g_stop{false};
 struct Arguments {
   std::string config;
   std::vector<std::string> overrides;
-  std::string engine;
   std::string log_level = "info";
   bool print_config = false;
   bool list_faults = false;
@@ -242,10 +241,6 @@ int main(int argc, char** argv) {
   auto* config = app.add_option("-c,--config", a.config, "Configuration file, e.g. config/icub_right/simulator.yaml");
   app.add_option("--set", a.overrides, "Override one key: --set simulator.cameras.rate_hz=10 (repeatable)");
   app.add_flag("--print-config", a.print_config, "Print the configuration in force and stop");
-  app.add_option("--engine", a.engine,
-                 "Taken by every program; without effect here: the simulator "
-                 "draws with a rasteriser of its own")
-      ->check(CLI::IsMember({"auto", "atlas", "contour"}));
   app.add_option("--log-level", a.log_level, "trace, debug, info, warn, error or off")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
   app.add_option("--seed", a.seed, "Same seed, same run (default 1)");
