@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -80,7 +81,7 @@ std::map<std::string, double> read_offsets(const std::string& text, std::uint64_
   } else {
     for (const auto& item : CLI::detail::split(text, ',')) {
       double value = 0.0;
-      if (!CLI::detail::lexical_cast(item, value)) {
+      if (!CLI::detail::lexical_cast(item, value) || !std::isfinite(value)) {
         throw ConfigurationError("--offsets: '" + item + "' is not a number; expected paper, random, none or " +
                                  std::to_string(joints.size()) + " numbers in deg");
       }
@@ -243,26 +244,24 @@ int main(int argc, char** argv) {
   app.add_flag("--print-config", a.print_config, "Print the configuration in force and stop");
   app.add_option("--log-level", a.log_level, "trace, debug, info, warn, error or off")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
-  app.add_option("--seed", a.seed, "Same seed, same run (default 1)");
+  app.add_option("--seed", a.seed, "Same seed, same run (default 1)")->check(whole_number());
 
   auto* reach = app.add_flag("--reach", a.reach, "Reach once across the view (default)")->group("Motion");
   auto* babble = app.add_option("--babble", a.babble_s, "Move at random for this many seconds, hand in view")
-                     ->check(CLI::Range(1.0, 3600.0))
+                     ->check(number_in(1.0, 3600.0))
                      ->group("Motion");
   auto* one_way = app.add_option("--one-way", a.one_way_s, "One slow reach of this many seconds, never turning back")
-                      ->check(CLI::Range(1.0, 3600.0))
+                      ->check(number_in(1.0, 3600.0))
                       ->group("Motion");
   auto* poses = app.add_option("--poses", a.poses, "Stop and go: this many postures, each held still for a second")
-                    ->check(CLI::Range(2, 3600))
+                    ->check(number_in(2, 3600))
                     ->group("Motion");
   reach->excludes(babble)->excludes(one_way)->excludes(poses);
   babble->excludes(one_way)->excludes(poses);
   one_way->excludes(poses);
-  app.add_option("--frames", a.frames, "Frames of a reach (default 100)")
-      ->check(CLI::Range(2, 100000))
-      ->group("Motion");
+  app.add_option("--frames", a.frames, "Frames of a reach (default 100)")->check(number_in(2, 100000))->group("Motion");
   app.add_option("--background-frames", a.background_frames, "Empty frames before the arm comes in")
-      ->check(CLI::Range(0, 10000))
+      ->check(number_in(0, 10000))
       ->group("Motion");
   app.add_flag("--head-moves", a.head_moves, "The head moves too")->group("Motion");
   app.add_option("--freeze", a.frozen, "Arm joint that never moves (repeatable)")->group("Motion");
@@ -274,10 +273,11 @@ int main(int argc, char** argv) {
       ->group("Truth");
   app.add_option("--fault", a.faults, "NAME:key=value,... (repeatable); see --list-faults")->group("Truth");
   app.add_option("--hidden-fault", a.hidden, "Draw a fault from this seed; it goes to --truth only (repeatable)")
+      ->check(whole_number())
       ->group("Truth");
   app.add_option("--hidden-size", a.hidden_size,
                  "Size of hidden faults, times the smallest detectable (default: drawn from 3 to 6)")
-      ->check(CLI::Range(0.01, 100.0))
+      ->check(number_in(0.01, 100.0))
       ->group("Truth");
   app.add_flag("--hidden-outside", a.hidden_outside, "Draw hidden faults that no diagnosis can name")->group("Truth");
   app.add_flag("--list-faults", a.list_faults, "Print all faults and stop")->group("Truth");
@@ -289,7 +289,7 @@ int main(int argc, char** argv) {
       ->group("Output")
       ->excludes(log);
   app.add_option("--rate", a.rate, "Speed over the network, times real time (default 1)")
-      ->check(CLI::Range(0.001, 100.0))
+      ->check(number_in(0.001, 100.0))
       ->group("Output")
       ->excludes(log);
   app.add_option("--pictures", a.pictures, "rgb (default), gray or jpeg")

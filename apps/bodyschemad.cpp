@@ -72,12 +72,12 @@ int main(int argc, char** argv) {
                  "Record all messages in and out to this log; what is there already is kept, NAME.1 follows");
   app.add_option("--estimates", estimates,
                  "Write one JSON line per estimate, as bodyschema replay does; kept as with --record");
-  app.add_option("--frames", options.frames, "Stop after so many estimates");
+  app.add_option("--frames", options.frames, "Stop after so many estimates")->check(apps::whole_number());
   app.add_option("--stop-after-idle", options.stop_after_idle_s,
                  "Stop when nothing has come for so many seconds, once something has")
-      ->check(CLI::Range(0.1, 1e6));
+      ->check(apps::number_in(0.1, 1e6));
   app.add_option("--page", page, "Serve the live page on this port of localhost: http://localhost:PORT/")
-      ->check(CLI::Range(1, 65535));
+      ->check(apps::number_in(1, 65535));
   app.add_flag("--timings", options.timings, "Print the time of each stage at the end");
   app.add_flag("--check-config", check_config, "Check configuration, robot and engine, and stop");
   try {

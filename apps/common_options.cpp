@@ -1,13 +1,49 @@
 #include "common_options.hpp"
 
+#include <cerrno>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
+#include <sstream>
+#include <type_traits>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/installation.hpp"
 #include "bodyschema/core/logging.hpp"
 
 namespace bodyschema::apps {
+namespace {
+
+template <class Number>
+bool reads_as(const std::string& text, Number& value) {
+  if (std::is_unsigned_v<Number> && text.find('-') != std::string::npos) return false;
+  errno = 0;
+  return CLI::detail::lexical_cast(text, value) && errno != ERANGE;
+}
+
+}  // namespace
+
+template <class Number>
+CLI::Validator number_in(Number least, Number most) {
+  std::ostringstream range;
+  range << "in [" << least << " - " << most << ']';
+  return {[least, most, where = range.str()](const std::string& text) {
+            Number value{};
+            if (reads_as(text, value) && value >= least && value <= most) return std::string();
+            return "'" + text + "' is not a number " + where;
+          },
+          CLI::detail::type_name<Number>() + (" " + range.str())};
+}
+template CLI::Validator number_in(int least, int most);
+template CLI::Validator number_in(double least, double most);
+
+CLI::Validator whole_number() {
+  return {[](const std::string& text) {
+            std::uint64_t value = 0;
+            return reads_as(text, value) ? std::string() : "'" + text + "' is not a whole number from 0 on";
+          },
+          ""};
+}
 
 void CommonOptions::add_to(CLI::App& app) {
   app.add_option("-c,--config", config, "Configuration file, e.g. config/icub_right/estimator.yaml")->required();

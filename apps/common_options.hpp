@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -27,6 +28,12 @@ struct CommonOptions {
   /// Those choices as overrides, "filter.particles=500".
   [[nodiscard]] std::vector<std::string> choices() const;
 };
+
+/// For values of options: a number from `least` to `most` (int or double). CLI::Range lets NaN pass.
+template <class Number>
+CLI::Validator number_in(Number least, Number most);
+/// For values of unsigned options: CLI11 takes a number with a sign for a large one.
+CLI::Validator whole_number();
 
 /// How --help is laid out in every program: as CLI11 does, without saying a value's type twice.
 std::shared_ptr<CLI::Formatter> help_formatter();

@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "../common_options.hpp"
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/core/installation.hpp"
 #include "bodyschema/core/logging.hpp"
@@ -50,7 +51,7 @@ void add_to_mcap(CLI::App& log) {
   command->add_option("-o,--out", options->out, "MCAP file to write")->required();
   command
       ->add_option("--jpeg-quality", options->jpeg_quality, "Of pictures that were not compressed already (default 90)")
-      ->check(CLI::Range(1, 100));
+      ->check(number_in(1, 100));
   command->callback([options] {
     set_up_logging("warn");
     const McapExportSummary summary = export_mcap(*options);
