@@ -238,7 +238,8 @@ int main(int argc, char** argv) {
       "  bodyschema-sim --config config/icub_right/simulator.yaml --reach --log reach.log --truth truth.json\n"
       "  bodyschema-sim --config config/icub_right/simulator.yaml --babble 60 --offsets random --seed 4 \\\n"
       "                 --fault backlash:joint=r_elbow,value=0.8 --log babble.log --truth truth.json\n"
-      "Exit status: 0 done, 2 wrong command line or configuration, 1 any other failure.");
+      "Exit status: 0 done, 2 wrong command line, configuration or file, 3 data that cannot be used\n"
+      "(no posture with the hand in view), 1 any other failure.");
   auto* config = app.add_option("-c,--config", a.config, "Configuration file, e.g. config/icub_right/simulator.yaml");
   app.add_option("--set", a.overrides, "Override one key: --set simulator.cameras.rate_hz=10 (repeatable)");
   app.add_flag("--print-config", a.print_config, "Print the configuration in force and stop");
@@ -295,16 +296,11 @@ int main(int argc, char** argv) {
   app.add_option("--pictures", a.pictures, "rgb (default), gray or jpeg")
       ->check(CLI::IsMember({"rgb", "gray", "jpeg"}))
       ->group("Output");
-  try {
+  return run_and_report("bodyschema-sim", app, [&] {
     app.parse(argc, argv);
-    if (!a.list_faults && config->count() == 0) throw CLI::RequiredError("--config");
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  if (a.list_faults) {
-    print_faults();
-    return 0;
-  }
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { g_stop = true; });
-  return run_and_report("bodyschema-sim", [&] { run(a); });
+    if (a.list_faults) return print_faults();
+    if (config->count() == 0) throw CLI::RequiredError("--config");
+    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { g_stop = true; });
+    run(a);
+  });
 }

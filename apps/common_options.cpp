@@ -14,6 +14,11 @@
 namespace bodyschema::apps {
 namespace {
 
+/// Exit statuses, the same in every program. The systemd unit knows the first.
+constexpr int kWrongInput = 2;
+constexpr int kUnusableData = 3;
+constexpr int kFailure = 1;
+
 template <class Number>
 bool reads_as(const std::string& text, Number& value) {
   if (std::is_unsigned_v<Number> && text.find('-') != std::string::npos) return false;
@@ -99,16 +104,26 @@ std::shared_ptr<CLI::Formatter> help_formatter() {
   return std::make_shared<HelpFormatter>();
 }
 
-int run_and_report(const char* program, const std::function<void()>& action) {
+int run_and_report(const char* program, const CLI::App& app, const std::function<void()>& action) {
+  const auto failed = [program](const std::exception& e, int status) {
+    std::fprintf(stderr, "%s: error: %s\n", program, e.what());
+    return status;
+  };
   try {
     action();
     return 0;
+  } catch (const CLI::RuntimeError& e) {  // all has been said
+    return e.get_exit_code();
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : kWrongInput;
   } catch (const ConfigurationError& e) {
-    std::fprintf(stderr, "%s: error: %s\n", program, e.what());
-    return 2;
+    return failed(e, kWrongInput);
+  } catch (const FileError& e) {
+    return failed(e, kWrongInput);
+  } catch (const DataError& e) {
+    return failed(e, kUnusableData);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "%s: error: %s\n", program, e.what());
-    return 1;
+    return failed(e, kFailure);
   }
 }
 

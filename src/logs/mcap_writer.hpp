@@ -31,7 +31,7 @@ class McapWriter {
   ChannelId add_channel(std::string_view topic, SchemaId schema);
   /// Times in ns since the Unix epoch.
   void write(ChannelId channel, std::uint64_t log_time, std::uint64_t publish_time, std::string_view json);
-  /// Completes the file and gives it its name. Throws FileError when the disk is full.
+  /// Completes the file and gives it its name. Throws DeviceError when the disk is full.
   void close();
   [[nodiscard]] std::uint64_t bytes_written() const { return position_; }
 

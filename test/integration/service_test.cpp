@@ -617,6 +617,36 @@ TEST_F(Service, NumbersThatAreNoneAreRefusedByOptionAndValue) {
   }
 }
 
+/// The systemd unit and scripts tell what to do next by it.
+TEST_F(Service, ExitStatusMeansTheSameInEveryProgram) {
+  const std::string simulator = std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/simulator.yaml";
+  const std::string log = (scratch_ / "no.lcmlog").string(), out = (scratch_ / "out").string();
+  struct Case {
+    int status;
+    std::vector<std::string> command;
+    std::string words;
+  };
+  const std::vector<Case> cases = {
+      {2,
+       {"bodyschemad", "--config", reach_configuration(), "-l", url_, "--set", "robot.urdf=missing.urdf"},
+       "missing.urdf"},
+      {2, {"bodyschema-sim", "--config", simulator, "--log", log, "--set", "robot.urdf=missing.urdf"}, "missing.urdf"},
+      {2,
+       {"bodyschema", "replay", "missing.lcmlog", "--config", reach_configuration(), "--out", out},
+       "missing.lcmlog"},
+      {3,
+       {"bodyschema-sim", "--config", simulator, "--log", log, "--set", "simulator.motion.distance_min_m=1.9", "--set",
+        "simulator.motion.distance_max_m=2"},
+       "no reach found"},
+  };
+  for (const auto& [status, command, words] : cases) {
+    Process process(command, scratch_.folder());
+    EXPECT_EQ(process.wait(kStart), status) << command.front();
+    EXPECT_THAT(process.err(), HasSubstr(command.front() + ": error: "));
+    EXPECT_THAT(process.err(), HasSubstr(words));
+  }
+}
+
 TEST_F(Service, ChecksAndPrintsTheConfigurationWithoutTheNetwork) {
   Process check(daemon({"--check-config"}), scratch_.folder());
   EXPECT_EQ(check.wait(kStart), 0);
