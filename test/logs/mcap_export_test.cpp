@@ -43,6 +43,27 @@ TEST(McapExport, LeavesOutWhatCannotBeRead) {
   EXPECT_EQ(summary.unknown, 1u);
 }
 
+/// Chunks are not compressed: what was written stands in the file.
+std::string written(const McapExportOptions& options) {
+  (void)export_mcap(options);
+  std::ifstream stream(options.out, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+TEST(McapExport, JointsThatSlideAreInMetres) {
+  const auto log = testing_logs::scratch_file("sliding.lcmlog");
+  auto message = testing_logs::joints(testing_logs::kBegin, 0.5f, 0.25f);
+  message.joint_velocity = {0.0f, 0.125f};
+  message.joint_name = {"elbow", "lift"};
+  LogWriter(log).publish("JOINTS", 1, encode(message));
+  McapExportOptions options{log, testing_logs::scratch_file("sliding.mcap")};
+  EXPECT_THAT(written(options), testing::Not(testing::HasSubstr("position_m")));
+  options.sliding_joints = {"lift"};
+  const std::string known = written(options);
+  EXPECT_THAT(known, testing::HasSubstr(R"("position_m":{"lift":0.25},"velocity_m_s":{"lift":0.125}})"));
+  EXPECT_THAT(known, testing::HasSubstr(R"("position_deg":{"elbow":28.6)"));
+}
+
 TEST(McapExport, NamesThatAreNoUtf8AreReplacedNotRefused) {
   const auto log = testing_logs::scratch_file("latin.lcmlog");
   auto message = testing_logs::joints(testing_logs::kBegin, 0.1f, 0.2f);
