@@ -1,13 +1,9 @@
 #include <CLI/CLI.hpp>
-#include <cstdio>
 
-#include "bodyschema/core/error.hpp"
 #include "commands/commands.hpp"
 #include "common_options.hpp"
 
-/// The offline program: one subcommand per workflow, each in apps/commands/. Exit status: 0 done,
-/// 2 wrong command line or configuration, 3 data that cannot be used (a log too short), 1 any other
-/// failure.
+/// The offline program: one subcommand per workflow, each in apps/commands/.
 int main(int argc, char** argv) {
   CLI::App app{"Body Schema: markerless calibration of a humanoid's arm from its own eyes"};
   app.formatter(bodyschema::apps::help_formatter());  // before the commands, which take it over
@@ -15,8 +11,8 @@ int main(int argc, char** argv) {
   app.footer(
       "Example:\n"
       "  bodyschema replay reach.lcmlog --config config/icub_right/estimator.yaml --out out/reach\n"
-      "bodyschema COMMAND --help explains each. Exit status: 0 done, 2 wrong command line or\n"
-      "configuration, 3 data that cannot be used (a log too short), 1 any other failure.");
+      "bodyschema COMMAND --help explains each. Exit status: 0 done, 2 wrong command line,\n"
+      "configuration or file, 3 data that cannot be used (a log too short), 1 any other failure.");
   app.set_version_flag("--version", BODYSCHEMA_VERSION);
   bodyschema::apps::add_import_yarp(app);
   bodyschema::apps::add_replay(app);
@@ -27,21 +23,5 @@ int main(int argc, char** argv) {
   bodyschema::apps::add_log(app);
   bodyschema::apps::add_new_robot(app);
   bodyschema::apps::add_selftest(app);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::RuntimeError& e) {
-    return e.get_exit_code();
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  } catch (const bodyschema::DataError& e) {
-    std::fprintf(stderr, "bodyschema: error: %s\n", e.what());
-    return 3;
-  } catch (const bodyschema::ConfigurationError& e) {
-    std::fprintf(stderr, "bodyschema: error: %s\n", e.what());
-    return 2;
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "bodyschema: error: %s\n", e.what());
-    return 1;
-  }
-  return 0;
+  return bodyschema::apps::run_and_report("bodyschema", app, [&] { app.parse(argc, argv); });
 }

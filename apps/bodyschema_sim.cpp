@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -32,7 +33,6 @@ std::atomic<bool> g_stop{false};
 struct Arguments {
   std::string config;
   std::vector<std::string> overrides;
-  std::string engine;
   std::string log_level = "info";
   bool print_config = false;
   bool list_faults = false;
@@ -81,7 +81,7 @@ std::map<std::string, double> read_offsets(const std::string& text, std::uint64_
   } else {
     for (const auto& item : CLI::detail::split(text, ',')) {
       double value = 0.0;
-      if (!CLI::detail::lexical_cast(item, value)) {
+      if (!CLI::detail::lexical_cast(item, value) || !std::isfinite(value)) {
         throw ConfigurationError("--offsets: '" + item + "' is not a number; expected paper, random, none or " +
                                  std::to_string(joints.size()) + " numbers in deg");
       }
@@ -238,36 +238,31 @@ int main(int argc, char** argv) {
       "  bodyschema-sim --config config/icub_right/simulator.yaml --reach --log reach.log --truth truth.json\n"
       "  bodyschema-sim --config config/icub_right/simulator.yaml --babble 60 --offsets random --seed 4 \\\n"
       "                 --fault backlash:joint=r_elbow,value=0.8 --log babble.log --truth truth.json\n"
-      "Exit status: 0 done, 2 wrong command line or configuration, 1 any other failure.");
+      "Exit status: 0 done, 2 wrong command line, configuration or file, 3 data that cannot be used\n"
+      "(no posture with the hand in view), 1 any other failure.");
   auto* config = app.add_option("-c,--config", a.config, "Configuration file, e.g. config/icub_right/simulator.yaml");
   app.add_option("--set", a.overrides, "Override one key: --set simulator.cameras.rate_hz=10 (repeatable)");
   app.add_flag("--print-config", a.print_config, "Print the configuration in force and stop");
-  app.add_option("--engine", a.engine,
-                 "Taken by every program; without effect here: the simulator "
-                 "draws with a rasteriser of its own")
-      ->check(CLI::IsMember({"auto", "atlas", "contour"}));
   app.add_option("--log-level", a.log_level, "trace, debug, info, warn, error or off")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
-  app.add_option("--seed", a.seed, "Same seed, same run (default 1)");
+  app.add_option("--seed", a.seed, "Same seed, same run (default 1)")->check(whole_number());
 
   auto* reach = app.add_flag("--reach", a.reach, "Reach once across the view (default)")->group("Motion");
   auto* babble = app.add_option("--babble", a.babble_s, "Move at random for this many seconds, hand in view")
-                     ->check(CLI::Range(1.0, 3600.0))
+                     ->check(number_in(1.0, 3600.0))
                      ->group("Motion");
   auto* one_way = app.add_option("--one-way", a.one_way_s, "One slow reach of this many seconds, never turning back")
-                      ->check(CLI::Range(1.0, 3600.0))
+                      ->check(number_in(1.0, 3600.0))
                       ->group("Motion");
   auto* poses = app.add_option("--poses", a.poses, "Stop and go: this many postures, each held still for a second")
-                    ->check(CLI::Range(2, 3600))
+                    ->check(number_in(2, 3600))
                     ->group("Motion");
   reach->excludes(babble)->excludes(one_way)->excludes(poses);
   babble->excludes(one_way)->excludes(poses);
   one_way->excludes(poses);
-  app.add_option("--frames", a.frames, "Frames of a reach (default 100)")
-      ->check(CLI::Range(2, 100000))
-      ->group("Motion");
+  app.add_option("--frames", a.frames, "Frames of a reach (default 100)")->check(number_in(2, 100000))->group("Motion");
   app.add_option("--background-frames", a.background_frames, "Empty frames before the arm comes in")
-      ->check(CLI::Range(0, 10000))
+      ->check(number_in(0, 10000))
       ->group("Motion");
   app.add_flag("--head-moves", a.head_moves, "The head moves too")->group("Motion");
   app.add_option("--freeze", a.frozen, "Arm joint that never moves (repeatable)")->group("Motion");
@@ -279,10 +274,11 @@ int main(int argc, char** argv) {
       ->group("Truth");
   app.add_option("--fault", a.faults, "NAME:key=value,... (repeatable); see --list-faults")->group("Truth");
   app.add_option("--hidden-fault", a.hidden, "Draw a fault from this seed; it goes to --truth only (repeatable)")
+      ->check(whole_number())
       ->group("Truth");
   app.add_option("--hidden-size", a.hidden_size,
                  "Size of hidden faults, times the smallest detectable (default: drawn from 3 to 6)")
-      ->check(CLI::Range(0.01, 100.0))
+      ->check(number_in(0.01, 100.0))
       ->group("Truth");
   app.add_flag("--hidden-outside", a.hidden_outside, "Draw hidden faults that no diagnosis can name")->group("Truth");
   app.add_flag("--list-faults", a.list_faults, "Print all faults and stop")->group("Truth");
@@ -294,22 +290,17 @@ int main(int argc, char** argv) {
       ->group("Output")
       ->excludes(log);
   app.add_option("--rate", a.rate, "Speed over the network, times real time (default 1)")
-      ->check(CLI::Range(0.001, 100.0))
+      ->check(number_in(0.001, 100.0))
       ->group("Output")
       ->excludes(log);
   app.add_option("--pictures", a.pictures, "rgb (default), gray or jpeg")
       ->check(CLI::IsMember({"rgb", "gray", "jpeg"}))
       ->group("Output");
-  try {
+  return run_and_report("bodyschema-sim", app, [&] {
     app.parse(argc, argv);
-    if (!a.list_faults && config->count() == 0) throw CLI::RequiredError("--config");
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  if (a.list_faults) {
-    print_faults();
-    return 0;
-  }
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { g_stop = true; });
-  return run_and_report("bodyschema-sim", [&] { run(a); });
+    if (a.list_faults) return print_faults();
+    if (config->count() == 0) throw CLI::RequiredError("--config");
+    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { g_stop = true; });
+    run(a);
+  });
 }

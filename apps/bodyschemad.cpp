@@ -14,11 +14,6 @@ namespace {
 
 using namespace bodyschema;
 
-/// Status 2: the command line, the configuration or a file it names is wrong, and starting again
-/// would not help; the systemd unit knows it.
-constexpr int kWrongInput = 2;
-constexpr int kFailure = 1;
-
 void check_configuration(const apps::CommonOptions& common, const std::string& lcm_url) {
   const Configuration configuration = common.load();
   Pipeline pipeline(configuration);
@@ -56,7 +51,7 @@ int main(int argc, char** argv) {
       "  bodyschemad --config config/icub_right/estimator.yaml\n"
       "  bodyschemad --config config/icub_right/estimator.yaml --record reach.lcmlog --page 8080\n"
       "SIGTERM stops, SIGHUP reads the configuration again. Exit status: 0 stopped as asked, 2 wrong\n"
-      "command line, configuration or file, 1 any other failure.");
+      "command line, configuration or file, 3 data that cannot be used, 1 any other failure.");
   apps::CommonOptions common;
   DaemonOptions options;
   options.version = BODYSCHEMA_VERSION;
@@ -72,20 +67,16 @@ int main(int argc, char** argv) {
                  "Record all messages in and out to this log; what is there already is kept, NAME.1 follows");
   app.add_option("--estimates", estimates,
                  "Write one JSON line per estimate, as bodyschema replay does; kept as with --record");
-  app.add_option("--frames", options.frames, "Stop after so many estimates");
+  app.add_option("--frames", options.frames, "Stop after so many estimates")->check(apps::whole_number());
   app.add_option("--stop-after-idle", options.stop_after_idle_s,
                  "Stop when nothing has come for so many seconds, once something has")
-      ->check(CLI::Range(0.1, 1e6));
+      ->check(apps::number_in(0.1, 1e6));
   app.add_option("--page", page, "Serve the live page on this port of localhost: http://localhost:PORT/")
-      ->check(CLI::Range(1, 65535));
+      ->check(apps::number_in(1, 65535));
   app.add_flag("--timings", options.timings, "Print the time of each stage at the end");
   app.add_flag("--check-config", check_config, "Check configuration, robot and engine, and stop");
-  try {
+  return apps::run_and_report("bodyschemad", app, [&] {
     app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : kWrongInput;
-  }
-  try {
     options.lcm_url = resolve_lcm_url(lcm_url);
     if (!record.empty()) options.record = record;
     if (!estimates.empty()) options.estimates = estimates;
@@ -97,15 +88,5 @@ int main(int argc, char** argv) {
     } else {
       run_daemon([&common] { return common.load(); }, options);
     }
-    return 0;
-  } catch (const ConfigurationError& e) {
-    std::fprintf(stderr, "bodyschemad: error: %s\n", e.what());
-    return kWrongInput;
-  } catch (const FileError& e) {
-    std::fprintf(stderr, "bodyschemad: error: %s\n", e.what());
-    return kWrongInput;
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "bodyschemad: error: %s\n", e.what());
-    return kFailure;
-  }
+  });
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,11 +29,19 @@ struct CommonOptions {
   [[nodiscard]] std::vector<std::string> choices() const;
 };
 
+/// For values of options: a number from `least` to `most` (int or double). CLI::Range lets NaN pass.
+template <class Number>
+CLI::Validator number_in(Number least, Number most);
+/// For values of unsigned options: CLI11 takes a number with a sign for a large one.
+CLI::Validator whole_number();
+
 /// How --help is laid out in every program: as CLI11 does, without saying a value's type twice.
 std::shared_ptr<CLI::Formatter> help_formatter();
 
-/// Runs `action`, turning every exception into one line on standard error. The value is the
-/// program's exit status: 0, 2 after a wrong command line or configuration, 1 after any other error.
-int run_and_report(const char* program, const std::function<void()>& action);
+/// Runs `action`, turning every exception into one line on standard error. The value is the program's exit status:
+/// 0; 2 after a wrong command line, configuration or file, where starting again would not help; 3 for data that
+/// cannot be used (a log too short); 1 after any other error. Where `action` parses the command line, CLI11 says what
+/// is wrong with it, --help and --version included (0).
+int run_and_report(const char* program, const CLI::App& app, const std::function<void()>& action);
 
 }  // namespace bodyschema::apps

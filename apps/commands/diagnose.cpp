@@ -26,8 +26,8 @@ void add_diagnose(CLI::App& app) {
   command->add_option("-o,--out", a->out, "Folder for report.html, report.json and extended_model.yaml")->required();
   command->add_option("--picture-rate", a->rate_hz, "Pictures used per second and camera")
       ->capture_default_str()
-      ->check(CLI::Range(0.5, 120.0));
-  command->add_option("--threads", a->threads, "Worker threads")->capture_default_str()->check(CLI::Range(1, 256));
+      ->check(number_in(0.5, 120.0));
+  command->add_option("--threads", a->threads, "Worker threads")->capture_default_str()->check(number_in(1, 256));
   a->common.add_to(*command);
   command->callback([a] {
     const Configuration configuration = a->common.load();

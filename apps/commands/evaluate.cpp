@@ -28,7 +28,9 @@ void add_evaluate(CLI::App& app) {
   command->add_option("--trials", a->options.trials, "Seeded trials of each experiment")
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
-  command->add_option("--seed", a->options.seed, "Seed of the first trial")->capture_default_str();
+  command->add_option("--seed", a->options.seed, "Seed of the first trial")
+      ->capture_default_str()
+      ->check(whole_number());
   command->add_option("--threads", a->options.threads, "Trials side by side; 0: one per core")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));

@@ -1,16 +1,33 @@
 #include <cstdio>
 #include <memory>
+#include <optional>
+#include <set>
+#include <string>
 
+#include "../common_options.hpp"
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/core/installation.hpp"
 #include "bodyschema/core/logging.hpp"
 #include "bodyschema/diagnosis/log_testability.hpp"
 #include "bodyschema/logs/log_summary.hpp"
 #include "bodyschema/logs/mcap_export.hpp"
+#include "bodyschema/robot/robot_model.hpp"
+#include "bodyschema/robot/robot_setup.hpp"
 #include "commands.hpp"
 
 namespace bodyschema::apps {
 namespace {
+
+std::set<std::string> sliding_joints(const Configuration& configuration) {
+  const Configuration robot = configuration.section("robot");
+  const auto model = RobotSetup::from(robot).load();
+  robot.reject_unknown_keys();
+  std::set<std::string> names;
+  for (const auto& joint : model->joints()) {
+    if (joint.slides) names.insert(joint.name);
+  }
+  return names;
+}
 
 void add_info(CLI::App& log) {
   struct Arguments {
@@ -26,33 +43,45 @@ void add_info(CLI::App& log) {
       "  bodyschema log info reach.lcmlog\n"
       "  bodyschema log info reach.lcmlog --config config/icub_right/estimator.yaml");
   command->add_option("log", a->log, "LCM log")->required();
-  command->add_option("-c,--config", a->config, "Say too what a diagnosis of this robot could test with the log");
+  command->add_option("-c,--config", a->config,
+                      "Tell joints that slide from those that turn, and say what a diagnosis of this robot could "
+                      "test with the log");
   command->add_option("--set", a->overrides, "Override one key: --set bus.channel_prefix=LAB (repeatable)");
   command->add_flag("--json", a->json, "Print JSON, without what a diagnosis could test");
   command->callback([a] {
     set_up_logging("warn");
-    const LogSummary summary = summarise_log(a->log);
+    std::optional<Configuration> configuration;
+    std::optional<std::set<std::string>> sliding;
+    if (!a->config.empty()) {
+      configuration = Configuration::load(find_data_file(a->config), a->overrides);
+      sliding = sliding_joints(*configuration);
+    }
+    const LogSummary summary = summarise_log(a->log, sliding);
     std::fputs((a->json ? summary.json() : summary.text()).c_str(), stdout);
-    if (a->config.empty() || a->json) return;
-    const Configuration configuration = Configuration::load(find_data_file(a->config), a->overrides);
-    std::printf("\n%s", testability_of(configuration, a->log).text().c_str());
+    if (configuration && !a->json) std::printf("\n%s", testability_of(*configuration, a->log).text().c_str());
   });
 }
 
 void add_to_mcap(CLI::App& log) {
   auto options = std::make_shared<McapExportOptions>();
+  auto config = std::make_shared<std::string>();
   CLI::App* command = log.add_subcommand("to-mcap", "Rewrite a log as MCAP, for Foxglove and PlotJuggler");
   command->footer(
       "Example:\n"
       "  bodyschema log to-mcap reach.lcmlog --out reach.mcap\n"
-      "Joint states, offsets and status become JSON with a schema, pictures JPEG.");
+      "Joint states, offsets and status become JSON with a schema, pictures JPEG. Positions are in deg,\n"
+      "as if every joint turned, unless --config tells which slide: these are in m then.");
   command->add_option("log", options->log, "LCM log")->required();
   command->add_option("-o,--out", options->out, "MCAP file to write")->required();
+  command->add_option("-c,--config", *config, "The robot's configuration, where it has joints that slide");
   command
       ->add_option("--jpeg-quality", options->jpeg_quality, "Of pictures that were not compressed already (default 90)")
-      ->check(CLI::Range(1, 100));
-  command->callback([options] {
+      ->check(number_in(1, 100));
+  command->callback([options, config] {
     set_up_logging("warn");
+    if (!config->empty()) {
+      options->sliding_joints = sliding_joints(Configuration::load(find_data_file(*config)));
+    }
     const McapExportSummary summary = export_mcap(*options);
     std::printf("%s: %.1f MB\n", options->out.c_str(), 1e-6 * static_cast<double>(summary.bytes));
     for (const auto& [topic, count] : summary.messages) {

@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "../common_options.hpp"
 #include "bodyschema/core/logging.hpp"
 #include "bodyschema/pipeline/starter_configuration.hpp"
 #include "commands.hpp"
@@ -30,7 +31,7 @@ void add_new_robot(CLI::App& app) {
       ->take_all();
   command->add_option("--size", a->size, "Size of the pictures in px, WIDTHxHEIGHT (default 640x480)");
   command->add_option("--focal", a->options.focal_px, "Focal length in px; a guess without it")
-      ->check(CLI::Range(1.0, 1e5));
+      ->check(number_in(1.0, 1e5));
   command->add_option("--prefix", a->options.channel_prefix,
                       "Messages come on PREFIX_JOINT_STATE and PREFIX_CAMERAS (default ROBOT)");
   command->add_option("-o,--out", a->options.out, "Folder for robot.yaml, estimator.yaml and simulator.yaml")

@@ -18,7 +18,6 @@ void add_replay(CLI::App& app) {
     int overlays = 3;
     bool masks = false;
     bool learn_online = false;
-    bool learn_first = false;  // the default now; scripts may still say so
   };
   auto a = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("replay", "Run a recorded log through the estimator");
@@ -33,10 +32,8 @@ void add_replay(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::Range(0, 100000));
   command->add_flag("--masks", a->masks, "Write the observed masks too");
-  CLI::Option* online =
-      command->add_flag("--learn-background-online", a->learn_online,
-                        "Learn the background from the first pictures, as bodyschemad does, not from the whole log");
-  command->add_flag("--learn-background-first", a->learn_first)->group("")->excludes(online);
+  command->add_flag("--learn-background-online", a->learn_online,
+                    "Learn the background from the first pictures, as bodyschemad does, not from the whole log");
   a->common.add_to(*command);
   a->common.add_extended_model_to(*command);
   command->callback([a] {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "bodyschema/bus/udpm_assembler.hpp"
 #include "bodyschema/geometry/pose.hpp"
 
 namespace bodyschema {
@@ -14,6 +15,14 @@ Microseconds milliseconds(const Configuration& section, const std::string& key, 
 
 Channels Channels::with_prefix(const std::string& prefix) {
   return {prefix + "_JOINT_STATE", prefix + "_CAMERAS", prefix + "_JOINT_OFFSETS", prefix + "_OFFSETS_STATUS"};
+}
+
+std::size_t BusOptions::longest_message_bytes(std::size_t cameras) const {
+  constexpr std::size_t kBeside = 1u << 20;
+  constexpr std::size_t kLcm = 256u << 20;
+  const std::size_t picture =
+      3 * static_cast<std::size_t>(limits.max_width_px) * static_cast<std::size_t>(limits.max_height_px);
+  return std::clamp(cameras * picture + kBeside, UdpmAssembler::Limits{}.message_bytes, kLcm);
 }
 
 BusOptions BusOptions::from(const Configuration& bus) {

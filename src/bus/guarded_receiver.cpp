@@ -56,7 +56,8 @@ void say_failure(const std::exception& failure) noexcept {
 
 }  // namespace
 
-GuardedReceiver::GuardedReceiver(const std::string& lcm_url, std::int64_t silence_us) : owners_(silence_us) {
+GuardedReceiver::GuardedReceiver(const std::string& lcm_url, std::int64_t silence_us, std::size_t longest_message_bytes)
+    : longest_message_bytes_(longest_message_bytes), owners_(silence_us) {
   sockaddr_in group = group_of(lcm_url);
   socket_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   const int yes = 1;
@@ -90,9 +91,11 @@ void GuardedReceiver::subscribe(const std::string& channel, int queue_messages, 
 }
 
 void GuardedReceiver::work() {
-  UdpmAssembler assembler({}, [this](const std::string& channel, Sender sender) { return wanted(channel, sender); });
+  UdpmAssembler assembler({.message_bytes = longest_message_bytes_, .pending_bytes = 2 * longest_message_bytes_},
+                          [this](const std::string& channel, Sender sender) { return wanted(channel, sender); });
   std::vector<std::uint8_t> packet(kLargestPacket);
   std::uint64_t failed = 0;
+  std::int64_t said_us = -kQuietTime_us;
   while (!stopping_) {
     pollfd ready{socket_, POLLIN, 0};
     if (poll(&ready, 1, kPoll_ms) <= 0) continue;
@@ -108,8 +111,18 @@ void GuardedReceiver::work() {
     } catch (const std::exception& e) {  // of this packet, which cost its message; memory may be there for the next
       if (failed++ % 1000 == 0) say_failure(e);
     }
-    const std::lock_guard lock(mutex_);
-    lost_.incomplete = assembler.incomplete() + failed;
+    bool refused = false;
+    {
+      const std::lock_guard lock(mutex_);
+      refused = assembler.too_large() > lost_.too_large;
+      lost_.incomplete = assembler.incomplete() + failed;
+      lost_.too_large = assembler.too_large();
+    }
+    if (refused && monotonic_us() - said_us >= kQuietTime_us) {
+      said_us = monotonic_us();
+      spdlog::warn("messages longer than {} MB refused; bus.max_width_px and max_height_px allow no more",
+                   longest_message_bytes_ / 1'000'000);
+    }
   }
 }
 

@@ -19,8 +19,9 @@ namespace bodyschema {
 class GuardedReceiver {
  public:
   /// @param lcm_url  udpm://
+  /// @param longest_message_bytes  unfinished messages of all senders take twice this at most
   /// Throws DeviceError when the URL is another or the group cannot be joined.
-  GuardedReceiver(const std::string& lcm_url, std::int64_t silence_us);
+  GuardedReceiver(const std::string& lcm_url, std::int64_t silence_us, std::size_t longest_message_bytes);
   ~GuardedReceiver();
   GuardedReceiver(const GuardedReceiver&) = delete;
   GuardedReceiver& operator=(const GuardedReceiver&) = delete;
@@ -49,6 +50,7 @@ class GuardedReceiver {
   void enqueue(Subscription& subscription, UdpmAssembler::Message message, std::int64_t wall_us);
 
   int socket_ = -1;
+  const std::size_t longest_message_bytes_;
   std::atomic<bool> stopping_{false};
   mutable std::mutex mutex_;
   std::condition_variable arrived_;

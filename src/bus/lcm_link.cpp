@@ -41,11 +41,12 @@ std::string resolve_lcm_url(const std::optional<std::string>& command_line) {
   return from_environment != nullptr && *from_environment != '\0' ? from_environment : kDefaultLcmUrl;
 }
 
-LcmLink::LcmLink(std::string url, std::optional<double> one_source_silence_s)
+LcmLink::LcmLink(std::string url, std::optional<double> one_source_silence_s, std::size_t longest_message_bytes)
     : url_(std::move(url)), lcm_(std::make_unique<lcm::LCM>(url_)) {
   if (!lcm_->good()) throw DeviceError("LCM cannot use '" + url_ + "'" + network_advice(url_));
   if (one_source_silence_s) {
-    guarded_ = std::make_unique<GuardedReceiver>(url_, static_cast<std::int64_t>(1e6 * *one_source_silence_s));
+    guarded_ = std::make_unique<GuardedReceiver>(url_, static_cast<std::int64_t>(1e6 * *one_source_silence_s),
+                                                 longest_message_bytes);
   }
 }
 

@@ -77,7 +77,7 @@ ObservationStream::ObservationStream(const std::vector<std::string>& joint_names
                                      const std::vector<CameraModel>& cameras, const BusOptions& options)
     : options_(options), channels_(options.channels()),
       synchroniser_(joint_names, fixed_rad, static_cast<int>(cameras.size()), options.synchroniser),
-      assembler_(joint_names, fixed_rad) {
+      assembler_(joint_names, fixed_rad, options.synchroniser.clock_step) {
   for (const CameraModel& camera : cameras) {
     const bool left = camera.name == "left";
     if ((!left && camera.name != "right") || cameras.size() > 2 || (!cameras_.empty() && left)) {
@@ -122,14 +122,19 @@ void ObservationStream::receive_joints(Bytes message) {
   if (follower_) show_follower();
 }
 
-/// The follower sees what the synchroniser saw, clock steps included.
+/// The follower sees what the synchroniser saw, clock steps included; and it must go back where a stamp lay so
+/// far ahead by mistake that its sample would be the last for long.
 void ObservationStream::show_follower() {
   if (const auto steps = synchroniser_.statistics().clock_steps; steps != clock_steps_) {
     clock_steps_ = steps;
     assembler_.forget();
     follower_->forget();
   }
-  if (const JointSample* sample = assembler_.take(joint_state_)) follower_->observe(*sample);
+  const JointSample* sample = assembler_.take(joint_state_);
+  if (sample == nullptr) return;
+  if (sample->utime < shown_) follower_->forget();
+  shown_ = sample->utime;
+  follower_->observe(*sample);
 }
 
 std::optional<ArrivedObservation> ObservationStream::next() {

@@ -62,9 +62,13 @@ std::optional<UdpmAssembler::Message> UdpmAssembler::take_fragment(Bytes packet,
   const std::size_t fragment = u16(packet, 16);
   const std::size_t fragments = u16(packet, 18);
   Bytes rest = packet.subspan(kFragmentHeader);
-  if (size > limits_.message_bytes || fragments == 0 || fragment >= fragments) return std::nullopt;
+  if (fragments == 0 || fragment >= fragments) return std::nullopt;
   std::optional<std::string> channel;
   if (fragment == 0 && !(channel = take_channel(rest))) return std::nullopt;
+  if (size > limits_.message_bytes) {
+    if (channel) refuse(sequence, *channel, sender);
+    return std::nullopt;
+  }
   if (offset > size || rest.size() > size - offset) return std::nullopt;
 
   auto at = pending_.find(sender);
@@ -109,6 +113,13 @@ std::optional<UdpmAssembler::Message> UdpmAssembler::take_fragment(Bytes packet,
   }
   remove(at);
   return message;
+}
+
+/// A message that is too large is counted by the fragment that tells its channel; that may come twice.
+void UdpmAssembler::refuse(std::uint32_t sequence, const std::string& channel, Sender sender) {
+  if (refused_ == std::pair(sender, sequence)) return;
+  refused_ = {sender, sequence};
+  if (!wanted_ || wanted_(channel, sender)) ++too_large_;
 }
 
 /// With what the tables take, so that many small pieces are not free.

@@ -20,14 +20,12 @@ std::map<std::string, double> resting_joints(const RobotModel& robot, const Robo
 }  // namespace
 
 JointStream::JointStream(const RobotModel& robot, const RobotSetup& setup, const BusOptions& bus)
-    : limits_(bus.limits), clock_step_(bus.synchroniser.clock_step),
-      assembler_(names_of(robot), resting_joints(robot, setup)) {
+    : limits_(bus.limits), assembler_(names_of(robot), resting_joints(robot, setup), bus.synchroniser.clock_step) {
   for (const auto& name : names_of(robot)) index_.emplace(name, index_.size());
 }
 
 void JointStream::take(Bytes message) {
   if (!decode(message, joints_, limits_).ok()) return;
-  if (begins_anew()) assembler_.forget();
   const JointSample* sample = assembler_.take(joints_);
   if (sample == nullptr) return;
   while (!stream_.empty() && stream_.back().utime > sample->utime) {
@@ -35,19 +33,12 @@ void JointStream::take(Bytes message) {
     read_.pop_back();
   }
   if (!stream_.empty() && stream_.back().utime == sample->utime) {
-    stream_.back() = *sample;  // head and arm apart, with one stamp
+    stream_.back() = *sample;  // head and arm apart, with one stamp or one that has been overtaken
   } else {
     stream_.push_back(*sample);
     read_.emplace_back(index_.size(), false);
   }
   mark_read();
-}
-
-bool JointStream::begins_anew() {
-  constexpr int kEvidence = 3;
-  const bool far_before = !stream_.empty() && stream_.back().utime - joints_.utime > clock_step_;
-  older_in_a_row_ = far_before ? older_in_a_row_ + 1 : 0;
-  return older_in_a_row_ == kEvidence;
 }
 
 void JointStream::mark_read() {

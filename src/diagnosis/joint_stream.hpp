@@ -20,19 +20,16 @@ class JointStream {
  public:
   JointStream(const RobotModel& robot, const RobotSetup& setup, const BusOptions& bus);
   /// A message that does not decode or names none of the robot's joints is left out, and one that is older than
-  /// the last. Where the stamps begin anew (three in a row far before the last, as for Synchroniser), what has a
-  /// later one is taken back: a single stamp far in the future costs no more than itself.
+  /// the last of its own joints. Where the stamps begin anew (JointAssembler), what has a later one is taken back:
+  /// a single stamp far in the future costs no more than itself.
   void take(Bytes message);
   /// The samples; velocities as published, which set_motion replaces.
   std::vector<JointSample> finish();
 
  private:
-  [[nodiscard]] bool begins_anew();
   void mark_read();
 
   DecodeLimits limits_;
-  Microseconds clock_step_;
-  int older_in_a_row_ = 0;
   JointStateMessage joints_;
   JointAssembler assembler_;
   std::map<std::string, std::size_t> index_;

@@ -7,6 +7,7 @@
 #include <map>
 #include <spdlog/fmt/fmt.h>
 #include <tuple>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -23,6 +24,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kGapPeriods = 3.0;
 constexpr double kTurn_rad = radians(0.5);
+constexpr double kTurn_m = 0.001;
 constexpr Microseconds kSpeedWindow = 50'000;
 constexpr std::size_t kMostPorts = 8;  // listed for people
 
@@ -57,8 +59,17 @@ class Stamps {
   std::vector<Microseconds> stamps_;
 };
 
+/// What counts as motion, rad or m.
+double least_motion(bool slides) {
+  return slides ? kTurn_m : kTurn_rad;
+}
+
 class JointWatcher {
  public:
+  JointWatcher(std::string name, bool slides) : least_(least_motion(slides)) {
+    motion.name = std::move(name);
+    motion.slides = slides;
+  }
   void add(Microseconds utime, double q) {
     if (motion.readings++ == 0) {
       motion.lowest_rad = motion.highest_rad = extreme_ = q;
@@ -72,12 +83,12 @@ class JointWatcher {
     if (span_s >= 0.5 * seconds(kSpeedWindow)) {
       motion.fastest_rad_s = std::max(motion.fastest_rad_s, std::abs(q - recent_.front().second) / span_s);
     }
-    // Turning points at least kTurn_rad apart, so that encoder noise is none.
-    if (direction_ >= 0 && q < extreme_ - kTurn_rad) {
+    // Turning points at least that far apart, so that encoder noise is none.
+    if (direction_ >= 0 && q < extreme_ - least_) {
       motion.turns += direction_ > 0 ? 1 : 0;
       direction_ = -1;
       extreme_ = q;
-    } else if (direction_ <= 0 && q > extreme_ + kTurn_rad) {
+    } else if (direction_ <= 0 && q > extreme_ + least_) {
       motion.turns += direction_ < 0 ? 1 : 0;
       direction_ = 1;
       extreme_ = q;
@@ -88,6 +99,7 @@ class JointWatcher {
   JointMotion motion;
 
  private:
+  double least_;
   std::deque<std::pair<Microseconds, double>> recent_;
   double extreme_ = 0.0;
   int direction_ = 0;
@@ -105,7 +117,10 @@ const char* encoding_name(std::int32_t format) {
 
 class Summariser {
  public:
-  explicit Summariser(const std::filesystem::path& log) : reader_(log) { summary_.file = log.string(); }
+  Summariser(const std::filesystem::path& log, std::optional<std::set<std::string>> sliding_joints) : reader_(log) {
+    summary_.file = log.string();
+    summary_.sliding_joints = std::move(sliding_joints);
+  }
 
   LogSummary run() {
     ProgressBar bar("reading", reader_.size());
@@ -163,11 +178,9 @@ class Summariser {
     auto& channels = summary_.joint_channels;
     if (std::find(channels.begin(), channels.end(), event.channel) == channels.end()) channels.push_back(event.channel);
     for (std::size_t i = 0; i < joint_state_.names.size(); ++i) {
-      const auto [at, is_new] = joint_index_.try_emplace(joint_state_.names[i], joints_.size());
-      if (is_new) {
-        joints_.emplace_back();
-        joints_.back().motion.name = joint_state_.names[i];
-      }
+      const std::string& name = joint_state_.names[i];
+      const auto [at, is_new] = joint_index_.try_emplace(name, joints_.size());
+      if (is_new) joints_.emplace_back(name, summary_.sliding_joints && summary_.sliding_joints->contains(name));
       joints_[at->second].add(joint_state_.utime, static_cast<double>(joint_state_.position_rad[i]));
     }
     return true;
@@ -270,18 +283,32 @@ std::string LogSummary::text() const {
   }
   if (encoders.size() > kMostPorts)
     out += fmt::format("encoders: {} other sets of joints\n", encoders.size() - kMostPorts);
-  out += fmt::format("{:<28} {:>10} {:>10} {:>12} {:>6}\n", "joint that moved", "from deg", "to deg", "deg/s at most",
-                     "turns");
-  std::size_t still = 0;
-  for (const auto& j : joints) {
-    if (j.highest_rad - j.lowest_rad < kTurn_rad) {
-      ++still;
-      continue;
+  for (const bool slides : {false, true}) {
+    const char* unit = slides ? "mm" : "deg";
+    const double per_unit = slides ? 1e3 : degrees(1.0);
+    std::string moved;
+    std::size_t still = 0;
+    for (const auto& j : joints) {
+      if (j.slides != slides) continue;
+      if (j.highest_rad - j.lowest_rad < least_motion(slides)) {
+        ++still;
+        continue;
+      }
+      moved += fmt::format("{:<28} {:>10.1f} {:>10.1f} {:>12.0f} {:>6}\n", j.name, per_unit * j.lowest_rad,
+                           per_unit * j.highest_rad, per_unit * j.fastest_rad_s, j.turns);
     }
-    out += fmt::format("{:<28} {:>10.1f} {:>10.1f} {:>12.0f} {:>6}\n", j.name, degrees(j.lowest_rad),
-                       degrees(j.highest_rad), degrees(j.fastest_rad_s), j.turns);
+    if (!slides || !moved.empty()) {
+      out += fmt::format("{:<28} {:>10} {:>10} {:>12} {:>6}\n",
+                         slides ? "sliding joint that moved" : "joint that moved", fmt::format("from {}", unit),
+                         fmt::format("to {}", unit), fmt::format("{}/s at most", unit), "turns");
+    }
+    out += moved;
+    if (still > 0) {
+      out += fmt::format("{} moved by less than {:.1f} {}\n", plural(still, slides ? "sliding joint" : "joint"),
+                         per_unit * least_motion(slides), unit);
+    }
   }
-  if (still > 0) out += fmt::format("{} moved by less than {:.1f} deg\n", plural(still, "joint"), degrees(kTurn_rad));
+  if (!sliding_joints) out += "in deg as if every joint turned: a log does not say which slide, a configuration does\n";
   return out;
 }
 
@@ -312,18 +339,21 @@ std::string LogSummary::json() const {
   }
   j["joints"] = Json::array();
   for (const auto& m : joints) {
+    const std::string unit = m.slides ? "_m" : "_deg";
+    const double per_unit = m.slides ? 1.0 : degrees(1.0);
     j["joints"].push_back({{"joint", m.name},
                            {"readings", m.readings},
-                           {"lowest_deg", degrees(m.lowest_rad)},
-                           {"highest_deg", degrees(m.highest_rad)},
-                           {"fastest_deg_s", degrees(m.fastest_rad_s)},
+                           {"lowest" + unit, per_unit * m.lowest_rad},
+                           {"highest" + unit, per_unit * m.highest_rad},
+                           {"fastest" + unit + "_s", per_unit * m.fastest_rad_s},
                            {"turns", m.turns}});
   }
+  j["sliding_joints"] = sliding_joints ? Json(*sliding_joints) : Json(nullptr);
   return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";  // names may be no UTF-8
 }
 
-LogSummary summarise_log(const std::filesystem::path& log) {
-  return Summariser(log).run();
+LogSummary summarise_log(const std::filesystem::path& log, std::optional<std::set<std::string>> sliding_joints) {
+  return Summariser(log, std::move(sliding_joints)).run();
 }
 
 }  // namespace bodyschema

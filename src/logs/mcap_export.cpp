@@ -1,6 +1,8 @@
 #include "bodyschema/logs/mcap_export.hpp"
 
 #include <cmath>
+#include <filesystem>
+#include <system_error>
 
 #include <nlohmann/json.hpp>
 
@@ -69,16 +71,24 @@ Json picture_schema() {
             {"format", {{"type", "string"}}}}}};
 }
 
-Json json_of(const JointStateMessage& m) {
-  Json position = Json::object(), velocity = Json::object();
-  for (std::size_t i = 0; i < m.names.size(); ++i) {
-    position[m.names[i]] = degrees(static_cast<double>(m.position_rad[i]));
-    velocity[m.names[i]] = degrees(static_cast<double>(m.velocity_rad_s[i]));
+/// With sliding joints known, these by themselves, in every message, since all of a topic have one schema.
+Json json_of(const JointStateMessage& m, const std::set<std::string>& sliding_joints) {
+  Json json = {{"timestamp", timestamp(m.utime)}, {"position_deg", Json::object()}, {"velocity_deg_s", Json::object()}};
+  if (!sliding_joints.empty()) {
+    json["position_m"] = Json::object();
+    json["velocity_m_s"] = Json::object();
   }
-  return {{"timestamp", timestamp(m.utime)}, {"position_deg", position}, {"velocity_deg_s", velocity}};
+  for (std::size_t i = 0; i < m.names.size(); ++i) {
+    const auto position = static_cast<double>(m.position_rad[i]), velocity = static_cast<double>(m.velocity_rad_s[i]);
+    const bool slides = sliding_joints.contains(m.names[i]);
+    json[slides ? "position_m" : "position_deg"][m.names[i]] = slides ? position : degrees(position);
+    json[slides ? "velocity_m_s" : "velocity_deg_s"][m.names[i]] = slides ? velocity : degrees(velocity);
+  }
+  return json;
 }
 
-Json json_of(const joint_offsets_t& m) {
+/// Estimated joints turn, all of them.
+Json json_of(const joint_offsets_t& m, const std::set<std::string>&) {
   Json mean = Json::object(), sd = Json::object(), hand = Json::object(), others = Json::object();
   for (std::size_t i = 0; i < m.joint_name.size(); ++i) {
     mean[m.joint_name[i]] = number(degrees(m.mean_rad[i]));
@@ -110,7 +120,7 @@ Json json_of(const joint_offsets_t& m) {
           {"config_hash", m.config_hash}};
 }
 
-Json json_of(const offsets_status_t& m) {
+Json json_of(const offsets_status_t& m, const std::set<std::string>&) {
   static constexpr const char* kLevels[] = {"OK", "WARN", "ERROR", "STALE"};
   Json counters = Json::object(), median = Json::object(), p99 = Json::object();
   for (std::size_t i = 0; i < m.counter_name.size(); ++i) counters[m.counter_name[i]] = m.counter_value[i];
@@ -185,7 +195,7 @@ class Exporter {
       ++summary_.unreadable;
       return;
     }
-    const Json json = json_of(message);
+    const Json json = json_of(message, options_.sliding_joints);
     write("/" + event.channel, type, event.time_us, message.utime, text_of(json), [&] {
       Json schema = schema_of(json);
       schema["title"] = type;
@@ -239,9 +249,20 @@ class Exporter {
   Image image_;
 };
 
+/// What is written must not be what is read, by whatever name: the log would be lost.
+void refuse_to_overwrite(const McapExportOptions& options) {
+  for (const std::filesystem::path& written : {options.out, McapWriter::unfinished(options.out)}) {
+    std::error_code none;  // what does not exist is no log
+    if (!std::filesystem::equivalent(options.log, written, none)) continue;
+    throw FileError(options.out.string() + ": would overwrite the log " + options.log.string() +
+                    "; expected another file");
+  }
+}
+
 }  // namespace
 
 McapExportSummary export_mcap(const McapExportOptions& options) {
+  refuse_to_overwrite(options);
   return Exporter(options).run();
 }
 

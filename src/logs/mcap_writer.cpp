@@ -60,7 +60,11 @@ class McapWriter::Fields {
   std::string bytes_;
 };
 
-McapWriter::McapWriter(std::filesystem::path file) : file_(std::move(file)), part_(file_.string() + ".part") {
+std::filesystem::path McapWriter::unfinished(const std::filesystem::path& file) {
+  return file.string() + ".part";
+}
+
+McapWriter::McapWriter(std::filesystem::path file) : file_(std::move(file)), part_(unfinished(file_)) {
   stream_.open(part_, std::ios::binary | std::ios::trunc);
   if (!stream_) throw FileError(file_.string() + ": cannot be created");
   put(kMagic);
@@ -189,14 +193,14 @@ void McapWriter::close() {
   stream_.close();
   std::error_code error;
   if (stream_) std::filesystem::rename(part_, file_, error);
-  if (!stream_ || error) throw FileError(file_.string() + ": cut short, is the disk full?");
+  if (!stream_ || error) throw DeviceError(file_.string() + ": cut short, is the disk full?");
   closed_ = true;
 }
 
 void McapWriter::put(std::string_view bytes) {
   stream_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   position_ += bytes.size();
-  if (!stream_) throw FileError(file_.string() + ": cut short, is the disk full?");
+  if (!stream_) throw DeviceError(file_.string() + ": cut short, is the disk full?");
 }
 
 void McapWriter::put_record(std::uint8_t opcode, const std::string& content) {

@@ -18,7 +18,9 @@ class McapWriter {
   using SchemaId = std::uint16_t;
   using ChannelId = std::uint16_t;
 
-  /// Writes to `file` with ".part" added until close(). Throws FileError.
+  /// Where what becomes `file` is written until close(): ".part" added.
+  static std::filesystem::path unfinished(const std::filesystem::path& file);
+  /// Throws FileError.
   explicit McapWriter(std::filesystem::path file);
   ~McapWriter();  ///< removes what was not closed
   McapWriter(const McapWriter&) = delete;
@@ -29,7 +31,7 @@ class McapWriter {
   ChannelId add_channel(std::string_view topic, SchemaId schema);
   /// Times in ns since the Unix epoch.
   void write(ChannelId channel, std::uint64_t log_time, std::uint64_t publish_time, std::string_view json);
-  /// Completes the file and gives it its name. Throws FileError when the disk is full.
+  /// Completes the file and gives it its name. Throws DeviceError when the disk is full.
   void close();
   [[nodiscard]] std::uint64_t bytes_written() const { return position_; }
 

@@ -112,12 +112,25 @@ void try_to_create(const std::filesystem::path& file) {
   }
 }
 
+/// Bytes that may wait to be recorded: beside what is usual two instants of raw pictures, however large these are.
+std::size_t room_to_wait(const StereoRig& rig) {
+  std::size_t instant = 0;
+  for (const auto& camera : rig.cameras) {
+    const auto pixels =
+        static_cast<std::size_t>(camera.intrinsics.width) * static_cast<std::size_t>(camera.intrinsics.height);
+    instant += 3 * pixels;
+  }
+  return Recorder::kWaiting_bytes + 2 * instant;
+}
+
 /// Everything that belongs to one load of the configuration. Takes in messages once its receiver is started.
 struct Session {
   Session(std::unique_ptr<Pipeline> loaded, const std::string& lcm_url, Recorder* recorder)
       : pipeline(std::move(loaded)), queue(static_cast<std::size_t>(pipeline->bus().queue_frames)),
-        link(lcm_url, pipeline->bus().one_source_silence_s), receiver(link, pipeline->make_stream(), queue, recorder),
-        picture_since_us(pipeline->rig().cameras.size(), -1) {}
+        link(lcm_url, pipeline->bus().one_source_silence_s,
+             pipeline->bus().longest_message_bytes(pipeline->rig().cameras.size())),
+        receiver(link, pipeline->make_stream(), queue, recorder), picture_since_us(pipeline->rig().cameras.size(), -1) {
+  }
 
   std::unique_ptr<Pipeline> pipeline;
   ObservationQueue queue;
@@ -151,7 +164,7 @@ class Daemon {
     keep_memory_flat();
     const Signals signals;
     auto pipeline = load(load_configuration_);
-    open_files();
+    open_files(pipeline->rig());
     for (const auto& complaint : check_network(options_.lcm_url)) spdlog::warn("{}", complaint);
     if (options_.page_port) {
       page_ = std::make_unique<LivePage>(*options_.page_port, camera_names(*pipeline));
@@ -194,15 +207,17 @@ class Daemon {
     return pipeline;
   }
 
-  void open_files() {
-    if (options_.record) {
-      const auto file = free_name(*options_.record);
-      try_to_create(file);
-      recorder_ = std::make_unique<Recorder>(file);
+  void open_files(const StereoRig& rig) {
+    std::filesystem::path record_file;
+    if (options_.record) try_to_create(record_file = free_name(*options_.record));
+    if (options_.estimates) try_to_create(estimates_file_ = free_name(*options_.estimates));
+    std::error_code none;  // where one of them is not asked for, or cannot be created
+    if (std::filesystem::equivalent(record_file, estimates_file_, none)) {
+      throw ConfigurationError("--record and --estimates would both write to " + record_file.string() +
+                               "; expected two files");
     }
+    if (options_.record) recorder_ = std::make_unique<Recorder>(record_file, room_to_wait(rig));
     if (!options_.estimates) return;
-    estimates_file_ = free_name(*options_.estimates);
-    try_to_create(estimates_file_);
     estimates_.open(estimates_file_);
     if (!estimates_) throw FileError(estimates_file_.string() + ": cannot be written");
   }

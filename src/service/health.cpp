@@ -36,17 +36,6 @@ std::string list(const std::vector<std::string>& names) {
   return text;
 }
 
-std::optional<std::string> stale(const HealthFacts& f) {
-  const bool pictures = f.picture_age_ms >= 0.0 && f.picture_age_ms < kStale_ms;
-  const bool joints = f.joints_age_ms >= 0.0 && f.joints_age_ms < kStale_ms;
-  const std::string no_pictures = silence("pictures", f.cameras_channel, f.picture_age_ms);
-  const std::string no_joints = silence("encoder readings", f.joints_channel, f.joints_age_ms);
-  if (!pictures && !joints) return no_pictures + "; " + no_joints;
-  if (!pictures) return no_pictures;
-  if (!joints) return no_joints;
-  return std::nullopt;
-}
-
 /// What is wrong with messages and pictures of the last second that were refused, in plain words.
 const char* explain(MessageFault fault) {
   switch (fault) {
@@ -73,6 +62,17 @@ std::optional<std::string> refused(const HealthFacts& f) {
   if (*most == 0) return std::nullopt;
   const auto fault = static_cast<MessageFault>(most - faults.begin());
   return fmt::format("{} messages or pictures refused in the last second: {}", *most, explain(fault));
+}
+
+/// What is too large may be refused before it counts as having come.
+std::optional<std::string> stale(const HealthFacts& f) {
+  const bool pictures = f.picture_age_ms >= 0.0 && f.picture_age_ms < kStale_ms;
+  const bool joints = f.joints_age_ms >= 0.0 && f.joints_age_ms < kStale_ms;
+  if (pictures && joints) return std::nullopt;
+  std::string text = pictures ? "" : silence("pictures", f.cameras_channel, f.picture_age_ms);
+  if (!joints) text += (pictures ? "" : "; ") + silence("encoder readings", f.joints_channel, f.joints_age_ms);
+  const bool too_large = f.since_last.faults[static_cast<std::size_t>(MessageFault::kTooLarge)] > 0;
+  return too_large ? text + "; " + *refused(f) : text;
 }
 
 std::optional<std::string> failed(const HealthFacts& f) {

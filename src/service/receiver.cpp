@@ -50,6 +50,10 @@ Receiver::Facts Receiver::facts() const {
   const LostMessages lost = link_.lost();
   facts.bus.lost_in_queue = lost.queue;
   facts.bus.lost_incomplete = lost.incomplete;
+  // Refused here or where they are decoded: the same to who sent them.
+  facts.bus.messages += lost.too_large;
+  facts.bus.messages_malformed += lost.too_large;
+  facts.bus.faults[static_cast<std::size_t>(MessageFault::kTooLarge)] += lost.too_large;
   return facts;
 }
 

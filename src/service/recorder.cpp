@@ -26,7 +26,7 @@ void Recorder::record(const std::string& channel, Microseconds time_us, Bytes me
   {
     const std::lock_guard lock(mutex_);
     const std::size_t bytes = message.size() + kOverhead_bytes;
-    if (!state_.failure.empty() || waiting_bytes_ + bytes > max_waiting_bytes_) {
+    if (!state_.failure.empty() || (!waiting_.empty() && waiting_bytes_ + bytes > max_waiting_bytes_)) {
       ++state_.lost;
       return;
     }
@@ -48,6 +48,7 @@ void Recorder::work() {
     if (waiting_.empty()) return;
     const Message message = std::move(waiting_.front());
     waiting_.pop_front();
+    waiting_bytes_ -= message.data.size() + kOverhead_bytes;
     lock.unlock();
     std::string failure;
     try {
@@ -57,7 +58,6 @@ void Recorder::work() {
       spdlog::error("recording has ended: {}", failure);
     }
     lock.lock();
-    waiting_bytes_ -= message.data.size() + kOverhead_bytes;
     if (failure.empty()) {
       ++state_.written;
     } else {

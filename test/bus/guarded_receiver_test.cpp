@@ -73,7 +73,7 @@ class OneSource : public testing::Test {
     spdlog::set_default_logger(
         std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log_)));
     try {
-      link_ = std::make_unique<LcmLink>("udpm://239.255.76.67:" + std::to_string(port_) + "?ttl=0", 60.0);
+      link_ = std::make_unique<LcmLink>("udpm://239.255.76.67:" + std::to_string(port_) + "?ttl=0", 60.0, kLongest);
     } catch (const Error& e) {
       GTEST_SKIP() << "LCM needs a multicast route (scripts/multicast adds it): " << e.what();
     }
@@ -96,6 +96,7 @@ class OneSource : public testing::Test {
     return condition();
   }
 
+  static constexpr std::size_t kLongest = 10'000;
   const int port_ = 32'100 + getpid() % 400;
   std::shared_ptr<spdlog::logger> logger_before_ = spdlog::default_logger();
   std::ostringstream log_;
@@ -125,6 +126,19 @@ TEST_F(OneSource, LongMessagesOfAnotherAreRefusedAndCountedOnce) {
   }
   EXPECT_EQ(sizes_, (std::vector<std::size_t>{300}));
   EXPECT_EQ(link_->lost().incomplete, 0u);
+}
+
+TEST_F(OneSource, CountsAndSaysWhatIsTooLarge) {
+  sender_.fragments(3);
+  sender_.fragments(101);
+  sender_.fragments(102);
+  EXPECT_TRUE(eventually([this] { return link_->lost().too_large == 2; })) << link_->lost().too_large;
+  while (link_->handle(200)) {
+  }
+  EXPECT_EQ(sizes_, (std::vector<std::size_t>{300}));
+  EXPECT_EQ(link_->lost().incomplete, 0u);
+  link_.reset();
+  EXPECT_NE(log_.str().find("bus.max_width_px"), std::string::npos) << log_.str();
 }
 
 TEST_F(OneSource, WhenTooManyWaitTheOldestGoAndAreCounted) {

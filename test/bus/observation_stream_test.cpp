@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "bodyschema/bus/lcm_link.hpp"
 #include "bodyschema/bus/observation_queue.hpp"
@@ -61,8 +62,12 @@ TEST(ObservationStream, TurnsMessagesIntoObservations) {
   for (const auto& [name, count] : stream.statistics().counters()) EXPECT_EQ(count, 0u) << name;
 }
 
-/// Arm and head published apart, as many robots do, with a backlash that is known.
-TEST(ObservationStream, CarriesWhatTheExtendedModelKnowsAtEachExposure) {
+/// What the extended model, a backlash of the elbow that is known, says of four exposures: two cameras, on the
+/// way up and down again. The link first lags below the encoder, then above it. A picture that comes after its
+/// encoders have gone on must not see the later ones.
+/// @param publish  sends the readings of an instant, given the elbow's
+std::vector<double> elbow_dq(
+    const std::function<void(ObservationStream& stream, Microseconds now, float elbow_rad)>& publish) {
   const Configuration configuration =
       Configuration::load(std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/robot.yaml");
   RobotSetup setup = RobotSetup::from(configuration.section("robot"));
@@ -77,33 +82,56 @@ TEST(ObservationStream, CarriesWhatTheExtendedModelKnowsAtEachExposure) {
   ObservationStream stream(roles.names, resting, rig(), {});
   stream.set_follower(std::make_unique<OnlineErrorModel>(robot, setup, model));
 
-  const auto joint = [](const char* name, Microseconds utime, float q) {
-    auto message = arm(utime, q);
-    message.joint_name = {name};
-    return encode(message);
-  };
-  // Up, then down again: the link first lags below the encoder, then above it. A picture that comes
-  // after its encoders have gone on must not see the later ones.
   std::vector<double> dq;
   for (int i = 0; i <= 40; ++i) {
     const Microseconds now = 10 * i * kMs;
-    const float q = 0.01F * static_cast<float>(i <= 20 ? i : 40 - i);
-    stream.receive("ICUB_JOINT_STATE", joint("r_elbow", now, q));
-    stream.receive("ICUB_JOINT_STATE", joint("neck_pitch", now, 0.1F));
+    publish(stream, now, 0.01F * static_cast<float>(i <= 20 ? i : 40 - i));
     if (i == 20 || i == 40) stream.receive("ICUB_CAMERAS", encode(pictures(now - 45 * kMs)));
     while (const auto arrived = stream.next()) {
       for (const auto& camera : arrived->observation.cameras) {
-        ASSERT_TRUE(camera && camera->corrections);
+        EXPECT_TRUE(camera && camera->corrections);
         dq.push_back(camera->corrections->dq[elbow]);
         EXPECT_EQ(camera->corrections->dq.cwiseAbs().sum(), std::abs(dq.back())) << "the elbow alone";
       }
     }
   }
+  return dq;
+}
+
+void read_joint(ObservationStream& stream, const char* name, Microseconds utime, float q_rad) {
+  auto message = arm(utime, q_rad);
+  message.joint_name = {name};
+  stream.receive("ICUB_JOINT_STATE", encode(message));
+}
+
+void expect_lag_up_and_down(const std::vector<double>& dq) {
   ASSERT_EQ(dq.size(), 4u);
   EXPECT_NEAR(dq[0], -0.01, 1e-6);
   EXPECT_NEAR(dq[1], dq[0], 1e-12);
   EXPECT_NEAR(dq[2], 0.01, 1e-6);
   EXPECT_NEAR(dq[3], dq[2], 1e-12);
+}
+
+/// Arm and head published apart, as many robots do, with a backlash that is known.
+TEST(ObservationStream, CarriesWhatTheExtendedModelKnowsAtEachExposure) {
+  expect_lag_up_and_down(elbow_dq([](ObservationStream& stream, Microseconds now, float elbow_rad) {
+    read_joint(stream, "r_elbow", now, elbow_rad);
+    read_joint(stream, "neck_pitch", now, 0.1F);
+  }));
+}
+
+TEST(ObservationStream, AnArmWhoseMessagesTrailTheHeadsIsFollowedToo) {
+  expect_lag_up_and_down(elbow_dq([](ObservationStream& stream, Microseconds now, float elbow_rad) {
+    read_joint(stream, "neck_pitch", now + 3 * kMs, 0.1F);
+    read_joint(stream, "r_elbow", now, elbow_rad);
+  }));
+}
+
+TEST(ObservationStream, OneStampFarAheadOfAJointThatThenFallsSilentStopsNothing) {
+  expect_lag_up_and_down(elbow_dq([](ObservationStream& stream, Microseconds now, float elbow_rad) {
+    read_joint(stream, "r_elbow", now, elbow_rad);
+    if (now == 50 * kMs) read_joint(stream, "torso_yaw", now + 3'600'000 * kMs, 0.1F);
+  }));
 }
 
 TEST(ObservationStream, ALegThatFallsSilentIsNotMissed) {
@@ -244,6 +272,16 @@ TEST(BusOptions, ShippedFileHoldsTheDefaultsAndOnlyKnownKeys) {
   EXPECT_EQ(options.synchroniser.pairing_window, defaults.synchroniser.pairing_window);
   EXPECT_EQ(options.synchroniser.encoder_wait, defaults.synchroniser.encoder_wait);
   EXPECT_NEAR(options.synchroniser.joints.max_speed_rad_s, defaults.synchroniser.joints.max_speed_rad_s, 0.01);
+}
+
+TEST(BusOptions, MessagesMayBeAsLongAsThePicturesTheyAllow) {
+  constexpr std::size_t kMiB = 1u << 20;
+  BusOptions options;
+  options.limits.max_width_px = options.limits.max_height_px = 2448;
+  EXPECT_EQ(options.longest_message_bytes(2), 2u * 3u * 2448u * 2448u + kMiB);
+  EXPECT_EQ(options.longest_message_bytes(1), 32 * kMiB);
+  options.limits.max_width_px = options.limits.max_height_px = 32'768;
+  EXPECT_EQ(options.longest_message_bytes(2), 256 * kMiB) << "what LCM carries";
 }
 
 TEST(LcmUrl, ComesFromCommandLineThenEnvironmentThenDefault) {

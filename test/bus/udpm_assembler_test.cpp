@@ -143,6 +143,22 @@ TEST(UdpmAssembler, LiesAreRefusedBeforeMemoryIsTaken) {
   EXPECT_FALSE(assembler.take(short_message(std::string(64, 'c'), {}), kRobot));
 }
 
+TEST(UdpmAssembler, WhatIsTooLargeIsCountedOnceWhereItIsWanted) {
+  UdpmAssembler assembler({.message_bytes = 1000}, [](const std::string& channel, Sender) { return channel == "C"; });
+  for (std::uint32_t sequence = 1; sequence <= 3; ++sequence) {
+    for (const auto& packet : fragments("C", numbers(1001), sequence, 300)) {
+      EXPECT_FALSE(assembler.take(packet, kRobot));
+      EXPECT_FALSE(assembler.take(packet, kRobot)) << "as over a second interface";
+    }
+    for (const auto& packet : fragments("OTHERS", numbers(1001), sequence, 300)) {
+      EXPECT_FALSE(assembler.take(packet, kOther));
+    }
+    EXPECT_EQ(assembler.too_large(), sequence);
+  }
+  EXPECT_EQ(assembler.pending_bytes(), 0u);
+  EXPECT_EQ(assembler.incomplete(), 0u);
+}
+
 TEST(UdpmAssembler, ManySendersCannotFillTheMemory) {
   UdpmAssembler assembler({.message_bytes = 10'000, .pending_bytes = 50'000, .senders = 8});
   for (std::uint16_t port = 1; port <= 100; ++port) {

@@ -76,11 +76,24 @@ TEST(JointStream, AnOldStrayIsLeftOut) {
   expect_in_order(samples);
 }
 
+TEST(JointStream, LosesLittleToAStampFarInTheFutureOfAnotherJoint) {
+  Robot robot;
+  const auto stamps = steady(1'000'000, 200);
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    robot.stream.take(reading("r_elbow", stamps[i], 0.5));
+    if (i == 100) robot.stream.take(reading("neck_pitch", 5'000'000'000, 0.1));
+  }
+  const auto samples = robot.stream.finish();
+  EXPECT_GE(samples.size(), 195u);
+  EXPECT_EQ(samples.back().utime, stamps.back());
+  expect_in_order(samples);
+}
+
 /// At 50 Hz each, 150 deg/s are 3 deg between two readings of the arm; the neck's come in between, and an eye has
 /// stopped coming.
 TEST(JointStream, AQuickArmMovesWhileTheHeadIsRead) {
   constexpr double kSpeed = 2.6;  // rad/s
-  for (const Microseconds after_head : {1'000, 7'000, 10'000, 19'000}) {
+  for (const Microseconds after_head : {-3'000, 1'000, 7'000, 10'000, 19'000}) {
     Robot robot;
     robot.stream.take(reading("eyes_tilt", 0, 0.2));
     for (Microseconds t = 1'000'000; t < 2'000'000; t += 20'000) {

@@ -142,13 +142,13 @@ def main():
     assert "type is not known here: 1" in told
     subprocess.run([python, __file__, program, types, directory, mcap, "check"], check=True, timeout=120)
 
-    # Wrong input: one line, status 1, nothing left behind.
+    # Wrong input: one line, status 2, nothing left behind.
     for arguments in ([scratch / "missing.lcmlog", "--out", scratch / "no.mcap"],
                       [pathlib.Path(__file__), "--out", scratch / "no.mcap"],
                       [log, "--out", "/nonexistent/no.mcap"]):
         wrong = subprocess.run([program, "log", "to-mcap", *arguments], text=True, check=False,
                                capture_output=True, timeout=60)
-        assert wrong.returncode == 1 and wrong.stderr.count("\n") == 1, wrong
+        assert wrong.returncode == 2 and wrong.stderr.count("\n") == 1, wrong
         assert not list(scratch.glob("no.mcap*"))
     return 0
 

@@ -558,6 +558,8 @@ TEST_F(Service, WrongInputEndsWithOneClearErrorAndStatusTwo) {
       {{"--config", good, "--engine", "magic"}, "--engine"},
       {{"--config", good, "--record", "/nowhere/at/all.lcmlog"}, "/nowhere/at/all.lcmlog"},
       {{"--config", good, "--estimates", "/nowhere/at/all.jsonl"}, "/nowhere/at/all.jsonl"},
+      {{"--config", good, "--record", (scratch_ / "one").string(), "--estimates", (scratch_ / "one").string()},
+       "--record and --estimates would both write to " + (scratch_ / "one").string()},
       {{"--config", good, "--stop-after-idle", "soon"}, "--stop-after-idle"},
   };
   for (const auto& [arguments, words] : cases) {
@@ -571,6 +573,78 @@ TEST_F(Service, WrongInputEndsWithOneClearErrorAndStatusTwo) {
   Process service({"bodyschemad", "--config", good, "-l", "nonsense://"}, scratch_.folder());
   EXPECT_EQ(service.wait(kStart), 1);
   EXPECT_THAT(service.err(), HasSubstr("LCM cannot use 'nonsense://'"));
+}
+
+/// Of all programs.
+TEST_F(Service, NumbersThatAreNoneAreRefusedByOptionAndValue) {
+  const std::string simulator = std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/simulator.yaml";
+  const std::vector<std::string> daemon = {"bodyschemad", "--config", reach_configuration(), "-l", url_};
+  const std::vector<std::string> sim = {"bodyschema-sim", "--config", simulator, "--log",
+                                        (scratch_ / "no.log").string()};
+  const std::vector<std::string> diagnose = {
+      "bodyschema", "diagnose", "no.log", "--config", reach_configuration(), "--out", (scratch_ / "out").string()};
+  struct Case {
+    std::vector<std::string> program;
+    std::string option, value;
+  };
+  const std::vector<Case> cases = {
+      {daemon, "--stop-after-idle", "nan"},
+      {daemon, "--stop-after-idle", "inf"},
+      {daemon, "--frames", "-1"},
+      {daemon, "--frames", "99999999999999999999"},
+      {daemon, "--page", "0"},
+      {sim, "--babble", "nan"},
+      {sim, "--rate", "nan"},
+      {sim, "--hidden-size", "nan"},
+      {sim, "--seed", "-1"},
+      {sim, "--hidden-fault", "-1"},
+      {sim, "--frames", "1"},
+      {sim, "--offsets", "nan,0,0,0,0,0,0"},
+      {sim, "--offsets", "inf,0,0,0,0,0,0"},
+      {diagnose, "--picture-rate", "nan"},
+      {diagnose, "--threads", "-1"},
+      {{"bodyschema", "evaluate", "paper", "--out", (scratch_ / "out").string()}, "--seed", "-1"},
+      {{"bodyschema", "new-robot", "no.urdf", "--hand", "h", "--camera", "c", "--out", "out"}, "--focal", "nan"},
+      {{"bodyschema", "log", "to-mcap", "no.log", "--out", "no.mcap"}, "--jpeg-quality", "101"},
+  };
+  for (const auto& [program, option, value] : cases) {
+    std::vector<std::string> command = program;
+    if (option == "--rate") command.resize(3);  // not with --log
+    command.insert(command.end(), {option, value});
+    Process process(command, scratch_.folder());
+    EXPECT_EQ(process.wait(kStart), 2) << option << ' ' << value;
+    EXPECT_THAT(process.err(), HasSubstr(option + ": '" + value.substr(0, value.find(',')))) << program.front();
+  }
+}
+
+/// The systemd unit and scripts tell what to do next by it.
+TEST_F(Service, ExitStatusMeansTheSameInEveryProgram) {
+  const std::string simulator = std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/simulator.yaml";
+  const std::string log = (scratch_ / "no.lcmlog").string(), out = (scratch_ / "out").string();
+  struct Case {
+    int status;
+    std::vector<std::string> command;
+    std::string words;
+  };
+  const std::vector<Case> cases = {
+      {2,
+       {"bodyschemad", "--config", reach_configuration(), "-l", url_, "--set", "robot.urdf=missing.urdf"},
+       "missing.urdf"},
+      {2, {"bodyschema-sim", "--config", simulator, "--log", log, "--set", "robot.urdf=missing.urdf"}, "missing.urdf"},
+      {2,
+       {"bodyschema", "replay", "missing.lcmlog", "--config", reach_configuration(), "--out", out},
+       "missing.lcmlog"},
+      {3,
+       {"bodyschema-sim", "--config", simulator, "--log", log, "--set", "simulator.motion.distance_min_m=1.9", "--set",
+        "simulator.motion.distance_max_m=2"},
+       "no reach found"},
+  };
+  for (const auto& [status, command, words] : cases) {
+    Process process(command, scratch_.folder());
+    EXPECT_EQ(process.wait(kStart), status) << command.front();
+    EXPECT_THAT(process.err(), HasSubstr(command.front() + ": error: "));
+    EXPECT_THAT(process.err(), HasSubstr(words));
+  }
 }
 
 TEST_F(Service, ChecksAndPrintsTheConfigurationWithoutTheNetwork) {

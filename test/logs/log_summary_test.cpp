@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <limits>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
@@ -70,6 +71,37 @@ TEST(LogSummary, TellsHowJointsMoved) {
   EXPECT_THAT(text, HasSubstr("elbow"));
   EXPECT_THAT(text, HasSubstr("1 joint moved by less than 0.5 deg"));
   EXPECT_THAT(text, HasSubstr("1 gap, the longest 1100 ms"));
+}
+
+TEST(LogSummary, JointsThatSlideAreInMetres) {
+  const auto file = testing_logs::scratch_file("sliding.lcmlog");
+  {
+    LogWriter writer(file);
+    for (int i = 0; i <= 100; ++i) {  // a lift of 4 mm and an elbow of 0.3 rad
+      const float share = 0.01F * static_cast<float>(i);
+      auto message = testing_logs::joints(kBegin + 10'000 * i, 0.3F * share, 0.5F + 0.004F * share);
+      message.joint_name = {"elbow", "lift"};
+      writer.publish("ICUB_JOINT_STATE", message.utime, encode(message));
+    }
+  }
+  const auto summary = summarise_log(file, std::set<std::string>{"lift"});
+  EXPECT_THAT(summary.text(), testing::ContainsRegex("\njoint that moved +from deg +to deg"));
+  EXPECT_THAT(summary.text(), testing::ContainsRegex("\nelbow +0.0 +17.2"));
+  EXPECT_THAT(summary.text(), testing::ContainsRegex("\nsliding joint that moved +from mm +to mm +mm/s at most"));
+  EXPECT_THAT(summary.text(), testing::ContainsRegex("\nlift +500.0 +504.0 +4 "));
+  EXPECT_THAT(summary.text(), testing::Not(HasSubstr("as if every joint turned")));
+  auto json = nlohmann::json::parse(summary.json());
+  EXPECT_NEAR(json["joints"][0]["highest_deg"], degrees(0.3), 1e-4);
+  EXPECT_NEAR(json["joints"][1]["highest_m"], 0.504, 1e-6);
+  EXPECT_NEAR(json["joints"][1]["fastest_m_s"], 0.004, 1e-4);
+  EXPECT_FALSE(json["joints"][1].contains("highest_deg"));
+  EXPECT_EQ(json["sliding_joints"], nlohmann::json({"lift"}));
+
+  const auto unknown = summarise_log(file);
+  EXPECT_THAT(unknown.text(), HasSubstr("as if every joint turned"));
+  json = nlohmann::json::parse(unknown.json());
+  EXPECT_NEAR(json["joints"][1]["highest_deg"], degrees(0.504), 1e-4);
+  EXPECT_TRUE(json["sliding_joints"].is_null());
 }
 
 // Arm and head of a YARP recording, half a millisecond apart: together they came at 200 Hz and with a gap after

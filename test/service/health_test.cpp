@@ -58,6 +58,15 @@ TEST(Health, CamerasFellSilent) {
   expect(facts, HealthLevel::kStale, "no pictures on ICUB_CAMERAS for 3.2 s");
 }
 
+TEST(Health, PicturesTooLargeToBeTakenInAreNotSilence) {
+  HealthFacts facts = well();
+  facts.picture_age_ms = facts.estimate_age_ms = -1.0;
+  facts.since_last.faults[static_cast<std::size_t>(MessageFault::kTooLarge)] = 30;
+  expect(facts, HealthLevel::kStale,
+         "no pictures yet on ICUB_CAMERAS; 30 messages or pictures refused in the last second: they are larger than "
+         "the configuration allows");
+}
+
 TEST(Health, EncodersFellSilent) {
   HealthFacts facts = well();
   facts.joints_age_ms = 61'000.0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 
@@ -28,6 +29,9 @@ struct BusOptions {
   /// Observations that may wait for the estimator; beyond it the oldest is shed.
   int queue_frames = 8;
 
+  /// What a message of ours may take: pictures of this many cameras, raw and in colour, each as large as `limits`
+  /// allow, with room for what belongs to them; 32 MiB at least and what LCM carries at most.
+  [[nodiscard]] std::size_t longest_message_bytes(std::size_t cameras) const;
   [[nodiscard]] Channels channels() const { return Channels::with_prefix(channel_prefix); }
   /// Throws ConfigurationError.
   static BusOptions from(const Configuration& bus);

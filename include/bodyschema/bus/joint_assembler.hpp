@@ -16,17 +16,23 @@ class JointAssembler {
  public:
   /// @param joint_names  RobotModel order
   /// @param resting_rad  values of joints before their first reading; others at zero
-  JointAssembler(const std::vector<std::string>& joint_names, const std::map<std::string, double>& resting_rad);
+  /// @param clock_step   three messages in a row further before the newest sample are stamps that begin anew
+  JointAssembler(const std::vector<std::string>& joint_names, const std::map<std::string, double>& resting_rad,
+                 Microseconds clock_step);
 
-  /// The joints as known with this message; null when it carries none of ours or is older than the
-  /// last. Head and arm with one stamp give two samples with it, the second complete. Valid until the
-  /// next call.
+  /// The joints as known with this message; null when it carries none of ours or is older than the last of
+  /// its own joints. Stamps rise: one that others have overtaken, as where head and arm come apart, counts at
+  /// their stamp, which thus comes again, more complete. Where stamps begin anew they go back: that of a single
+  /// message far in the future, whose sender then falls silent, hides nothing for long. Valid until the next call.
   const JointSample* take(const JointStateMessage& message);
   /// Stamps may begin anew (clock step).
-  void forget() { now_.utime = -1; }
+  void forget();
 
  private:
   std::map<std::string, Eigen::Index> index_;
+  std::vector<Microseconds> read_;  ///< stamp of each joint's last reading; -1: none
+  Microseconds clock_step_;
+  int far_before_in_a_row_ = 0;
   JointSample now_;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -34,6 +35,7 @@ struct RefusedSources {
 struct LostMessages {
   std::uint64_t queue = 0;       ///< too many waited: the oldest of that channel
   std::uint64_t incomplete = 0;  ///< a part of them never came; of any channel
+  std::uint64_t too_large = 0;   ///< refused by the size they announced
 };
 
 /// A connection to LCM: publishes, and hands every message of the subscribed channels to one
@@ -46,7 +48,9 @@ class LcmLink : public MessageSink {
   /// Throws DeviceError naming the URL and what to do when the network cannot be used.
   /// @param one_source_silence_s  when given, each channel is taken from one source only (a process,
   ///   by address and port): the first one heard, until it is silent for longer than this
-  explicit LcmLink(std::string url, std::optional<double> one_source_silence_s = {});
+  /// @param longest_message_bytes  longer ones are refused and counted, where one source only is admitted
+  explicit LcmLink(std::string url, std::optional<double> one_source_silence_s = {},
+                   std::size_t longest_message_bytes = 32u << 20);
   ~LcmLink() override;
   LcmLink(const LcmLink&) = delete;
   LcmLink& operator=(const LcmLink&) = delete;

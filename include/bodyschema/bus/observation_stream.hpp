@@ -105,6 +105,7 @@ class ObservationStream {
   JointAssembler assembler_;
   std::unique_ptr<EncoderFollower> follower_;
   std::uint64_t clock_steps_ = 0;  ///< when the follower saw its last sample
+  Microseconds shown_ = -1;        ///< that sample's stamp
   BusStatistics statistics_;
   JointStateMessage joint_state_;
   ImagesView images_;

@@ -32,7 +32,7 @@ struct Sender {
 class UdpmAssembler {
  public:
   struct Limits {
-    std::size_t message_bytes = 32u << 20;  ///< longer messages are refused
+    std::size_t message_bytes = 32u << 20;  ///< longer messages are refused, and counted where they are wanted
     std::size_t pending_bytes = 64u << 20;  ///< of all unfinished messages, as far as they have arrived
     std::size_t senders = 64;               ///< with an unfinished message
   };
@@ -52,6 +52,8 @@ class UdpmAssembler {
   /// Messages begun and given up: a fragment was lost, they were not what they said, or there were too many
   /// at a time. Not those that were not wanted.
   [[nodiscard]] std::uint64_t incomplete() const { return incomplete_; }
+  /// Messages longer than `message_bytes` that were wanted.
+  [[nodiscard]] std::uint64_t too_large() const { return too_large_; }
   /// What unfinished messages hold now.
   [[nodiscard]] std::size_t pending_bytes() const { return pending_bytes_; }
 
@@ -75,6 +77,7 @@ class UdpmAssembler {
   };
   using Place = std::map<Sender, Pending>::iterator;
   std::optional<Message> take_fragment(Bytes packet, Sender sender);
+  void refuse(std::uint32_t sequence, const std::string& channel, Sender sender);
   void remove(Place pending);
   void give_up(Place pending);
   bool make_room(Place newcomer);
@@ -85,6 +88,8 @@ class UdpmAssembler {
   std::size_t pending_bytes_ = 0;
   std::uint64_t order_ = 0;
   std::uint64_t incomplete_ = 0;
+  std::uint64_t too_large_ = 0;
+  std::optional<std::pair<Sender, std::uint32_t>> refused_;  ///< the last one too large: whose, and its sequence
 };
 
 /// Who may speak on a channel: whoever spoke first, until silent for longer than `silence_us`.

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -44,11 +46,12 @@ struct EncodersSummary {
 /// How a joint moved, as its encoder told.
 struct JointMotion {
   std::string name;
+  bool slides = false;  ///< then m stands for rad below, as in its messages
   std::uint64_t readings = 0;
   double lowest_rad = 0.0;
   double highest_rad = 0.0;
   double fastest_rad_s = 0.0;  ///< over 50 ms
-  int turns = 0;               ///< changes of direction, each after at least half a degree
+  int turns = 0;               ///< changes of direction, each after at least half a degree or one millimetre
 };
 
 /// What a log holds, whoever recorded it: message types are told by their LCM fingerprints.
@@ -64,13 +67,17 @@ struct LogSummary {
   std::vector<std::string> joint_channels;
   std::vector<EncodersSummary> encoders;  ///< in the order of their first appearance
   std::vector<JointMotion> joints;        ///< in the order of their first appearance
+  /// What was given to summarise_log(). A log itself does not say; without it every joint counts as turning.
+  std::optional<std::set<std::string>> sliding_joints;
 
-  /// For people.
+  /// For people: deg, of sliding joints mm.
   [[nodiscard]] std::string text() const;
+  /// Keys end in their unit: deg, of sliding joints m; `sliding_joints` is null where these are not known.
   [[nodiscard]] std::string json() const;
 };
 
 /// Reads a log from end to end. Throws FileError when it is none.
-LogSummary summarise_log(const std::filesystem::path& log);
+/// @param sliding_joints  the robot's, where it is known: their readings are m, not rad
+LogSummary summarise_log(const std::filesystem::path& log, std::optional<std::set<std::string>> sliding_joints = {});
 
 }  // namespace bodyschema

@@ -15,7 +15,7 @@ struct DaemonOptions {
   /// Log of every message that comes in on our channels or goes out. A file that holds something already
   /// is kept: name.1.lcmlog, name.2.lcmlog, ... are written instead.
   std::optional<std::filesystem::path> record;
-  /// estimates.jsonl, as replay writes it; kept in the same way.
+  /// estimates.jsonl, as replay writes it; kept in the same way. Not the same file.
   std::optional<std::filesystem::path> estimates;
   std::uint64_t frames = 0;        ///< stop after this many estimates; 0: do not
   double stop_after_idle_s = 0.0;  ///< stop when nothing has come for so long, once something has; 0: do not

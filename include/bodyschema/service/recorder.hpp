@@ -15,12 +15,14 @@ namespace bodyschema {
 
 /// Records messages to a log from a thread of its own, so that a slow disk holds up nobody. What
 /// waits for the disk is bounded; beyond it, and once the disk has failed, messages are lost and
-/// counted. Any thread may record.
+/// counted. One for which nothing waits is taken whatever its size. Any thread may record.
 class Recorder {
  public:
+  static constexpr std::size_t kWaiting_bytes = 64u << 20;
+
   /// Throws FileError when the log cannot be created.
-  /// @param max_waiting_bytes  what may wait for the disk
-  explicit Recorder(const std::filesystem::path& file, std::size_t max_waiting_bytes = 64u << 20);
+  /// @param max_waiting_bytes  what may wait for the disk, beside the message being written
+  explicit Recorder(const std::filesystem::path& file, std::size_t max_waiting_bytes = kWaiting_bytes);
   ~Recorder();  ///< writes what waits
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
