@@ -78,6 +78,10 @@ class Effect {
   [[nodiscard]] virtual std::unique_ptr<Effect> clone() const = 0;
   /// Whether `observe` matters, so that others need not replay the stream.
   [[nodiscard]] virtual bool has_memory() const { return false; }
+  /// Whether `apply` looks at velocity or acceleration, so that others need not find them.
+  [[nodiscard]] virtual bool follows_motion() const { return false; }
+  /// Whether `apply` looks at the torques, which others then take where the arm stands under all effects, sagged.
+  [[nodiscard]] virtual bool follows_gravity() const { return false; }
 
  protected:
   Effect(const Effect&) = default;
