@@ -89,6 +89,8 @@ JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSe
   for (const auto& joint : model->joints()) roles.names.push_back(joint.name);
   for (const auto& name : setup.estimated_joints) roles.arm.push_back(roles.index(name));
   for (const auto& name : setup.head_joints) roles.head.push_back(roles.index(name));
+  std::sort(roles.arm.begin(), roles.arm.end());
+  std::sort(roles.head.begin(), roles.head.end());
 
   std::vector<std::string> cameras;
   for (const auto& camera : rig.cameras) cameras.push_back(camera.link);

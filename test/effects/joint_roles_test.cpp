@@ -50,6 +50,20 @@ TEST(JointRoles, DoNotDependOnTheOrderInWhichTheHeadIsListed) {
   EXPECT_EQ(name_of(r, r.roles.right_pan), "r_eye_pan");
 }
 
+TEST(JointRoles, ComeFromTheRootOutwardsHoweverTheyAreListed) {
+  const auto r = robot("icub_right/robot.yaml");
+  const auto backwards = robot("icub_right/robot.yaml",
+                               {"robot.head_joints=[r_eye_pan, l_eye_pan, eyes_tilt, neck_yaw, neck_roll, neck_pitch]",
+                                "robot.estimated_joints=[r_wrist_yaw, r_wrist_pitch, r_wrist_prosup, r_elbow, "
+                                "r_shoulder_yaw, r_shoulder_roll, r_shoulder_pitch]"});
+  EXPECT_EQ(backwards.roles.neck, r.roles.neck);
+  EXPECT_EQ(backwards.roles.head, r.roles.head);
+  EXPECT_EQ(backwards.roles.arm, r.roles.arm);
+  EXPECT_EQ(name_of(r, r.roles.neck.front()), "neck_pitch");
+  EXPECT_EQ(name_of(r, r.roles.neck.back()), "eyes_tilt");
+  EXPECT_EQ(name_of(r, r.roles.arm.front()), "r_shoulder_pitch");
+}
+
 TEST(JointRoles, OfARobotWithoutHeadOrFingers) {
   const auto r = robot("arm7/robot.yaml");
   EXPECT_TRUE(r.roles.fingers.empty()) << r.names(r.roles.fingers).front();

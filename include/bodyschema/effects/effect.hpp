@@ -34,11 +34,12 @@ struct EffectTarget {
   friend bool operator==(const EffectTarget&, const EffectTarget&) = default;
 };
 
-/// Which joints play which part on this robot, by position in RobotModel order.
+/// Which joints play which part on this robot, by position in RobotModel order; in that order too, so from the
+/// root outwards, however a configuration lists them.
 struct JointRoles {
   std::vector<std::string> names;     ///< every joint of the model
   std::vector<Eigen::Index> arm;      ///< shoulder to wrist, the joints whose offsets are estimated
-  std::vector<Eigen::Index> head;     ///< every joint of neck and eyes, as configured
+  std::vector<Eigen::Index> head;     ///< every joint of neck and eyes
   std::vector<Eigen::Index> neck;     ///< those of the head that move every camera (eyes' tilt too)
   Eigen::Index left_pan = -1;         ///< moves the left camera alone; -1: none
   Eigen::Index right_pan = -1;        ///< moves the right camera alone; -1: none
