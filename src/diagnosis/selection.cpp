@@ -188,8 +188,13 @@ class Selector {
   /// Whether a cause in time also predicts stretches that lie far from what its fit has seen. Slow
   /// noise follows any smooth curve into the next block, but not further.
   [[nodiscard]] bool lasts(std::size_t candidate) const {
-    const auto rest = without(model_, candidate);
-    const auto plain = fit(rest, options_.far_group);
+    auto rest = without(model_, candidate);
+    auto plain = fit(rest, options_.far_group);
+    if (!plain.usable) {
+      // Nor can a slip near an end be fitted without the group that holds it; what others are worth shows beside it.
+      std::erase_if(rest, [&](std::size_t c) { return candidates_[c].slip && !fit({c}, options_.far_group).usable; });
+      plain = fit(rest, options_.far_group);
+    }
     const auto extended_model = with(rest, candidate);
     const auto extended = fit(extended_model, options_.far_group);
     if (!plain.usable) return false;

@@ -241,6 +241,35 @@ TEST(Selection, PutsUpWithASmallSlipUnlessItTakesAwayMuch) {
   }
 }
 
+/// The last group holds all of a late slip; that says nothing of one in the middle.
+TEST(Selection, ASlipLastsBesideOneNearTheEnd) {
+  constexpr Eigen::Index kBlocks = 30, kMiddle = 12, kLate = 28;
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    std::mt19937_64 random(test::seed() + i);
+    std::normal_distribution<double> normal;
+    Eigen::MatrixXd X(kLong, 2);
+    Eigen::VectorXd y(kLong);
+    for (Eigen::Index r = 0; r < kLong; ++r) {
+      const auto block = r * kBlocks / kLong;
+      X.row(r) << 1.0, normal(random);
+      y[r] = (block >= kMiddle ? 0.6 : 0.0) + (block >= kLate ? 1.5 * X(r, 1) : 0.0) + normal(random);
+    }
+    std::vector<Candidate> candidates(2);
+    for (auto& c : candidates) {
+      c.name = "slip";
+      c.slip = true;
+    }
+    candidates[0].columns = {{0, kMiddle, 0}};
+    candidates[1].columns = {{1, kLate, 0}};
+    candidates[1].target.joint = "another";
+    SelectionOptions options;
+    options.crowd_rest_t = 1e9;  // two causes are no crowd
+    const auto selection = select_causes(test::statistics_of(X, y, kBlocks), {{0}, {1}}, candidates, options);
+    EXPECT_EQ(found(selection), (std::vector<std::size_t>{0, 1})) << "seed " << test::seed() + i;
+    for (const auto& cause : selection.causes) EXPECT_LT(cause.score.gain, options.gain_far);
+  }
+}
+
 TEST(Selection, RefusesWhatCannotBeFitted) {
   const Swapped data(test::seed());
   const std::vector<Candidate> candidates = {candidate("cause", 2)};
