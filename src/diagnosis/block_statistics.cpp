@@ -85,6 +85,16 @@ bool jackknife(const std::vector<Eigen::VectorXd>& replicas, Eigen::MatrixXd& co
 
 }  // namespace
 
+std::size_t BlockStatistics::seen_blocks(std::size_t group) const {
+  std::size_t seen = 0;
+  for (std::size_t first = 0; first < blocks_.size(); first += group) {
+    const std::size_t last = std::min(first + group, blocks_.size());
+    const auto of_group = blocks().subspan(first, last - first);
+    seen += std::any_of(of_group.begin(), of_group.end(), [](const Block& block) { return block.weight > 0.0; });
+  }
+  return seen;
+}
+
 BlockFit BlockStatistics::fit(const Columns& columns, std::size_t group) const {
   const auto n = static_cast<Eigen::Index>(columns.size());
   const auto blocks = static_cast<Eigen::Index>(blocks_.size());

@@ -15,6 +15,7 @@ class IntervalRule {
  public:
   /// @param final_fit  of the final model: how much wider its errors are than white noise would make
   ///        them is the least that is believed of any fit
+  /// @param blocks  those in which anything was seen
   /// @param systematic_share, systematic_error  as in DiagnosisOptions
   IntervalRule(const BlockFit& final_fit, std::size_t blocks, double systematic_share,
                std::map<std::string, double> systematic_error = {});

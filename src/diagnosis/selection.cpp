@@ -124,7 +124,7 @@ class Selector {
     if (dispersion < floor_) V *= floor_ / dispersion;
     V += 1e-12 * V.trace() * Eigen::MatrixXd::Identity(n, n);
     // Few blocks know the covariance of many columns badly (Hotelling's correction; none for one).
-    const double blocks = static_cast<double>(statistics_.block_count());
+    const double blocks = static_cast<double>(statistics_.seen_blocks());
     const double known = std::max(0.0, (blocks - static_cast<double>(n)) / (blocks - 1.0));
     return equivalent_z(known * theta.dot(V.ldlt().solve(theta)), n);
   }
@@ -171,7 +171,7 @@ class Selector {
     const double least = std::max(floor * measure_of(c), left_by_shapes());
     const bool large = c.temporal() && s.gain > options_.gain_large;
     const double z = large ? options_.z_large : options_.z_enter;
-    return s.testable && z_of_few(s.z, statistics_.block_count(), options_.usual_blocks) > z && s.gain > least &&
+    return s.testable && z_of_few(s.z, statistics_.seen_blocks(), options_.usual_blocks) > z && s.gain > least &&
            s.t > options_.t_enter &&
            (!c.temporal() || s.gain > options_.gain_far || (!tolerable_slip(candidate) && lasts(candidate)));
   }
@@ -199,9 +199,8 @@ class Selector {
     const auto extended = fit(extended_model, options_.far_group);
     if (!plain.usable) return false;
     if (!extended.usable) return candidates_[candidate].slip;  // near an end: one group holds it all
-    const auto groups = [&](std::size_t blocks) { return (blocks + options_.far_group - 1) / options_.far_group; };
-    const auto z = z_of_few(wald_z(extended, extended_model, candidate), groups(statistics_.block_count()),
-                            groups(options_.usual_blocks));
+    const auto z = z_of_few(wald_z(extended, extended_model, candidate), statistics_.seen_blocks(options_.far_group),
+                            (options_.usual_blocks + options_.far_group - 1) / options_.far_group);
     return z > options_.z_far &&
            (plain.heldout() - extended.heldout()) / baseline_ > gain_floor_ * measure_of(candidates_[candidate]);
   }
@@ -228,9 +227,8 @@ class Selector {
   /// Without blocks to hold out, or with offsets that the log cannot tell from each other, nothing that
   /// follows means anything; least of all that nothing was found.
   void refuse_unusable() const {
-    constexpr std::ptrdiff_t kFewestBlocks = 4;
-    const auto blocks = statistics_.blocks();
-    const auto seen = std::count_if(blocks.begin(), blocks.end(), [](const auto& b) { return b.weight > 0.0; });
+    constexpr std::size_t kFewestBlocks = 4;
+    const auto seen = statistics_.seen_blocks();
     if (current_.usable && seen >= kFewestBlocks) return;
     throw DataError(std::string("the log cannot be diagnosed: ") +
                     (seen < kFewestBlocks ? "the arm stands still in nearly all of it"

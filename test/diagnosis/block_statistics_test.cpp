@@ -118,6 +118,19 @@ TEST(BlockStatistics, RefusesAColumnThatLivesInOneGroup) {
   }
 }
 
+TEST(BlockStatistics, CountsTheBlocksInWhichSomethingWasSeen) {
+  const auto r = regression(test::seed(), 0.3, 0.0);
+  const auto seen = r.statistics();
+  EXPECT_EQ(seen.seen_blocks(), 20u);
+  EXPECT_EQ(seen.seen_blocks(3), 7u);
+  std::vector<BlockStatistics::Block> blocks(seen.blocks().begin(), seen.blocks().end());
+  for (const std::size_t b : {0u, 3u, 4u, 5u, 19u}) blocks[b] = test::unseen_block(3);
+  const BlockStatistics some(std::move(blocks));
+  EXPECT_EQ(some.block_count(), 20u);
+  EXPECT_EQ(some.seen_blocks(), 15u);
+  EXPECT_EQ(some.seen_blocks(3), 6u);  // of the second group nothing
+}
+
 TEST(BlockStatistics, AColumnCanBeginWithABlock) {
   auto r = regression(test::seed(), 0.1, 0.0);
   r.y.tail(200).array() += 3.0;

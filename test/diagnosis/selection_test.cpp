@@ -270,6 +270,36 @@ TEST(Selection, ASlipLastsBesideOneNearTheEnd) {
   }
 }
 
+/// Ten blocks know their spread no better if twenty in which the hand was hidden lie between them.
+TEST(Selection, BlocksInWhichNothingWasSeenProveNothing) {
+  constexpr Eigen::Index kBlocks = 10, kPerBlock = 20;
+  constexpr double kSpread = 0.6;  // of the cause between blocks: z = 3 / 0.6
+  Eigen::MatrixXd X(kBlocks * kPerBlock, 2);
+  Eigen::VectorXd y(kBlocks * kPerBlock);
+  for (Eigen::Index r = 0; r < X.rows(); ++r) {
+    X.row(r) << 1.0, r % 2 == 0 ? 1.0 : -1.0;
+    y[r] = (r / kPerBlock % 2 == 0 ? 1.0 + kSpread : 1.0 - kSpread) * X(r, 1);
+  }
+  const auto few = test::statistics_of(X, y, kBlocks);
+  std::vector<BlockStatistics::Block> blocks;
+  for (const auto& block : few.blocks()) {
+    blocks.push_back(block);
+    for (int unseen = 0; unseen < 2; ++unseen) blocks.push_back(test::unseen_block(2));
+  }
+  const BlockStatistics with_unseen(std::move(blocks));
+  SelectionOptions options;
+  options.crowd_rest_t = 1e9;  // a single candidate is no crowd
+  const std::vector<Candidate> candidates = {candidate("cause", 1)};
+  for (const auto* statistics : {&few, &with_unseen}) {
+    const auto none = select_causes(*statistics, {{0}}, candidates, options);
+    EXPECT_TRUE(none.causes.empty());
+    EXPECT_NEAR(none.first_scores[0].z, 5.0, 0.05);
+  }
+  options.usual_blocks = kBlocks;
+  EXPECT_EQ(select_causes(few, {{0}}, candidates, options).causes.size(), 1u);
+  EXPECT_EQ(select_causes(with_unseen, {{0}}, candidates, options).causes.size(), 1u);
+}
+
 TEST(Selection, RefusesWhatCannotBeFitted) {
   const Swapped data(test::seed());
   const std::vector<Candidate> candidates = {candidate("cause", 2)};
