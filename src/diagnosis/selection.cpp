@@ -279,12 +279,16 @@ class Selector {
     return named;
   }
 
-  /// A cause that is already in the model, at another time or in another shape.
   [[nodiscard]] bool blocked(std::size_t candidate) const {
-    return contains(dropped_, candidate) || std::any_of(causes_.begin(), causes_.end(), [&](std::size_t c) {
-             return same_cause(candidates_[c], candidates_[candidate]) && !candidates_[c].slip &&
-                    !candidates_[c].generic();
-           });
+    return contains(dropped_, candidate) || is_cause(candidate);
+  }
+
+  /// Whether it is a cause already, at whatever time: a model holds one slip of a joint. A joint that jumps twice
+  /// follows time in a way that no effect of the catalogue does.
+  [[nodiscard]] bool is_cause(std::size_t candidate) const {
+    return !candidates_[candidate].generic() && std::any_of(causes_.begin(), causes_.end(), [&](std::size_t c) {
+      return same_cause(candidates_[c], candidates_[candidate]);
+    });
   }
 
   void begin_with_given() {
@@ -313,10 +317,28 @@ class Selector {
     while (static_cast<int>(causes_.size()) < options_.max_causes) {
       const auto best = best_addition();
       if (!best) return;
-      causes_.push_back(*best);
-      model_.push_back(*best);
-      refit();
+      add(*best);
+      find_times();
       drop_causes();
+    }
+  }
+
+  /// Beside what was found after it a slip may fit better at another time.
+  void find_times() {
+    if (causes_.size() < 2) return;
+    for (const auto slip : Ids(causes_)) {
+      if (!candidates_[slip].slip) continue;
+      remove(slip);
+      auto best = slip;
+      double most = test(slip).score.gain;
+      for (std::size_t c = 0; c < candidates_.size(); ++c) {
+        if (!same_cause(candidates_[c], candidates_[slip]) || contains(dropped_, c)) continue;
+        const auto score = test(c).score;
+        if (score.gain <= most || !enters(c, score)) continue;
+        best = c;
+        most = score.gain;
+      }
+      add(best);
     }
   }
 
@@ -335,6 +357,12 @@ class Selector {
       remove(*least);
       dropped_.push_back(*least);
     }
+  }
+
+  void add(std::size_t c) {
+    causes_.push_back(c);
+    model_.push_back(c);
+    refit();
   }
 
   void remove(std::size_t c) {
@@ -439,9 +467,7 @@ class Selector {
       }
       if (!best) return;
       for (const auto c : best_killed) remove(c);
-      causes_.push_back(*best);
-      model_.push_back(*best);
-      refit();
+      add(*best);
     }
   }
 
@@ -454,9 +480,7 @@ class Selector {
     const NestedFits rest(statistics_, columns_of(without(model_, cause)));
     std::vector<std::pair<double, std::size_t>> same;
     for (std::size_t a = 0; a < candidates_.size(); ++a) {
-      if (contains(model_, a) || candidates_[a].generic() || same_cause(candidates_[a], candidates_[cause])) {
-        continue;
-      }
+      if (contains(model_, a) || candidates_[a].generic() || is_cause(a)) continue;
       const auto both_model = with(model_, a);
       const auto both = extended_by(a);
       const auto instead = rest.with(candidates_[a].columns);

@@ -241,6 +241,61 @@ TEST(Selection, PutsUpWithASmallSlipUnlessItTakesAwayMuch) {
   }
 }
 
+/// An offset that changes with blocks: a slip of one joint at each of them.
+std::vector<Candidate> slips(std::size_t blocks) {
+  std::vector<Candidate> list;
+  for (std::size_t b = 1; b < blocks; ++b) {
+    Candidate slip;
+    slip.name = "slip";
+    slip.slip = true;
+    slip.columns = {{0, b, 0}};
+    list.push_back(slip);
+  }
+  return list;
+}
+
+/// An error model holds one slip of a joint: two of one joint had one step between them, or none and a name all
+/// the same.
+TEST(Selection, AJointHasOneSlip) {
+  constexpr Eigen::Index kBlocks = 30;
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    std::mt19937_64 random(test::seed() + i);
+    std::normal_distribution<double> normal;
+    const Eigen::MatrixXd X = Eigen::MatrixXd::Ones(kLong, 1);
+    Eigen::VectorXd y(kLong);
+    for (Eigen::Index r = 0; r < kLong; ++r) {
+      const auto block = r * kBlocks / kLong;
+      y[r] = (block < 10 ? 0.0 : block < 20 ? 2.0 : 1.0) + normal(random);
+    }
+    SelectionOptions options;
+    options.crowd_rest_t = 1e9;  // one joint is no crowd
+    const auto selection = select_causes(test::statistics_of(X, y, kBlocks), {{0}}, slips(kBlocks), options);
+    EXPECT_EQ(found(selection), (std::vector<std::size_t>{9})) << "seed " << test::seed() + i;
+  }
+}
+
+/// A bump of another cause before the slip makes it look as if it had come earlier.
+TEST(Selection, ASlipMovesToWhereItFitsBesideWhatIsFoundLater) {
+  constexpr Eigen::Index kBlocks = 30, kFrom = 20;
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    std::mt19937_64 random(test::seed() + i);
+    std::normal_distribution<double> normal;
+    Eigen::MatrixXd X(kLong, 2);
+    Eigen::VectorXd y(kLong);
+    for (Eigen::Index r = 0; r < kLong; ++r) {
+      const auto block = r * kBlocks / kLong;
+      X.row(r) << 1.0, (block >= 14 && block < kFrom ? 1.0 : 0.0) + 0.5 * normal(random);
+      y[r] = 1.2 * X(r, 1) + (block >= kFrom ? 1.5 : 0.0) + 0.2 * normal(random);
+    }
+    SelectionOptions options;
+    options.crowd_rest_t = 1e9;  // two causes are no crowd
+    auto candidates = slips(kBlocks);
+    candidates.push_back(candidate("cause", 1));
+    const auto selection = select_causes(test::statistics_of(X, y, kBlocks), {{0}}, candidates, options);
+    EXPECT_EQ(found(selection), (std::vector<std::size_t>{kFrom - 1, kBlocks - 1})) << "seed " << test::seed() + i;
+  }
+}
+
 /// The last group holds all of a late slip; that says nothing of one in the middle.
 TEST(Selection, ASlipLastsBesideOneNearTheEnd) {
   constexpr Eigen::Index kBlocks = 30, kMiddle = 12, kLate = 28;
