@@ -60,6 +60,26 @@ double find_slip_time(const Evidence& evidence, const BlockFit& fit, const Colum
   return best_time;
 }
 
+/// Wald z of a cause's parameters once they are fitted; 0 of one that is no effect of the model.
+double fitted_z(const Candidate& candidate, const ModelFit& after, const ErrorModel& model) {
+  std::vector<Eigen::Index> columns;
+  std::vector<double> values;
+  for (std::size_t c = 0; c < after.parameters.size(); ++c) {
+    const auto& ref = after.parameters[c];
+    const auto& effect = model[ref.effect];
+    if (effect.name() != candidate.name || !(effect.target() == candidate.target)) continue;
+    const auto& p = effect.parameters()[ref.parameter];
+    values.push_back(p.value / p.typical);
+    columns.push_back(static_cast<Eigen::Index>(c));
+  }
+  const auto n = static_cast<Eigen::Index>(columns.size());
+  if (n == 0) return 0.0;
+  Eigen::MatrixXd V = after.fit.covariance(columns, columns);
+  V += 1e-12 * V.trace() * Eigen::MatrixXd::Identity(n, n);
+  const Eigen::Map<const Eigen::VectorXd> value(values.data(), n);
+  return equivalent_z(value.dot(V.ldlt().solve(value)), n);
+}
+
 }  // namespace
 
 Extension extend(ErrorModel model, const Selection& selection, const Evidence& evidence) {
@@ -128,39 +148,18 @@ Extension extend(ErrorModel model, const Selection& selection, const Evidence& e
   return result;
 }
 
-bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit& after, double z_enter,
+bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit& after, const SelectionOptions& rules,
                   ErrorModel& model) {
   if (!after.fit.usable) return false;
-  double weakest = z_enter;
+  double weakest = 1.0;  // of the z asked
   auto worst = selection.causes.end();
   for (auto cause = selection.causes.begin(); cause != selection.causes.end(); ++cause) {
     const auto& candidate = set.candidates[cause->candidate];
     if (candidate.generic()) continue;
-    std::vector<Eigen::Index> columns;
-    std::vector<double> values;
-    for (std::size_t c = 0; c < after.parameters.size(); ++c) {
-      const auto& ref = after.parameters[c];
-      const auto& effect = std::as_const(model)[ref.effect];
-      if (effect.name() != candidate.name || !(effect.target() == candidate.target)) continue;
-      const auto& p = effect.parameters()[ref.parameter];
-      values.push_back(p.value / p.typical);
-      columns.push_back(static_cast<Eigen::Index>(c));
-    }
-    const auto n = static_cast<Eigen::Index>(columns.size());
-    if (n == 0) continue;
-    Eigen::MatrixXd V(n, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j) {
-        V(i, j) = after.fit.covariance(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)]);
-      }
-    }
-    V += 1e-12 * V.trace() * Eigen::MatrixXd::Identity(n, n);
-    const Eigen::Map<const Eigen::VectorXd> value(values.data(), n);
-    const double z = equivalent_z(value.dot(V.ldlt().solve(value)), n);
-    if (z < weakest) {
-      weakest = z;
-      worst = cause;
-    }
+    const double share = fitted_z(candidate, after, model) / rules.z_asked(candidate, cause->score.gain);
+    if (share >= weakest) continue;
+    weakest = share;
+    worst = cause;
   }
   if (worst == selection.causes.end()) return false;
   const auto& candidate = set.candidates[worst->candidate];

@@ -169,10 +169,9 @@ class Selector {
     const auto& c = candidates_[candidate];
     const double floor = c.generic() ? generic_gain_floor_ : gain_floor_;
     const double least = std::max(floor * measure_of(c), left_by_shapes());
-    const bool large = c.temporal() && s.gain > options_.gain_large;
-    const double z = large ? options_.z_large : options_.z_enter;
-    return s.testable && z_of_few(s.z, statistics_.seen_blocks(), options_.usual_blocks) > z && s.gain > least &&
-           s.t > options_.t_enter &&
+    return s.testable &&
+           z_of_few(s.z, statistics_.seen_blocks(), options_.usual_blocks) > options_.z_asked(c, s.gain) &&
+           s.gain > least && s.t > options_.t_enter &&
            (!c.temporal() || s.gain > options_.gain_far || (!tolerable_slip(candidate) && lasts(candidate)));
   }
 
