@@ -60,6 +60,32 @@ double find_slip_time(const Evidence& evidence, const BlockFit& fit, const Colum
   return best_time;
 }
 
+bool explains_away(const SelectedCause& cause, std::size_t nuisance) {
+  return cause.candidate != nuisance && contains(cause.same, nuisance);
+}
+
+/// Parameters that this log cannot tell from the offsets are not fitted.
+void fit_what_shows(Effect& effect, const Candidate& candidate) {
+  std::size_t next = 0;  // among the effect's fitted parameters
+  for (auto& p : effect.parameters()) {
+    if (!p.fitted) continue;
+    p.fitted = contains(candidate.parameters, next++);
+    p.value = 0.0;
+  }
+}
+
+/// Nuisances that were left out for causes which are no longer there.
+void put_back_nuisances(const Selection& selection, const CandidateSet& set, ErrorModel& model) {
+  for (std::size_t c = 0; c < set.candidates.size(); ++c) {
+    const auto& candidate = set.candidates[c];
+    if (!candidate.nuisance || contains(selection.not_testable, c)) continue;
+    if (model.find(candidate.name, candidate.target) != nullptr) continue;
+    const bool swapped_out = std::any_of(selection.causes.begin(), selection.causes.end(),
+                                         [&](const SelectedCause& cause) { return explains_away(cause, c); });
+    if (!swapped_out) fit_what_shows(model.add(candidate.name, candidate.target), candidate);
+  }
+}
+
 /// Wald z of a cause's parameters once they are fitted; 0 of one that is no effect of the model.
 double fitted_z(const Candidate& candidate, const ModelFit& after, const ErrorModel& model) {
   std::vector<Eigen::Index> columns;
@@ -96,9 +122,8 @@ Extension extend(ErrorModel model, const Selection& selection, const Evidence& e
   for (std::size_t c = 0; c < set.candidates.size(); ++c) {
     const auto& candidate = set.candidates[c];
     if (!candidate.nuisance) continue;
-    const bool swapped_out =
-        std::any_of(selection.causes.begin(), selection.causes.end(),
-                    [&](const SelectedCause& cause) { return cause.candidate != c && contains(cause.same, c); });
+    const bool swapped_out = std::any_of(selection.causes.begin(), selection.causes.end(),
+                                         [&](const SelectedCause& cause) { return explains_away(cause, c); });
     if (!contains(selection.model, c) || swapped_out) {
       result.model.remove(candidate.name, candidate.target);
     } else {
@@ -120,15 +145,10 @@ Extension extend(ErrorModel model, const Selection& selection, const Evidence& e
     if (candidate.generic()) continue;
     auto& effect = result.model.add(candidate.name, candidate.target);
     if (!candidate.slip) {
-      std::size_t next = 0;  // among the effect's fitted parameters
-      Eigen::Index column = 0;
+      fit_what_shows(effect, candidate);
+      Eigen::Index column = first;
       for (auto& p : effect.parameters()) {
-        if (!p.fitted) continue;
-        const auto& kept = candidate.parameters;
-        const bool seen = contains(kept, next++);
-        p.fitted = seen;
-        p.value = seen && fit.usable ? fit.estimate[first + column] * p.typical : 0.0;
-        column += seen;
+        if (p.fitted && fit.usable) p.value = fit.estimate[column++] * p.typical;
       }
     }
     if (candidate.name == "backlash") {
@@ -163,8 +183,10 @@ bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit&
   }
   if (worst == selection.causes.end()) return false;
   const auto& candidate = set.candidates[worst->candidate];
-  if (!candidate.nuisance) model.remove(candidate.name, candidate.target);
   selection.causes.erase(worst);
+  if (candidate.nuisance) return true;
+  model.remove(candidate.name, candidate.target);
+  put_back_nuisances(selection, set, model);
   return true;
 }
 

@@ -30,7 +30,8 @@ struct Extension {
 Extension extend(ErrorModel model, const Selection& selection, const Evidence& evidence);
 
 /// Takes the named cause that falls furthest short of the z asked of it, once it is fitted, out of selection and
-/// model; one that is not in the model at all has none. Whether there was one.
+/// model; one that is not in the model at all has none. Nuisances that no other cause explains away are back in
+/// the model then, at zero. Whether there was one.
 bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit& after, const SelectionOptions& rules,
                   ErrorModel& model);
 

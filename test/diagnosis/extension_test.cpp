@@ -88,5 +88,26 @@ TEST(DropWeakest, DropsACauseThatIsNotInTheModel) {
   EXPECT_TRUE(fitted.selection.causes.empty());
 }
 
+TEST(DropWeakest, PutsBackTheNuisanceThatTheCauseStoodFor) {
+  Fitted fitted;
+  const auto vergence = fitted.add_candidate("vergence", {}, true);
+  const auto focal = fitted.add_candidate("focal_length", {}, true);
+  const auto unseen = fitted.add_candidate("mesh_scale", {}, true);
+  const auto baseline = fitted.add_candidate("baseline", {});
+  const auto distortion = fitted.add_candidate("distortion", {});
+  fitted.selection.model = {vergence, focal};
+  fitted.selection.not_testable = {unseen};
+  fitted.add_cause(baseline, 1.0, 0.1, {vergence});
+  fitted.add_cause(distortion, 9.0, 0.1, {focal});
+  ASSERT_TRUE(fitted.drop());
+  EXPECT_EQ(fitted.model.find("baseline", {}), nullptr);
+  const auto* back = fitted.model.find("vergence", {});
+  ASSERT_NE(back, nullptr);
+  EXPECT_TRUE(back->parameters()[0].fitted);
+  EXPECT_EQ(back->parameters()[0].value, 0.0);
+  EXPECT_EQ(fitted.model.find("focal_length", {}), nullptr);  // the distortion still stands for it
+  EXPECT_EQ(fitted.model.find("mesh_scale", {}), nullptr);
+}
+
 }  // namespace
 }  // namespace bodyschema::diagnosis
