@@ -9,6 +9,9 @@
 
 namespace bodyschema::diagnosis {
 
+/// Two-sided 95 % point of Student's t with so many degrees of freedom; of fewer than one as of one.
+double student95(double dof);
+
 /// How far an estimate may be from the truth: one rule for the intervals of causes and offsets and for
 /// the limits of what was not found.
 class IntervalRule {
