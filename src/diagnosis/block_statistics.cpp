@@ -64,6 +64,12 @@ bool solve(const Eigen::MatrixXd& H, const Eigen::VectorXd& g, Eigen::VectorXd& 
   return true;
 }
 
+/// Whether a column lives in the blocks left out alone. What is left of it then is no zero but the rounding of a
+/// difference of sums.
+bool gone(const Eigen::MatrixXd& rest, const Eigen::MatrixXd& total) {
+  return (rest.diagonal().array() < kDependent * total.diagonal().array()).any();
+}
+
 /// False with fewer than two replicas.
 bool jackknife(const std::vector<Eigen::VectorXd>& replicas, Eigen::MatrixXd& covariance) {
   if (replicas.size() < 2) return false;
@@ -78,6 +84,16 @@ bool jackknife(const std::vector<Eigen::VectorXd>& replicas, Eigen::MatrixXd& co
 }
 
 }  // namespace
+
+std::size_t BlockStatistics::seen_blocks(std::size_t group) const {
+  std::size_t seen = 0;
+  for (std::size_t first = 0; first < blocks_.size(); first += group) {
+    const std::size_t last = std::min(first + group, blocks_.size());
+    const auto of_group = blocks().subspan(first, last - first);
+    seen += std::any_of(of_group.begin(), of_group.end(), [](const Block& block) { return block.weight > 0.0; });
+  }
+  return seen;
+}
 
 BlockFit BlockStatistics::fit(const Columns& columns, std::size_t group) const {
   const auto n = static_cast<Eigen::Index>(columns.size());
@@ -120,7 +136,7 @@ BlockFit BlockStatistics::fit(const Columns& columns, std::size_t group) const {
       x = fit.estimate;  // nothing seen here: leaving it out changes nothing
     } else {
       // A column that lives in one group alone cannot be predicted for that group: not usable.
-      if (!solve(rest.H, rest.g, x)) return fit;
+      if (gone(rest.H, total.H) || !solve(rest.H, rest.g, x)) return fit;
       replicas.push_back(x);
     }
     for (std::size_t b = first; b < last; ++b) {
@@ -232,7 +248,7 @@ BlockFit NestedFits::with(const Columns& more) const {
   Eigen::LLT<Eigen::MatrixXd> schur;
   Eigen::VectorXd scale;
   const auto solve_part = [&](const Part& part) {
-    if (!(rest_C.diagonal().minCoeff() > 0.0)) return false;
+    if (!(rest_C.diagonal().minCoeff() > 0.0) || gone(rest_C, all_C)) return false;
     Y = part.scale.asDiagonal() * part.factor.solve(part.scale.asDiagonal() * rest_B);
     scale = rest_C.diagonal().cwiseSqrt().cwiseInverse();
     S = scale.asDiagonal() * (rest_C - rest_B.transpose() * Y) * scale.asDiagonal();

@@ -228,7 +228,7 @@ class Diagnoser {
     begin_where_better(found.extended);
     found.after = fitter_.fit(found.extended, extension.generic, {options_.refit_iterations, between(0.65, 0.9)});
     // What looked like a cause only because others were taken for linear is none.
-    while (rules.search && drop_weakest(found.selection, set, found.after, rules.z_enter, found.extended)) {
+    while (rules.search && drop_weakest(found.selection, set, found.after, rules, found.extended)) {
       found.after = fitter_.fit(found.extended, extension.generic, {options_.refit_iterations, {}});
     }
     return found;

@@ -7,98 +7,44 @@
 #include <numeric>
 #include <spdlog/fmt/fmt.h>
 
+#include "residual_curve.hpp"
+
 namespace bodyschema {
 namespace {
 
-constexpr std::size_t kBins = 14;
-constexpr std::size_t kFewestPerBin = 4;
+using diagnosis::ErrorMemory;
+using diagnosis::ResidualCurve;
+
 constexpr std::size_t kBarsShown = 16;
-
-// ---- what is left, in bins of what it may follow ----
-
-struct Point {
-  double x = 0.0, y = 0.0;
-};
-
-/// Medians of y over bins of x that hold equally many points, with their 95 % intervals.
-struct Curve {
-  std::vector<double> x, y, low, high;
-  /// Mean square of the medians over their standard errors: about one when y does not follow x.
-  [[nodiscard]] double structure() const {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < y.size(); ++i) {
-      const double sd = std::max(1e-12, (high[i] - low[i]) / 3.92);
-      sum += y[i] * y[i] / (sd * sd);
-    }
-    return y.empty() ? 0.0 : sum / static_cast<double>(y.size());
-  }
-  /// Size of what follows x: the root mean square of the medians without their own noise.
-  [[nodiscard]] double size() const {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < y.size(); ++i) {
-      const double sd = (high[i] - low[i]) / 3.92;
-      sum += y[i] * y[i] - sd * sd;
-    }
-    return y.empty() ? 0.0 : std::sqrt(std::max(0.0, sum / static_cast<double>(y.size())));
-  }
-};
-
-double quantile(const std::vector<double>& sorted, double share) {
-  const double at = share * static_cast<double>(sorted.size() - 1);
-  const auto low = static_cast<std::size_t>(at);
-  const double part = at - static_cast<double>(low);
-  return low + 1 < sorted.size() ? (1.0 - part) * sorted[low] + part * sorted[low + 1] : sorted[low];
-}
-
-Curve binned(std::vector<Point> points, bool centred = true) {
-  std::erase_if(points, [](const Point& p) { return !std::isfinite(p.x) || !std::isfinite(p.y); });
-  Curve curve;
-  if (points.size() < 2 * kFewestPerBin) return curve;
-  std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.x < b.x; });
-  double centre = 0.0;
-  if (centred) {  // a constant belongs to the offsets
-    std::vector<double> all;
-    for (const auto& p : points) all.push_back(p.y);
-    std::sort(all.begin(), all.end());
-    centre = quantile(all, 0.5);
-  }
-  const std::size_t bins = std::clamp<std::size_t>(points.size() / 12, 2, kBins);
-  for (std::size_t b = 0; b < bins; ++b) {
-    const std::size_t from = b * points.size() / bins, to = (b + 1) * points.size() / bins;
-    if (to - from < kFewestPerBin) continue;
-    std::vector<double> values;
-    double x = 0.0;
-    for (std::size_t i = from; i < to; ++i) {
-      values.push_back(points[i].y - centre);
-      x += points[i].x / static_cast<double>(to - from);
-    }
-    std::sort(values.begin(), values.end());
-    const double median = quantile(values, 0.5);
-    // Standard error of a median from the middle half of the values.
-    const double sd =
-        0.93 * (quantile(values, 0.75) - quantile(values, 0.25)) / std::sqrt(static_cast<double>(values.size()));
-    curve.x.push_back(x);
-    curve.y.push_back(median);
-    curve.low.push_back(median - 1.96 * sd);
-    curve.high.push_back(median + 1.96 * sd);
-  }
-  return curve;
-}
 
 using Value = std::function<double(const ResidualSample&)>;
 
-Curve curve_of(const DiagnosisReport& report, const Value& x, const Value& y, bool centred = true) {
-  std::vector<Point> points;
+std::vector<diagnosis::ResidualPoint> points_of(const DiagnosisReport& report, const Value& x, const Value& y) {
+  std::vector<diagnosis::ResidualPoint> points;
   for (const auto& sample : report.samples) {
-    if (sample.rms_px_before > 0.0 && sample.rms_px_after > 0.0) points.push_back({x(sample), y(sample)});
+    if (sample.rms_px_before <= 0.0 || sample.rms_px_after <= 0.0) continue;
+    points.push_back({x(sample), y(sample), sample.time_s, sample.camera});
   }
-  return binned(std::move(points), centred);
+  return points;
+}
+
+double time_of(const ResidualSample& sample) {
+  return sample.time_s;
+}
+
+ErrorMemory memory_of(const DiagnosisReport& report, const Value& y) {
+  return diagnosis::error_memory(points_of(report, time_of, y));
+}
+
+ResidualCurve curve_of(const DiagnosisReport& report, const Value& x, const Value& y, const ErrorMemory& memory,
+                       bool centred = true) {
+  return diagnosis::residual_curve(points_of(report, x, y), memory, centred);
 }
 
 /// The report's colours.
 enum Colour { kBlue = 0, kRed = 1, kGreen = 2, kOchre = 3 };
 
-ChartSeries series_of(const std::string& name, const Curve& curve, Colour colour) {
+ChartSeries series_of(const std::string& name, const ResidualCurve& curve, Colour colour) {
   return {name, curve.x, curve.y, curve.low, curve.high, colour};
 }
 
@@ -124,7 +70,7 @@ const std::vector<Variable>& variables() {
       {"angle", "deg", [](const auto& s, std::size_t j) { return s.angle_deg[j]; }},
       {"velocity", "deg/s", [](const auto& s, std::size_t j) { return s.velocity_deg_s[j]; }},
       {"speed", "deg/s", [](const auto& s, std::size_t j) { return std::abs(s.velocity_deg_s[j]); }},
-      {"time", "s", [](const auto& s, std::size_t) { return s.time_s; }}};
+      {"time", "s", [](const auto& s, std::size_t) { return time_of(s); }}};
   return list;
 }
 
@@ -136,7 +82,10 @@ Value apparent(std::size_t joint, bool after) {
 
 class Page {
  public:
-  Page(const DiagnosisReport& report, const std::string& title) : d_(report), page_("Diagnosis: " + title) {}
+  Page(const DiagnosisReport& report, const std::string& title) : d_(report), page_("Diagnosis: " + title) {
+    // Before, what an error in the model leaves stays alike as well; that is what the charts are to show.
+    for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) memory_.push_back(memory_of(d_, apparent(j, true)));
+  }
 
   Report write(const std::vector<std::pair<Image, std::string>>& pictures) {
     page_.verdict(d_.sentence);
@@ -278,9 +227,10 @@ class Page {
     page_.paragraph(
         "Every picture asks for a small correction of each joint alone. Without an error in the model these are "
         "noise about zero; a line that follows something names an error. Lines are medians over equally many "
-        "pictures, bands their 95 % intervals; red with offsets and usual nuisances, blue with the extended "
-        "model, both predicted for blocks that the fit had not seen. Each chart shows the joint that follows its "
-        "variable most clearly.");
+        "pictures, bands their 95 % intervals (pictures that err alike count as fewer); red with offsets and usual "
+        "nuisances, blue with the extended model, both predicted for blocks that the fit had not seen. Of several "
+        "joints the one is shown that follows its variable most clearly: where nothing is wrong, the one that "
+        "chance moved most.");
     page_.begin_grid();
     for (const auto& variable : variables()) chart_of(variable);
     direction_of_motion();
@@ -308,18 +258,22 @@ class Page {
         strongest = j;
       }
     }
-    page_.chart(
-        curves(d_.arm_joints[strongest] + (variable.name == "time" ? " over " : " against its ") + variable.name,
-               variable.name + ", " + variable.axis, "correction asked for, deg",
-               before_and_after(curve(strongest, variable, false), curve(strongest, variable, true))));
+    page_.chart(curves(d_.arm_joints[strongest] + (variable.name == "time" ? " over " : " against its ") +
+                           variable.name + strongest_of(d_.arm_joints.size(), "joints"),
+                       variable.name + ", " + variable.axis, "correction asked for, deg",
+                       before_and_after(curve(strongest, variable, false), curve(strongest, variable, true))));
   }
 
-  [[nodiscard]] Curve curve(std::size_t joint, const Variable& variable, bool after) const {
+  static std::string strongest_of(std::size_t count, const char* what) {
+    return count > 1 ? fmt::format(" (strongest of {} {})", count, what) : "";
+  }
+
+  [[nodiscard]] ResidualCurve curve(std::size_t joint, const Variable& variable, bool after) const {
     return curve_of(
-        d_, [&](const ResidualSample& s) { return variable.of(s, joint); }, apparent(joint, after));
+        d_, [&](const ResidualSample& s) { return variable.of(s, joint); }, apparent(joint, after), memory_[joint]);
   }
 
-  static std::vector<ChartSeries> before_and_after(const Curve& before, const Curve& after) {
+  static std::vector<ChartSeries> before_and_after(const ResidualCurve& before, const ResidualCurve& after) {
     return {series_of("before", before, kRed), series_of("extended", after, kBlue)};
   }
 
@@ -332,19 +286,19 @@ class Page {
           [&, j](const ResidualSample& s) {
             return sign * s.velocity_deg_s[j] > kMoving_deg_s ? apparent(j, after)(s) : std::nan("");
           },
-          false);
+          memory_[j], false);
     };
     std::size_t widest = 0;
     double most = -1.0;
     for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
       const auto up = one_way(j, 1.0, false), down = one_way(j, -1.0, false);
       if (up.y.empty() || down.y.empty()) continue;
-      const auto mean = [](const Curve& c) {
+      const auto mean = [](const ResidualCurve& c) {
         return std::accumulate(c.y.begin(), c.y.end(), 0.0) / static_cast<double>(c.y.size());
       };
-      const auto noise = [](const Curve& c) {
+      const auto noise = [](const ResidualCurve& c) {
         double sum = 0.0;
-        for (std::size_t i = 0; i < c.y.size(); ++i) sum += std::pow((c.high[i] - c.low[i]) / 3.92, 2);
+        for (const double sd : c.sd) sum += sd * sd;
         return sum / std::pow(static_cast<double>(c.y.size()), 2);
       };
       const double strength = std::abs(mean(up) - mean(down)) / std::sqrt(noise(up) + noise(down) + 1e-12);
@@ -354,11 +308,13 @@ class Page {
       }
     }
     if (most < 0.0) return;
-    page_.chart(curves(d_.arm_joints[widest] + ", rising against falling", "angle, deg", "correction asked for, deg",
-                       {series_of("rising, before", one_way(widest, 1.0, false), kRed),
-                        series_of("falling, before", one_way(widest, -1.0, false), kOchre),
-                        series_of("rising, extended", one_way(widest, 1.0, true), kBlue),
-                        series_of("falling, extended", one_way(widest, -1.0, true), kGreen)}));
+    page_.chart(
+        curves(d_.arm_joints[widest] + ", rising against falling" + strongest_of(d_.arm_joints.size(), "joints"),
+               "angle, deg", "correction asked for, deg",
+               {series_of("rising, before", one_way(widest, 1.0, false), kRed),
+                series_of("falling, before", one_way(widest, -1.0, false), kOchre),
+                series_of("rising, extended", one_way(widest, 1.0, true), kBlue),
+                series_of("falling, extended", one_way(widest, -1.0, true), kGreen)}));
   }
 
   void other_joints() {
@@ -366,7 +322,7 @@ class Page {
     double most = -1.0;
     const auto pair = [&](std::size_t i, std::size_t j, bool after) {
       return curve_of(
-          d_, [j](const ResidualSample& s) { return s.angle_deg[j]; }, apparent(i, after));
+          d_, [j](const ResidualSample& s) { return s.angle_deg[j]; }, apparent(i, after), memory_[i]);
     };
     for (std::size_t i = 0; i < d_.arm_joints.size(); ++i) {
       for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
@@ -380,21 +336,23 @@ class Page {
       }
     }
     if (most < 0.0) return;
-    page_.chart(curves(d_.arm_joints[follower] + " against another joint: " + d_.arm_joints[leader],
-                       d_.arm_joints[leader] + ", deg", "correction asked for, deg",
-                       before_and_after(pair(follower, leader, false), pair(follower, leader, true))));
+    const auto pairs = d_.arm_joints.size() * (d_.arm_joints.size() - 1);
+    page_.chart(curves(
+        d_.arm_joints[follower] + " against another joint: " + d_.arm_joints[leader] + strongest_of(pairs, "pairs"),
+        d_.arm_joints[leader] + ", deg", "correction asked for, deg",
+        before_and_after(pair(follower, leader, false), pair(follower, leader, true))));
   }
 
   void over_pictures() {
     const auto both = [&](const Value& x, const Value& before, const Value& after, bool centred = false) {
-      return before_and_after(curve_of(d_, x, before, centred), curve_of(d_, x, after, centred));
+      const auto memory = memory_of(d_, after);
+      return before_and_after(curve_of(d_, x, before, memory, centred), curve_of(d_, x, after, memory, centred));
     };
     const Value rms_before = [](const ResidualSample& s) { return s.rms_px_before; };
     const Value rms_after = [](const ResidualSample& s) { return s.rms_px_after; };
     const Value mean_before = [](const ResidualSample& s) { return s.mean_px_before; };
     const Value mean_after = [](const ResidualSample& s) { return s.mean_px_after; };
-    page_.chart(curves("outline residual over time", "time, s", "rms, px",
-                       both([](const ResidualSample& s) { return s.time_s; }, rms_before, rms_after)));
+    page_.chart(curves("outline residual over time", "time, s", "rms, px", both(time_of, rms_before, rms_after)));
     if (std::none_of(d_.samples.begin(), d_.samples.end(), [](const auto& s) { return s.depth_m > 0.0; })) return;
     const Value radius = [](const ResidualSample& s) { return s.image_radius_px; };
     const Value depth = [](const ResidualSample& s) { return s.depth_m; };
@@ -474,6 +432,7 @@ class Page {
 
   const DiagnosisReport& d_;
   Report page_;
+  std::vector<ErrorMemory> memory_;  ///< per arm joint, of what the extended model leaves
 };
 
 }  // namespace

@@ -60,6 +60,52 @@ double find_slip_time(const Evidence& evidence, const BlockFit& fit, const Colum
   return best_time;
 }
 
+bool explains_away(const SelectedCause& cause, std::size_t nuisance) {
+  return cause.candidate != nuisance && contains(cause.same, nuisance);
+}
+
+/// Parameters that this log cannot tell from the offsets are not fitted.
+void fit_what_shows(Effect& effect, const Candidate& candidate) {
+  std::size_t next = 0;  // among the effect's fitted parameters
+  for (auto& p : effect.parameters()) {
+    if (!p.fitted) continue;
+    p.fitted = contains(candidate.parameters, next++);
+    p.value = 0.0;
+  }
+}
+
+/// Nuisances that were left out for causes which are no longer there.
+void put_back_nuisances(const Selection& selection, const CandidateSet& set, ErrorModel& model) {
+  for (std::size_t c = 0; c < set.candidates.size(); ++c) {
+    const auto& candidate = set.candidates[c];
+    if (!candidate.nuisance || contains(selection.not_testable, c)) continue;
+    if (model.find(candidate.name, candidate.target) != nullptr) continue;
+    const bool swapped_out = std::any_of(selection.causes.begin(), selection.causes.end(),
+                                         [&](const SelectedCause& cause) { return explains_away(cause, c); });
+    if (!swapped_out) fit_what_shows(model.add(candidate.name, candidate.target), candidate);
+  }
+}
+
+/// Wald z of a cause's parameters once they are fitted; 0 of one that is no effect of the model.
+double fitted_z(const Candidate& candidate, const ModelFit& after, const ErrorModel& model) {
+  std::vector<Eigen::Index> columns;
+  std::vector<double> values;
+  for (std::size_t c = 0; c < after.parameters.size(); ++c) {
+    const auto& ref = after.parameters[c];
+    const auto& effect = model[ref.effect];
+    if (effect.name() != candidate.name || !(effect.target() == candidate.target)) continue;
+    const auto& p = effect.parameters()[ref.parameter];
+    values.push_back(p.value / p.typical);
+    columns.push_back(static_cast<Eigen::Index>(c));
+  }
+  const auto n = static_cast<Eigen::Index>(columns.size());
+  if (n == 0) return 0.0;
+  Eigen::MatrixXd V = after.fit.covariance(columns, columns);
+  V += 1e-12 * V.trace() * Eigen::MatrixXd::Identity(n, n);
+  const Eigen::Map<const Eigen::VectorXd> value(values.data(), n);
+  return equivalent_z(value.dot(V.ldlt().solve(value)), n);
+}
+
 }  // namespace
 
 Extension extend(ErrorModel model, const Selection& selection, const Evidence& evidence) {
@@ -76,9 +122,8 @@ Extension extend(ErrorModel model, const Selection& selection, const Evidence& e
   for (std::size_t c = 0; c < set.candidates.size(); ++c) {
     const auto& candidate = set.candidates[c];
     if (!candidate.nuisance) continue;
-    const bool swapped_out =
-        std::any_of(selection.causes.begin(), selection.causes.end(),
-                    [&](const SelectedCause& cause) { return cause.candidate != c && contains(cause.same, c); });
+    const bool swapped_out = std::any_of(selection.causes.begin(), selection.causes.end(),
+                                         [&](const SelectedCause& cause) { return explains_away(cause, c); });
     if (!contains(selection.model, c) || swapped_out) {
       result.model.remove(candidate.name, candidate.target);
     } else {
@@ -100,15 +145,10 @@ Extension extend(ErrorModel model, const Selection& selection, const Evidence& e
     if (candidate.generic()) continue;
     auto& effect = result.model.add(candidate.name, candidate.target);
     if (!candidate.slip) {
-      std::size_t next = 0;  // among the effect's fitted parameters
-      Eigen::Index column = 0;
+      fit_what_shows(effect, candidate);
+      Eigen::Index column = first;
       for (auto& p : effect.parameters()) {
-        if (!p.fitted) continue;
-        const auto& kept = candidate.parameters;
-        const bool seen = contains(kept, next++);
-        p.fitted = seen;
-        p.value = seen && fit.usable ? fit.estimate[first + column] * p.typical : 0.0;
-        column += seen;
+        if (p.fitted && fit.usable) p.value = fit.estimate[column++] * p.typical;
       }
     }
     if (candidate.name == "backlash") {
@@ -128,44 +168,25 @@ Extension extend(ErrorModel model, const Selection& selection, const Evidence& e
   return result;
 }
 
-bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit& after, double z_enter,
+bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit& after, const SelectionOptions& rules,
                   ErrorModel& model) {
   if (!after.fit.usable) return false;
-  double weakest = z_enter;
+  double weakest = 1.0;  // of the z asked
   auto worst = selection.causes.end();
   for (auto cause = selection.causes.begin(); cause != selection.causes.end(); ++cause) {
     const auto& candidate = set.candidates[cause->candidate];
     if (candidate.generic()) continue;
-    std::vector<Eigen::Index> columns;
-    std::vector<double> values;
-    for (std::size_t c = 0; c < after.parameters.size(); ++c) {
-      const auto& ref = after.parameters[c];
-      const auto& effect = std::as_const(model)[ref.effect];
-      if (effect.name() != candidate.name || !(effect.target() == candidate.target)) continue;
-      const auto& p = effect.parameters()[ref.parameter];
-      values.push_back(p.value / p.typical);
-      columns.push_back(static_cast<Eigen::Index>(c));
-    }
-    const auto n = static_cast<Eigen::Index>(columns.size());
-    if (n == 0) continue;
-    Eigen::MatrixXd V(n, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j) {
-        V(i, j) = after.fit.covariance(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)]);
-      }
-    }
-    V += 1e-12 * V.trace() * Eigen::MatrixXd::Identity(n, n);
-    const Eigen::Map<const Eigen::VectorXd> value(values.data(), n);
-    const double z = equivalent_z(value.dot(V.ldlt().solve(value)), n);
-    if (z < weakest) {
-      weakest = z;
-      worst = cause;
-    }
+    const double share = fitted_z(candidate, after, model) / rules.z_asked(candidate, cause->score.gain);
+    if (share >= weakest) continue;
+    weakest = share;
+    worst = cause;
   }
   if (worst == selection.causes.end()) return false;
   const auto& candidate = set.candidates[worst->candidate];
-  if (!candidate.nuisance) model.remove(candidate.name, candidate.target);
   selection.causes.erase(worst);
+  if (candidate.nuisance) return true;
+  model.remove(candidate.name, candidate.target);
+  put_back_nuisances(selection, set, model);
   return true;
 }
 

@@ -29,9 +29,10 @@ struct Extension {
 /// Puts the selection's causes into a model and takes out nuisances that they explain away.
 Extension extend(ErrorModel model, const Selection& selection, const Evidence& evidence);
 
-/// Takes the named cause with the smallest z out of selection and model if that no longer suffices
-/// once it is fitted; whether it did.
-bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit& after, double z_enter,
+/// Takes the named cause that falls furthest short of the z asked of it, once it is fitted, out of selection and
+/// model; one that is not in the model at all has none. Nuisances that no other cause explains away are back in
+/// the model then, at zero. Whether there was one.
+bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit& after, const SelectionOptions& rules,
                   ErrorModel& model);
 
 /// The views as if all fitted parameters but the offsets were zero, by linearity.

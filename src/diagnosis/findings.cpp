@@ -68,7 +68,8 @@ class Findings {
            const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before,
            double systematic_share, const std::map<std::string, double>& systematic_error)
       : source_(source), rules_(rules), layout_(layout), plan_(plan), found_(found), baseline_(baseline),
-        before_(before), rule_(found.after.fit, plan.block_count(), systematic_share, systematic_error),
+        before_(before),
+        rule_(found.after.fit, found.after.statistics->seen_blocks(), systematic_share, systematic_error),
         jacobians_(source.views().size()) {}
 
   DiagnosisReport report(const std::vector<NotTestable>& excluded) {

@@ -9,12 +9,6 @@
 namespace bodyschema::diagnosis {
 namespace {
 
-/// Two-sided 95 % point of Student's t.
-double student95(double dof) {
-  const double n = std::max(1.0, dof);
-  return 1.96 + 2.37 / n + 2.8 / (n * n) + (n < 3.0 ? 5.0 / (n * n * n) : 0.0);
-}
-
 /// Median over the parameters of how much wider a fit's errors are than white noise would make them.
 double inflation(const BlockFit& fit) {
   if (!fit.usable || fit.estimate.size() == 0) return 1.0;
@@ -28,6 +22,11 @@ double inflation(const BlockFit& fit) {
 }
 
 }  // namespace
+
+double student95(double dof) {
+  const double n = std::max(1.0, dof);
+  return 1.96 + 2.37 / n + 2.8 / (n * n) + (n < 3.0 ? 5.0 / (n * n * n) : 0.0);
+}
 
 IntervalRule::IntervalRule(const BlockFit& final_fit, std::size_t blocks, double systematic_share,
                            std::map<std::string, double> systematic_error)

@@ -9,12 +9,16 @@
 
 namespace bodyschema::diagnosis {
 
+/// Two-sided 95 % point of Student's t with so many degrees of freedom; of fewer than one as of one.
+double student95(double dof);
+
 /// How far an estimate may be from the truth: one rule for the intervals of causes and offsets and for
 /// the limits of what was not found.
 class IntervalRule {
  public:
   /// @param final_fit  of the final model: how much wider its errors are than white noise would make
   ///        them is the least that is believed of any fit
+  /// @param blocks  those in which anything was seen
   /// @param systematic_share, systematic_error  as in DiagnosisOptions
   IntervalRule(const BlockFit& final_fit, std::size_t blocks, double systematic_share,
                std::map<std::string, double> systematic_error = {});

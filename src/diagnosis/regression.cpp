@@ -35,9 +35,7 @@ Linearisation linearise(MeasurementSource& source, ErrorModel model) {
   const auto count = source.views().size();
   const auto offsets = model.offsets();
   bool sags = false;
-  for (std::size_t e = 0; e < model.size(); ++e) {
-    sags = sags || model[e].name() == "compliance" || model[e].name() == "payload";
-  }
+  for (std::size_t e = 0; e < model.size(); ++e) sags = sags || model[e].follows_gravity();
   Instant sagged;
   result.instants.resize(count);
   result.corrections.assign(count, Corrections(offsets.size()));

@@ -124,7 +124,7 @@ class Selector {
     if (dispersion < floor_) V *= floor_ / dispersion;
     V += 1e-12 * V.trace() * Eigen::MatrixXd::Identity(n, n);
     // Few blocks know the covariance of many columns badly (Hotelling's correction; none for one).
-    const double blocks = static_cast<double>(statistics_.block_count());
+    const double blocks = static_cast<double>(statistics_.seen_blocks());
     const double known = std::max(0.0, (blocks - static_cast<double>(n)) / (blocks - 1.0));
     return equivalent_z(known * theta.dot(V.ldlt().solve(theta)), n);
   }
@@ -169,10 +169,9 @@ class Selector {
     const auto& c = candidates_[candidate];
     const double floor = c.generic() ? generic_gain_floor_ : gain_floor_;
     const double least = std::max(floor * measure_of(c), left_by_shapes());
-    const bool large = c.temporal() && s.gain > options_.gain_large;
-    const double z = large ? options_.z_large : options_.z_enter;
-    return s.testable && z_of_few(s.z, statistics_.block_count(), options_.usual_blocks) > z && s.gain > least &&
-           s.t > options_.t_enter &&
+    return s.testable &&
+           z_of_few(s.z, statistics_.seen_blocks(), options_.usual_blocks) > options_.z_asked(c, s.gain) &&
+           s.gain > least && s.t > options_.t_enter &&
            (!c.temporal() || s.gain > options_.gain_far || (!tolerable_slip(candidate) && lasts(candidate)));
   }
 
@@ -188,15 +187,19 @@ class Selector {
   /// Whether a cause in time also predicts stretches that lie far from what its fit has seen. Slow
   /// noise follows any smooth curve into the next block, but not further.
   [[nodiscard]] bool lasts(std::size_t candidate) const {
-    const auto rest = without(model_, candidate);
-    const auto plain = fit(rest, options_.far_group);
+    auto rest = without(model_, candidate);
+    auto plain = fit(rest, options_.far_group);
+    if (!plain.usable) {
+      // Nor can a slip near an end be fitted without the group that holds it; what others are worth shows beside it.
+      std::erase_if(rest, [&](std::size_t c) { return candidates_[c].slip && !fit({c}, options_.far_group).usable; });
+      plain = fit(rest, options_.far_group);
+    }
     const auto extended_model = with(rest, candidate);
     const auto extended = fit(extended_model, options_.far_group);
     if (!plain.usable) return false;
     if (!extended.usable) return candidates_[candidate].slip;  // near an end: one group holds it all
-    const auto groups = [&](std::size_t blocks) { return (blocks + options_.far_group - 1) / options_.far_group; };
-    const auto z = z_of_few(wald_z(extended, extended_model, candidate), groups(statistics_.block_count()),
-                            groups(options_.usual_blocks));
+    const auto z = z_of_few(wald_z(extended, extended_model, candidate), statistics_.seen_blocks(options_.far_group),
+                            (options_.usual_blocks + options_.far_group - 1) / options_.far_group);
     return z > options_.z_far &&
            (plain.heldout() - extended.heldout()) / baseline_ > gain_floor_ * measure_of(candidates_[candidate]);
   }
@@ -223,9 +226,8 @@ class Selector {
   /// Without blocks to hold out, or with offsets that the log cannot tell from each other, nothing that
   /// follows means anything; least of all that nothing was found.
   void refuse_unusable() const {
-    constexpr std::ptrdiff_t kFewestBlocks = 4;
-    const auto blocks = statistics_.blocks();
-    const auto seen = std::count_if(blocks.begin(), blocks.end(), [](const auto& b) { return b.weight > 0.0; });
+    constexpr std::size_t kFewestBlocks = 4;
+    const auto seen = statistics_.seen_blocks();
     if (current_.usable && seen >= kFewestBlocks) return;
     throw DataError(std::string("the log cannot be diagnosed: ") +
                     (seen < kFewestBlocks ? "the arm stands still in nearly all of it"
@@ -276,12 +278,16 @@ class Selector {
     return named;
   }
 
-  /// A cause that is already in the model, at another time or in another shape.
   [[nodiscard]] bool blocked(std::size_t candidate) const {
-    return contains(dropped_, candidate) || std::any_of(causes_.begin(), causes_.end(), [&](std::size_t c) {
-             return same_cause(candidates_[c], candidates_[candidate]) && !candidates_[c].slip &&
-                    !candidates_[c].generic();
-           });
+    return contains(dropped_, candidate) || is_cause(candidate);
+  }
+
+  /// Whether it is a cause already, at whatever time: a model holds one slip of a joint. A joint that jumps twice
+  /// follows time in a way that no effect of the catalogue does.
+  [[nodiscard]] bool is_cause(std::size_t candidate) const {
+    return !candidates_[candidate].generic() && std::any_of(causes_.begin(), causes_.end(), [&](std::size_t c) {
+      return same_cause(candidates_[c], candidates_[candidate]);
+    });
   }
 
   void begin_with_given() {
@@ -310,10 +316,28 @@ class Selector {
     while (static_cast<int>(causes_.size()) < options_.max_causes) {
       const auto best = best_addition();
       if (!best) return;
-      causes_.push_back(*best);
-      model_.push_back(*best);
-      refit();
+      add(*best);
+      find_times();
       drop_causes();
+    }
+  }
+
+  /// Beside what was found after it a slip may fit better at another time.
+  void find_times() {
+    if (causes_.size() < 2) return;
+    for (const auto slip : Ids(causes_)) {
+      if (!candidates_[slip].slip) continue;
+      remove(slip);
+      auto best = slip;
+      double most = test(slip).score.gain;
+      for (std::size_t c = 0; c < candidates_.size(); ++c) {
+        if (!same_cause(candidates_[c], candidates_[slip]) || contains(dropped_, c)) continue;
+        const auto score = test(c).score;
+        if (score.gain <= most || !enters(c, score)) continue;
+        best = c;
+        most = score.gain;
+      }
+      add(best);
     }
   }
 
@@ -332,6 +356,12 @@ class Selector {
       remove(*least);
       dropped_.push_back(*least);
     }
+  }
+
+  void add(std::size_t c) {
+    causes_.push_back(c);
+    model_.push_back(c);
+    refit();
   }
 
   void remove(std::size_t c) {
@@ -436,9 +466,7 @@ class Selector {
       }
       if (!best) return;
       for (const auto c : best_killed) remove(c);
-      causes_.push_back(*best);
-      model_.push_back(*best);
-      refit();
+      add(*best);
     }
   }
 
@@ -451,9 +479,7 @@ class Selector {
     const NestedFits rest(statistics_, columns_of(without(model_, cause)));
     std::vector<std::pair<double, std::size_t>> same;
     for (std::size_t a = 0; a < candidates_.size(); ++a) {
-      if (contains(model_, a) || candidates_[a].generic() || same_cause(candidates_[a], candidates_[cause])) {
-        continue;
-      }
+      if (contains(model_, a) || candidates_[a].generic() || is_cause(a)) continue;
       const auto both_model = with(model_, a);
       const auto both = extended_by(a);
       const auto instead = rest.with(candidates_[a].columns);

@@ -10,6 +10,7 @@ class CameraSkew final : public Clonable<CameraSkew> {
   explicit CameraSkew(const EffectTarget& target)
       : Clonable("camera_skew", target,
                  {EffectParameter{.name = "skew", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {}
+  [[nodiscard]] bool follows_motion() const override { return true; }
   void apply(const Instant& at, Corrections& add_to) const override {
     if (at.camera != 1) return;
     add_to.dq.noalias() += value(0) * at.qdot;

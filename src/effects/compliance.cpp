@@ -10,6 +10,7 @@ class Compliance final : public Clonable<Compliance> {
       : Clonable("compliance", target,
                  {EffectParameter{.name = "compliance", .unit = "deg/Nm", .si_per_unit = kDeg, .typical = 0.3 * kDeg}}),
         joint_(joint) {}
+  [[nodiscard]] bool follows_gravity() const override { return true; }
   void apply(const Instant& at, Corrections& add_to) const override {
     if (at.gravity_torque.size() > 0) add_to.dq[joint_] += value(0) * at.gravity_torque[joint_];
   }

@@ -89,18 +89,26 @@ JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSe
   for (const auto& joint : model->joints()) roles.names.push_back(joint.name);
   for (const auto& name : setup.estimated_joints) roles.arm.push_back(roles.index(name));
   for (const auto& name : setup.head_joints) roles.head.push_back(roles.index(name));
+  std::sort(roles.arm.begin(), roles.arm.end());
+  std::sort(roles.head.begin(), roles.head.end());
 
   std::vector<std::string> cameras;
   for (const auto& camera : rig.cameras) cameras.push_back(camera.link);
-  const ForwardKinematics eyes(model, cameras);
+  ForwardKinematics eyes(model, cameras);
+  std::vector<Pose> X_WC(cameras.size());
+  eyes.compute(setup.default_joints(*model), X_WC);
+  // An eye may also tilt by itself: the joint that pans it turns most nearly about the vertical of its picture.
+  const auto upright = [&](Eigen::Index joint, std::size_t camera) {
+    return joint < 0 ? -1.0 : std::abs(eyes.joint_axis(joint).direction_W.dot(X_WC[camera].linear().col(1)));
+  };
   for (const auto joint : roles.head) {
     const bool left = eyes.moves(joint, 0);
     const bool right = cameras.size() < 2 ? left : eyes.moves(joint, 1);
     if (left && right) {
       roles.neck.push_back(joint);
-    } else if (left) {
+    } else if (left && upright(joint, 0) > upright(roles.left_pan, 0)) {
       roles.left_pan = joint;
-    } else if (right) {
+    } else if (right && upright(joint, 1) > upright(roles.right_pan, 1)) {
       roles.right_pan = joint;
     }
   }

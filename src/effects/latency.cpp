@@ -11,6 +11,7 @@ class Latency final : public Clonable<Latency> {
   explicit Latency(const EffectTarget& target)
       : Clonable("latency", target,
                  {EffectParameter{.name = "delay", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {}
+  [[nodiscard]] bool follows_motion() const override { return true; }
   void apply(const Instant& at, Corrections& add_to) const override {
     add_to.dq.noalias() -= value(0) * at.qdot;
     add_to.dq.noalias() += 0.5 * value(0) * value(0) * at.qddot;

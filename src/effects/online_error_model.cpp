@@ -10,10 +10,9 @@ OnlineErrorModel::OnlineErrorModel(std::shared_ptr<const RobotModel> robot, cons
     : model_(std::move(model)), offsets_(model_.offsets()), instants_(robot, setup.hand_link, setup.gravity_W),
       whole_(robot->joint_count()) {
   for (std::size_t e = 0; e < model_.size(); ++e) {
-    const auto& name = model_[e].name();
     has_memory_ = has_memory_ || model_[e].has_memory();
-    sags_ = sags_ || name == "compliance" || name == "payload";
-    moves_ = moves_ || name == "latency" || name == "camera_skew";
+    sags_ = sags_ || model_[e].follows_gravity();
+    moves_ = moves_ || model_[e].follows_motion();
   }
   if (has_memory_ || moves_) samples_.resize(kKept + kMostWaiting);
 }

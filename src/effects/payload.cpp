@@ -18,6 +18,7 @@ class Payload final : public Clonable<Payload> {
                                   .fitted = false,
                                   .typical = 0.3 * kDeg}}),
         arm_(std::move(arm)) {}
+  [[nodiscard]] bool follows_gravity() const override { return true; }
   void apply(const Instant& at, Corrections& add_to) const override {
     if (at.payload_torque.size() == 0) return;
     for (const auto joint : arm_) {

@@ -1,30 +1,9 @@
 #include "bodyschema/estimator/parameter.hpp"
 
+#include "bodyschema/effects/effect.hpp"
 #include "bodyschema/estimator/estimator_options.hpp"
-#include "bodyschema/robot/forward_kinematics.hpp"
 
 namespace bodyschema {
-namespace {
-
-/// Head joints that move every camera. A joint of one eye alone changes the vergence, which is a
-/// parameter of its own.
-std::vector<std::string> shared_head_joints(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
-                                            const StereoRig& rig) {
-  std::vector<std::string> links;
-  for (const auto& camera : rig.cameras) links.push_back(camera.link);
-  const ForwardKinematics kinematics(robot, links);
-  std::vector<std::string> joints;
-  for (const auto& name : setup.head_joints) {
-    bool all = true;
-    for (std::size_t c = 0; c < links.size(); ++c) {
-      all = all && kinematics.moves(robot->joint_index(name), c);
-    }
-    if (all) joints.push_back(name);
-  }
-  return joints;
-}
-
-}  // namespace
 
 const char* unit_of(ParameterKind kind) {
   switch (kind) {
@@ -50,8 +29,11 @@ std::vector<Parameter> estimated_parameters(const std::shared_ptr<const RobotMod
   if (options.mode == EstimatorMode::kPaper) return parameters;
   const NuisancePriors& priors = options.priors;
   if (priors.head_rad > 0.0) {
-    for (const auto& name : shared_head_joints(model, setup, rig)) {
-      parameters.push_back({name, ParameterKind::kJointOffset, robot.joint_index(name), priors.head_rad});
+    // A joint of one eye alone changes the vergence, which is a parameter of its own.
+    const auto roles = JointRoles::of(model, setup, rig);
+    for (const auto joint : roles.neck) {
+      const auto& name = roles.names[static_cast<std::size_t>(joint)];
+      parameters.push_back({name, ParameterKind::kJointOffset, joint, priors.head_rad});
     }
   }
   const auto add = [&](const char* name, ParameterKind kind, double sd) {

@@ -96,6 +96,41 @@ TEST(BlockStatistics, RefusesColumnsThatAreNotIndependent) {
   EXPECT_FALSE(r.statistics().fit({{0}, {2}}).usable);
 }
 
+/// What is left of a column that begins in the last group is no zero but rounding, and its estimate without that
+/// group anything.
+TEST(BlockStatistics, RefusesAColumnThatLivesInOneGroup) {
+  constexpr Eigen::Index kBlocks = 21, kRows = 20;
+  for (std::uint64_t i = 0; i < 200; ++i) {
+    std::mt19937_64 random(test::seed() + i);
+    std::normal_distribution<double> normal;
+    Eigen::MatrixXd X(kBlocks * kRows, 2);
+    Eigen::VectorXd y(kBlocks * kRows);
+    for (Eigen::Index r = 0; r < X.rows(); ++r) {
+      X.row(r) << normal(random), normal(random);
+      y[r] = X(r, 0) + normal(random);
+    }
+    const auto statistics = test::statistics_of(X, y, kBlocks);
+    EXPECT_FALSE(statistics.fit({{0}, {1}, {0, 19}}, 3).usable) << "seed " << test::seed() + i;
+    EXPECT_FALSE(NestedFits(statistics, {{0}, {1}}, 3).with({{0, 19}}).usable) << "seed " << test::seed() + i;
+    // One that began a group before shows there too.
+    EXPECT_TRUE(statistics.fit({{0}, {1}, {0, 17}}, 3).usable) << "seed " << test::seed() + i;
+    EXPECT_TRUE(NestedFits(statistics, {{0}, {1}}, 3).with({{0, 17}}).usable) << "seed " << test::seed() + i;
+  }
+}
+
+TEST(BlockStatistics, CountsTheBlocksInWhichSomethingWasSeen) {
+  const auto r = regression(test::seed(), 0.3, 0.0);
+  const auto seen = r.statistics();
+  EXPECT_EQ(seen.seen_blocks(), 20u);
+  EXPECT_EQ(seen.seen_blocks(3), 7u);
+  std::vector<BlockStatistics::Block> blocks(seen.blocks().begin(), seen.blocks().end());
+  for (const std::size_t b : {0u, 3u, 4u, 5u, 19u}) blocks[b] = test::unseen_block(3);
+  const BlockStatistics some(std::move(blocks));
+  EXPECT_EQ(some.block_count(), 20u);
+  EXPECT_EQ(some.seen_blocks(), 15u);
+  EXPECT_EQ(some.seen_blocks(3), 6u);  // of the second group nothing
+}
+
 TEST(BlockStatistics, AColumnCanBeginWithABlock) {
   auto r = regression(test::seed(), 0.1, 0.0);
   r.y.tail(200).array() += 3.0;

@@ -46,6 +46,18 @@ TEST(Candidates, AreTheCatalogueTheSlipsAndTheGenericFeatures) {
   EXPECT_GT(slips, 7u * 60u);  // at least one a second and joint
 }
 
+/// Neck roll and eye tilt, wherever the head is listed first.
+TEST(Candidates, NuisancesDoNotDependOnTheOrderInWhichTheHeadIsListed) {
+  const auto& robot = test::robot();
+  auto listed_backwards = robot.setup;
+  std::reverse(listed_backwards.head_joints.begin(), listed_backwards.head_joints.end());
+  const auto nuisances = usual_nuisances(JointRoles::of(robot.model, listed_backwards, robot.rig));
+  EXPECT_EQ(nuisances, usual_nuisances(JointRoles::of(robot.model, robot.setup, robot.rig)));
+  for (const char* joint : {"neck_roll", "eyes_tilt"}) {
+    EXPECT_THAT(nuisances, testing::Contains(CauseName{"head_offset", joint, ""}));
+  }
+}
+
 TEST(Untestable, NamesWhatTheLogLacks) {
   TrialOptions options;
   options.frozen_joints = {"r_wrist_pitch"};

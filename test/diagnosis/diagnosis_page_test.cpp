@@ -85,7 +85,7 @@ TEST(DiagnosisPage, BeginsWithTheVerdictAndShowsEveryPart) {
 
 TEST(DiagnosisPage, ShowsTheJointThatFollowsItsVariable) {
   const auto page = page_of(report());
-  EXPECT_THAT(page, HasSubstr("r_elbow against its angle"));
+  EXPECT_THAT(page, HasSubstr("r_elbow against its angle (strongest of 2 joints)"));
   EXPECT_THAT(page, Not(HasSubstr("against its gravity torque")));  // nobody knows the torques
 }
 

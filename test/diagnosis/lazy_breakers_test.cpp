@@ -235,6 +235,24 @@ TEST(LazyBreakers, ASlipAtEitherEndIsFound) {
   }
 }
 
+TEST(LazyBreakers, ASlipThatIsUndoneIsNoSlip) {
+  for (const double deg : {2.0, -2.0}) {
+    const auto options = log_with({fault("slip", "r_elbow", deg, 0.33), fault("slip", "r_elbow", -deg, 0.66)});
+    const auto log = make_synthetic_log(robot(), options, test::log_seed());
+    const auto report = diagnosis(*log);
+    EXPECT_EQ(report.verdict, "unexplained") << report.sentence;
+    EXPECT_TRUE(std::any_of(report.causes.begin(), report.causes.end(), [](const auto& c) {
+      return c.cause == CauseName{"unexplained", "r_elbow", ""} && c.variable == "time";
+    })) << report.sentence;
+    ErrorModel extended = *report.extended_model;
+    for (const auto& c : report.causes) {
+      if (c.cause.name == "unexplained") continue;
+      EXPECT_FALSE(c.parameters.empty()) << c.cause.text();
+      EXPECT_NE(extended.find(c.cause.name, {c.cause.joint, c.cause.source}), nullptr) << c.cause.text();
+    }
+  }
+}
+
 TEST(LazyBreakers, FingersCurledByFiveDegreesAreJustThat) {
   const auto log = make_synthetic_log(robot(), log_with({fault("finger_posture", "", 5.0)}), test::log_seed());
   const auto report = diagnosis(*log);

@@ -20,4 +20,9 @@ inline BlockStatistics statistics_of(const Eigen::MatrixXd& X, const Eigen::Vect
   return BlockStatistics(std::move(list));
 }
 
+/// A block in which nothing was seen.
+inline BlockStatistics::Block unseen_block(Eigen::Index columns) {
+  return {Eigen::MatrixXd::Zero(columns, columns), Eigen::VectorXd::Zero(columns), 0.0, 0.0};
+}
+
 }  // namespace bodyschema::test

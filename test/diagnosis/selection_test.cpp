@@ -241,6 +241,120 @@ TEST(Selection, PutsUpWithASmallSlipUnlessItTakesAwayMuch) {
   }
 }
 
+/// An offset that changes with blocks: a slip of one joint at each of them.
+std::vector<Candidate> slips(std::size_t blocks) {
+  std::vector<Candidate> list;
+  for (std::size_t b = 1; b < blocks; ++b) {
+    Candidate slip;
+    slip.name = "slip";
+    slip.slip = true;
+    slip.columns = {{0, b, 0}};
+    list.push_back(slip);
+  }
+  return list;
+}
+
+/// An error model holds one slip of a joint: two of one joint had one step between them, or none and a name all
+/// the same.
+TEST(Selection, AJointHasOneSlip) {
+  constexpr Eigen::Index kBlocks = 30;
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    std::mt19937_64 random(test::seed() + i);
+    std::normal_distribution<double> normal;
+    const Eigen::MatrixXd X = Eigen::MatrixXd::Ones(kLong, 1);
+    Eigen::VectorXd y(kLong);
+    for (Eigen::Index r = 0; r < kLong; ++r) {
+      const auto block = r * kBlocks / kLong;
+      y[r] = (block < 10 ? 0.0 : block < 20 ? 2.0 : 1.0) + normal(random);
+    }
+    SelectionOptions options;
+    options.crowd_rest_t = 1e9;  // one joint is no crowd
+    const auto selection = select_causes(test::statistics_of(X, y, kBlocks), {{0}}, slips(kBlocks), options);
+    EXPECT_EQ(found(selection), (std::vector<std::size_t>{9})) << "seed " << test::seed() + i;
+  }
+}
+
+/// A bump of another cause before the slip makes it look as if it had come earlier.
+TEST(Selection, ASlipMovesToWhereItFitsBesideWhatIsFoundLater) {
+  constexpr Eigen::Index kBlocks = 30, kFrom = 20;
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    std::mt19937_64 random(test::seed() + i);
+    std::normal_distribution<double> normal;
+    Eigen::MatrixXd X(kLong, 2);
+    Eigen::VectorXd y(kLong);
+    for (Eigen::Index r = 0; r < kLong; ++r) {
+      const auto block = r * kBlocks / kLong;
+      X.row(r) << 1.0, (block >= 14 && block < kFrom ? 1.0 : 0.0) + 0.5 * normal(random);
+      y[r] = 1.2 * X(r, 1) + (block >= kFrom ? 1.5 : 0.0) + 0.2 * normal(random);
+    }
+    SelectionOptions options;
+    options.crowd_rest_t = 1e9;  // two causes are no crowd
+    auto candidates = slips(kBlocks);
+    candidates.push_back(candidate("cause", 1));
+    const auto selection = select_causes(test::statistics_of(X, y, kBlocks), {{0}}, candidates, options);
+    EXPECT_EQ(found(selection), (std::vector<std::size_t>{kFrom - 1, kBlocks - 1})) << "seed " << test::seed() + i;
+  }
+}
+
+/// The last group holds all of a late slip; that says nothing of one in the middle.
+TEST(Selection, ASlipLastsBesideOneNearTheEnd) {
+  constexpr Eigen::Index kBlocks = 30, kMiddle = 12, kLate = 28;
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    std::mt19937_64 random(test::seed() + i);
+    std::normal_distribution<double> normal;
+    Eigen::MatrixXd X(kLong, 2);
+    Eigen::VectorXd y(kLong);
+    for (Eigen::Index r = 0; r < kLong; ++r) {
+      const auto block = r * kBlocks / kLong;
+      X.row(r) << 1.0, normal(random);
+      y[r] = (block >= kMiddle ? 0.6 : 0.0) + (block >= kLate ? 1.5 * X(r, 1) : 0.0) + normal(random);
+    }
+    std::vector<Candidate> candidates(2);
+    for (auto& c : candidates) {
+      c.name = "slip";
+      c.slip = true;
+    }
+    candidates[0].columns = {{0, kMiddle, 0}};
+    candidates[1].columns = {{1, kLate, 0}};
+    candidates[1].target.joint = "another";
+    SelectionOptions options;
+    options.crowd_rest_t = 1e9;  // two causes are no crowd
+    const auto selection = select_causes(test::statistics_of(X, y, kBlocks), {{0}, {1}}, candidates, options);
+    EXPECT_EQ(found(selection), (std::vector<std::size_t>{0, 1})) << "seed " << test::seed() + i;
+    for (const auto& cause : selection.causes) EXPECT_LT(cause.score.gain, options.gain_far);
+  }
+}
+
+/// Ten blocks know their spread no better if twenty in which the hand was hidden lie between them.
+TEST(Selection, BlocksInWhichNothingWasSeenProveNothing) {
+  constexpr Eigen::Index kBlocks = 10, kPerBlock = 20;
+  constexpr double kSpread = 0.6;  // of the cause between blocks: z = 3 / 0.6
+  Eigen::MatrixXd X(kBlocks * kPerBlock, 2);
+  Eigen::VectorXd y(kBlocks * kPerBlock);
+  for (Eigen::Index r = 0; r < X.rows(); ++r) {
+    X.row(r) << 1.0, r % 2 == 0 ? 1.0 : -1.0;
+    y[r] = (r / kPerBlock % 2 == 0 ? 1.0 + kSpread : 1.0 - kSpread) * X(r, 1);
+  }
+  const auto few = test::statistics_of(X, y, kBlocks);
+  std::vector<BlockStatistics::Block> blocks;
+  for (const auto& block : few.blocks()) {
+    blocks.push_back(block);
+    for (int unseen = 0; unseen < 2; ++unseen) blocks.push_back(test::unseen_block(2));
+  }
+  const BlockStatistics with_unseen(std::move(blocks));
+  SelectionOptions options;
+  options.crowd_rest_t = 1e9;  // a single candidate is no crowd
+  const std::vector<Candidate> candidates = {candidate("cause", 1)};
+  for (const auto* statistics : {&few, &with_unseen}) {
+    const auto none = select_causes(*statistics, {{0}}, candidates, options);
+    EXPECT_TRUE(none.causes.empty());
+    EXPECT_NEAR(none.first_scores[0].z, 5.0, 0.05);
+  }
+  options.usual_blocks = kBlocks;
+  EXPECT_EQ(select_causes(few, {{0}}, candidates, options).causes.size(), 1u);
+  EXPECT_EQ(select_causes(with_unseen, {{0}}, candidates, options).causes.size(), 1u);
+}
+
 TEST(Selection, RefusesWhatCannotBeFitted) {
   const Swapped data(test::seed());
   const std::vector<Candidate> candidates = {candidate("cause", 2)};

@@ -60,6 +60,28 @@ TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   }
 }
 
+/// Whoever applies an effect finds motion and torques only where it asks for them.
+TEST(Catalogue, EffectsSayWhatTheyFollow) {
+  const auto r = roles();
+  auto still = instant(r);
+  still.q.setConstant(0.7);
+  auto moving = still, hanging = still;
+  moving.qdot.setConstant(1.0);
+  moving.qddot.setConstant(1.0);
+  hanging.gravity_torque.setConstant(2.0);
+  hanging.payload_torque.setConstant(3.0);
+  moving.camera = hanging.camera = still.camera = 1;
+  for (const auto& name : effect_names()) {
+    const auto effect = make_effect(name, effect_targets(name, r).front(), r);
+    const double value = effect->parameters()[0].typical / effect->parameters()[0].si_per_unit;
+    const auto apart = [&](const Instant& at) {
+      return (corrections(*effect, value, at).dq - corrections(*effect, value, still).dq).norm();
+    };
+    EXPECT_EQ(effect->follows_motion(), apart(moving) > 0.0) << name;
+    EXPECT_EQ(effect->follows_gravity(), apart(hanging) > 0.0) << name;
+  }
+}
+
 /// Without sign and definition nobody can compare an estimate with another tool's.
 TEST(Catalogue, EveryParameterHasItsMeaningInTheHandbook) {
   const auto r = roles();

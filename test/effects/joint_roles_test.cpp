@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 
 #include "bodyschema/effects/effect.hpp"
 #include "test_data.hpp"
@@ -48,6 +50,57 @@ TEST(JointRoles, DoNotDependOnTheOrderInWhichTheHeadIsListed) {
   EXPECT_EQ(r.names(r.roles.neck), (Names{"eyes_tilt", "neck_pitch", "neck_roll", "neck_yaw"}));
   EXPECT_EQ(name_of(r, r.roles.left_pan), "l_eye_pan");
   EXPECT_EQ(name_of(r, r.roles.right_pan), "r_eye_pan");
+}
+
+TEST(JointRoles, ComeFromTheRootOutwardsHoweverTheyAreListed) {
+  const auto r = robot("icub_right/robot.yaml");
+  const auto backwards = robot("icub_right/robot.yaml",
+                               {"robot.head_joints=[r_eye_pan, l_eye_pan, eyes_tilt, neck_yaw, neck_roll, neck_pitch]",
+                                "robot.estimated_joints=[r_wrist_yaw, r_wrist_pitch, r_wrist_prosup, r_elbow, "
+                                "r_shoulder_yaw, r_shoulder_roll, r_shoulder_pitch]"});
+  EXPECT_EQ(backwards.roles.neck, r.roles.neck);
+  EXPECT_EQ(backwards.roles.head, r.roles.head);
+  EXPECT_EQ(backwards.roles.arm, r.roles.arm);
+  EXPECT_EQ(name_of(r, r.roles.neck.front()), "neck_pitch");
+  EXPECT_EQ(name_of(r, r.roles.neck.back()), "eyes_tilt");
+  EXPECT_EQ(name_of(r, r.roles.arm.front()), "r_shoulder_pitch");
+}
+
+/// Eyes that pan and tilt each by themselves: the left one hangs its tilt on its pan, the right one the other way.
+TEST(JointRoles, OfAnEyeThatTiltsByItselfThePanTurnsAboutTheVertical) {
+  const auto joint = [](const char* name, const char* parent, const char* child, const char* axis) {
+    return std::string("<joint name='") + name + "' type='revolute'><parent link='" + parent + "'/><child link='" +
+           child + "'/><axis xyz='" + axis + "'/><limit lower='-1' upper='1' effort='1' velocity='1'/></joint>";
+  };
+  const auto camera = [](const char* name, const char* parent) {
+    return std::string("<joint name='at_") + name + "' type='fixed'><parent link='" + parent + "'/><child link='" +
+           name + "'/><origin rpy='-1.5708 0 -1.5708'/></joint>";
+  };
+  std::string urdf = "<robot name='eyes'>";
+  for (const char* link : {"root", "head", "l_outer", "l_inner", "r_outer", "r_inner", "left", "right", "hand"}) {
+    urdf += std::string("<link name='") + link + "'/>";
+  }
+  urdf += joint("neck", "root", "head", "0 0 1") + joint("l_pan", "head", "l_outer", "0 0 1") +
+          joint("l_tilt", "l_outer", "l_inner", "0 1 0") + joint("r_tilt", "head", "r_outer", "0 1 0") +
+          joint("r_pan", "r_outer", "r_inner", "0 0.1 -1") + joint("arm", "root", "hand", "0 1 0") +
+          camera("left", "l_inner") + camera("right", "r_inner") + "</robot>";
+  RobotSetup setup;
+  setup.model.urdf = std::filesystem::path(testing::TempDir()) / "eyes_that_tilt.urdf";
+  std::ofstream(setup.model.urdf) << urdf;
+  setup.hand_link = "hand";
+  setup.estimated_joints = {"arm"};
+  StereoRig rig;
+  rig.cameras.resize(2);
+  rig.cameras[0].link = "left";
+  rig.cameras[1].link = "right";
+  for (const auto& listed :
+       {Names{"neck", "l_pan", "l_tilt", "r_tilt", "r_pan"}, Names{"r_pan", "r_tilt", "l_tilt", "l_pan", "neck"}}) {
+    setup.head_joints = listed;
+    const Robot r{JointRoles::of(setup.load(), setup, rig)};
+    EXPECT_EQ(r.names(r.roles.neck), Names{"neck"});
+    EXPECT_EQ(name_of(r, r.roles.left_pan), "l_pan");
+    EXPECT_EQ(name_of(r, r.roles.right_pan), "r_pan");
+  }
 }
 
 TEST(JointRoles, OfARobotWithoutHeadOrFingers) {

@@ -132,6 +132,51 @@ TEST_F(OnlineErrorModelTest, ALatePictureShowsWhereTheArmWas) {
   }
 }
 
+/// An effect that the catalogue does not know: a joint that lags by its speed and gives way to gravity.
+class LagAndSag final : public Effect {
+ public:
+  LagAndSag(Eigen::Index joint, bool lags, bool sags)
+      : Effect("lag_and_sag", {}, {}), joint_(joint), lags_(lags), sags_(sags) {}
+  [[nodiscard]] std::unique_ptr<Effect> clone() const override { return std::make_unique<LagAndSag>(*this); }
+  [[nodiscard]] bool follows_motion() const override { return lags_; }
+  [[nodiscard]] bool follows_gravity() const override { return sags_; }
+  void apply(const Instant& at, Corrections& add_to) const override {
+    if (lags_) add_to.dq[joint_] -= 0.05 * at.qdot[joint_];
+    if (sags_) add_to.dq[joint_] += 0.05 * at.gravity_torque[joint_];
+  }
+
+ private:
+  Eigen::Index joint_;
+  bool lags_, sags_;
+};
+
+TEST_F(OnlineErrorModelTest, AnEffectNeedsNoNameToFindMotionAndGravity) {
+  const auto with = [&](bool lags, bool sags) {
+    ErrorModel model(roles);
+    model.add(std::make_unique<LagAndSag>(elbow, lags, sags));
+    return model;
+  };
+  OnlineErrorModel lags(robot, setup, with(true, false));
+  for (Microseconds t = -200'000; t <= 200'000; t += 10'000) {
+    JointSample published = sample(t);
+    published.qdot.setZero();
+    lags.observe(published);
+  }
+  JointSample exposure = sample(0);
+  exposure.qdot.setZero();
+  const double speed = sample(0).qdot[elbow];
+  EXPECT_NEAR(at(lags, exposure).dq[elbow], -0.05 * speed, 0.01 * std::abs(speed));
+  // Where the first look at gravity puts the arm, the torque is another.
+  OnlineErrorModel sags(robot, setup, with(false, true));
+  GravityTorques torques(robot);
+  Eigen::VectorXd q = sample(0).q;
+  const double first = 0.05 * torques.compute(q, setup.gravity_W)[elbow];
+  q[elbow] += first;
+  const double second = 0.05 * torques.compute(q, setup.gravity_W)[elbow];
+  EXPECT_NEAR(at(sags, sample(0)).dq[elbow], second, 1e-12);
+  EXPECT_GT(std::abs(second - first), 1e-4);
+}
+
 TEST_F(OnlineErrorModelTest, GravityActsOnTheArmWhereItHangs) {
   ASSERT_TRUE(robot->has_masses());
   const auto roll = roles.index("r_shoulder_roll");

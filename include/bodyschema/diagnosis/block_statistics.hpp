@@ -51,6 +51,9 @@ class BlockStatistics {
   explicit BlockStatistics(std::vector<Block> blocks) : blocks_(std::move(blocks)) {}
   [[nodiscard]] std::size_t block_count() const { return blocks_.size(); }
   [[nodiscard]] std::span<const Block> blocks() const { return blocks_; }
+  /// Blocks, or groups of so many, in which anything was seen: the replicas of a fit, on which every standard
+  /// error rests.
+  [[nodiscard]] std::size_t seen_blocks(std::size_t group = 1) const;
 
   /// @param group  blocks left out at a time: with more, what is held out lies further in time from
   ///        what the fit has seen

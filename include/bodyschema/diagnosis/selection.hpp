@@ -78,6 +78,10 @@ struct SelectionOptions {
   /// The log passes every posture once: whatever follows an angle follows time as well, and so does what
   /// masks and meshes get wrong in a posture. Only what takes away more than slow noise counts.
   bool one_pass = false;
+  /// The z that is asked of a candidate which takes away this share of the loss.
+  [[nodiscard]] double z_asked(const Candidate& candidate, double gain) const {
+    return candidate.temporal() && gain > gain_large ? z_large : z_enter;
+  }
 };
 
 /// How a candidate fared when tested against the model so far.

@@ -34,14 +34,17 @@ struct EffectTarget {
   friend bool operator==(const EffectTarget&, const EffectTarget&) = default;
 };
 
-/// Which joints play which part on this robot, by position in RobotModel order.
+/// Which joints play which part on this robot, by position in RobotModel order; in that order too, so from the
+/// root outwards, however a configuration lists them.
 struct JointRoles {
-  std::vector<std::string> names;     ///< every joint of the model
-  std::vector<Eigen::Index> arm;      ///< shoulder to wrist, the joints whose offsets are estimated
-  std::vector<Eigen::Index> head;     ///< every joint of neck and eyes, as configured
-  std::vector<Eigen::Index> neck;     ///< those of the head that move every camera (eyes' tilt too)
-  Eigen::Index left_pan = -1;         ///< moves the left camera alone; -1: none
-  Eigen::Index right_pan = -1;        ///< moves the right camera alone; -1: none
+  std::vector<std::string> names;  ///< every joint of the model
+  std::vector<Eigen::Index> arm;   ///< shoulder to wrist, the joints whose offsets are estimated
+  std::vector<Eigen::Index> head;  ///< every joint of neck and eyes
+  std::vector<Eigen::Index> neck;  ///< those of the head that move every camera (eyes' tilt too)
+  /// Moves the left camera alone; of several the one whose axis is nearest to the y axis of its picture at
+  /// RobotSetup::default_joints. -1: none.
+  Eigen::Index left_pan = -1;
+  Eigen::Index right_pan = -1;        ///< the same of the right camera
   std::vector<Eigen::Index> fingers;  ///< joints that curl a finger when they grow
   /// The roles that a configuration gives: arm and head as named there, neck and pans by what they move.
   /// Fingers are the joints that turn a rendered link but not the hand's frame, about an axis within 45
@@ -78,6 +81,10 @@ class Effect {
   [[nodiscard]] virtual std::unique_ptr<Effect> clone() const = 0;
   /// Whether `observe` matters, so that others need not replay the stream.
   [[nodiscard]] virtual bool has_memory() const { return false; }
+  /// Whether `apply` looks at velocity or acceleration, so that others need not find them.
+  [[nodiscard]] virtual bool follows_motion() const { return false; }
+  /// Whether `apply` looks at the torques, which others then take where the arm stands under all effects, sagged.
+  [[nodiscard]] virtual bool follows_gravity() const { return false; }
 
  protected:
   Effect(const Effect&) = default;

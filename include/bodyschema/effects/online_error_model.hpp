@@ -44,7 +44,7 @@ class OnlineErrorModel final : public EncoderFollower {
   Corrections whole_;
   Instant before_;  ///< the sag
   Eigen::VectorXd sag_;
-  bool moves_ = false;  ///< some effect follows velocity
+  bool moves_ = false;  ///< some effect follows the motion
   /// In order of time: first those that the effects have seen (the last `kKept` of them stay, for the
   /// motion about an exposure), then those that wait. Slots beyond `count_` keep their memory.
   std::vector<JointSample> samples_;
