@@ -506,6 +506,14 @@ struct Estimator::Impl {
   /// The state of a robot that is as its encoders and model say.
   [[nodiscard]] Eigen::VectorXd uncorrected() const { return Eigen::VectorXd::Zero(state.size()); }
 
+  /// The state that an estimate reports.
+  [[nodiscard]] Eigen::VectorXd state_of(const Estimate& estimate) const {
+    Eigen::VectorXd x = uncorrected();
+    x.head(joints) = estimate.offset_rad;
+    x.segment(joints, estimate.nuisance.size()) = estimate.nuisance;
+    return x;
+  }
+
   /// How well the hand is known in a camera, by this frame's covariance: the root of the summed variances
   /// of x, y and z.
   double hand_sd(const Exposure& at, std::size_t camera) {
@@ -626,9 +634,20 @@ BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::
   return impl_->scorer.render(X_CB, camera);
 }
 
+BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::size_t camera,
+                                           const Estimate& estimate) {
+  std::vector<Eigen::Isometry3f> X_CB(impl_->body.part_count());
+  impl_->body.compute(*observation.cameras[camera], impl_->state_of(estimate), camera, X_CB);
+  return impl_->scorer.render(X_CB, camera);
+}
+
 Pose Estimator::hand_pose(const Exposure& at, std::size_t camera, bool corrected) {
   return corrected ? impl_->body.hand_pose(at, impl_->state, camera)
                    : impl_->body.hand_pose(at.q, impl_->uncorrected(), camera);
+}
+
+Pose Estimator::hand_pose(const Exposure& at, std::size_t camera, const Estimate& estimate) {
+  return impl_->body.hand_pose(at, impl_->state_of(estimate), camera);
 }
 
 std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& at, std::size_t camera, bool corrected) {

@@ -139,7 +139,7 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
   if (seen.empty()) throw DataError(log.string() + ": no synchronised pictures in the recording");
 
   RecordingResult result;
-  result.overlay = draw_overlay(overlay_views(pipeline, *last_view), label);
+  result.overlay = draw_overlay(overlay_views(pipeline, *last_view, last), label);
   result.offsets = std::move(offsets);
   result.joint_names = last.joint_names;
   std::vector<double> before_px, before_mm, before_deg, after_px, after_mm, after_deg, online_px;
