@@ -437,6 +437,7 @@ struct Estimator::Impl {
       estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
       for (std::size_t k = static_cast<std::size_t>(joints); k < parameters.size(); ++k) {
         estimate.nuisance_names.push_back(parameters[k].name);
+        estimate.head_joints += parameters[k].kind == ParameterKind::kJointOffset ? 1 : 0;
         estimate.nuisance_units.push_back(unit_of(parameters[k].kind));
       }
       estimate.nuisance = state.tail(state.size() - joints);

@@ -123,8 +123,16 @@ void check_same_model(const std::filesystem::path& summary, const RobotSetup& se
   }
 }
 
-bool is_one_of(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
+std::string joints_yaml(const std::vector<std::pair<std::string, double>>& angles_rad) {
+  std::string text;
+  for (const auto& [joint, angle] : angles_rad) text += fmt::format("  {}: {:.4f}\n", joint, degrees(angle));
+  return text;
+}
+
+std::string joints_delta(const std::vector<std::pair<std::string, double>>& offsets_rad) {
+  std::string text;
+  for (const auto& [joint, offset] : offsets_rad) text += fmt::format("{:<24} {:+.4f}\n", joint, degrees(offset));
+  return text;
 }
 
 std::string cameras_yaml(const StereoRig& rig) {
@@ -177,13 +185,23 @@ Correction read_correction(const std::filesystem::path& summary, bool anyway) {
   try {
     const auto estimate = nlohmann::ordered_json::parse(stream).at("estimate");
     state = estimate.at("state").get<std::string>();
-    for (const auto& [joint, value] : estimate.at("offset_deg").items()) {
-      correction.offsets_rad.emplace_back(joint, radians(value.get<double>()));
-    }
-    for (const auto& [joint, value] : estimate.at("stddev_deg").items()) {
-      correction.sd_rad.emplace_back(joint, radians(value.get<double>()));
+    const auto read_joints = [&](const char* key, std::vector<std::pair<std::string, double>>& list) {
+      for (const auto& [joint, value] : estimate.at(key).items()) {
+        list.emplace_back(joint, radians(value.get<double>()));
+      }
+    };
+    read_joints("offset_deg", correction.offsets_rad);
+    read_joints("stddev_deg", correction.sd_rad);
+    if (estimate.contains("head_offset_deg")) {
+      read_joints("head_offset_deg", correction.head_offsets_rad);
+      read_joints("head_stddev_deg", correction.head_sd_rad);
     }
     if (estimate.contains("nuisance")) {
+      if (!estimate.contains("nuisance_stddev")) {
+        throw FileError(summary.string() +
+                        ": estimate.nuisance is that of an older version, which does not say how well the head's "
+                        "joints are known; expected head_offset_deg and head_stddev_deg: replay the log again");
+      }
       for (const auto& [name, value] : estimate.at("nuisance").items()) {
         correction.nuisances.emplace_back(name, value.get<double>());
       }
@@ -196,10 +214,12 @@ Correction read_correction(const std::filesystem::path& summary, bool anyway) {
     if (!anyway) throw DataError(summary.string() + ": " + ending + " (--anyway)");
     correction.warnings.push_back(ending);
   }
-  for (const auto& [joint, sd] : correction.sd_rad) {
-    if (degrees(sd) <= kHardlyKnown_deg) continue;
-    correction.warnings.push_back(
-        fmt::format("{}: known to {:.2f} deg only (one sigma); this motion hardly told it", joint, degrees(sd)));
+  for (const auto* list : {&correction.sd_rad, &correction.head_sd_rad}) {
+    for (const auto& [joint, sd] : *list) {
+      if (degrees(sd) <= kHardlyKnown_deg) continue;
+      correction.warnings.push_back(
+          fmt::format("{}: known to {:.2f} deg only (one sigma); this motion hardly told it", joint, degrees(sd)));
+    }
   }
   return correction;
 }
@@ -228,12 +248,8 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
     if (joint == nullptr) throw FileError(urdf.string() + ": no joint carries camera link '" + link + "'");
     move_joint(document, joint, {shift, 0.0, 0.0});
   }
-  for (const auto* list : {&correction.offsets_rad, &correction.known_offsets_rad}) {
+  for (const auto* list : {&correction.offsets_rad, &correction.known_offsets_rad, &correction.head_offsets_rad}) {
     for (const auto& [name, offset] : *list) correct_joint(document, joint_named(name), offset);
-  }
-  // The arm's offsets hold together with the head's: one without the other would be wrong.
-  for (const auto& [name, value] : correction.nuisances) {
-    if (XMLElement* joint = find_joint(robot, name)) correct_joint(document, joint, value);
   }
   for (auto warning = correction.warnings.rbegin(); warning != correction.warnings.rend(); ++warning) {
     std::string text = ' ' + *warning + ' ';
@@ -276,24 +292,20 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
     yaml += "# " + warning + '\n';
     delta += "# " + warning + '\n';
   }
-  yaml += "version: 1\noffset_deg:\n";
-  for (const auto& [joint, offset] : correction.offsets_rad) {
-    yaml += fmt::format("  {}: {:.4f}\n", joint, degrees(offset));
-    delta += fmt::format("{:<24} {:+.4f}\n", joint, degrees(offset));
+  yaml += "version: 1\noffset_deg:\n" + joints_yaml(correction.offsets_rad);
+  yaml += "stddev_deg:\n" + joints_yaml(correction.sd_rad);
+  delta += joints_delta(correction.offsets_rad);
+  if (!correction.head_offsets_rad.empty()) {
+    yaml += "# Of the head's joints. Arm and head offsets hold together: apply both or neither.\n";
+    yaml += "head_offset_deg:\n" + joints_yaml(correction.head_offsets_rad);
+    yaml += "head_stddev_deg:\n" + joints_yaml(correction.head_sd_rad);
+    delta += "# head; holds together with the arm: apply both or neither\n";
+    delta += joints_delta(correction.head_offsets_rad);
   }
   if (!correction.nuisances.empty()) {
-    yaml +=
-        "# Estimated beside the offsets; joints in rad, encoder - true. Arm and head offsets hold together:\n"
-        "# apply both or neither.\nnuisance:\n";
-    std::string head;
-    for (const auto& [name, value] : correction.nuisances) {
-      yaml += fmt::format("  {}: {:.6g}\n", name, value);
-      if (is_one_of(setup.head_joints, name)) head += fmt::format("{:<24} {:+.4f}\n", name, degrees(value));
-    }
-    if (!head.empty()) delta += "# head; holds together with the arm: apply both or neither\n" + head;
+    yaml += "# Estimated beside the offsets; not to be applied.\nnuisance:\n";
+    for (const auto& [name, value] : correction.nuisances) yaml += fmt::format("  {}: {:.6g}\n", name, value);
   }
-  yaml += "stddev_deg:\n";
-  for (const auto& [joint, sd] : correction.sd_rad) yaml += fmt::format("  {}: {:.4f}\n", joint, degrees(sd));
   write_text(out / "offsets.yaml", yaml);
   write_text(out / "calibration_delta.txt", delta);
   std::string files =

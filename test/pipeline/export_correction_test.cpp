@@ -41,7 +41,10 @@ class ExportCorrection : public ::testing::Test {
     std::ofstream(folder_ / "summary.json")
         << R"({"estimate": {"state": ")" << state << R"(", "offset_deg": {"r_elbow": -2.0, "r_wrist_yaw": 3.0},
           "stddev_deg": {"r_elbow": 0.1, "r_wrist_yaw": 1.234},
-          "nuisance": {"neck_pitch": 0.05, "mesh_scale": 0.01}}})";
+          "head_offset_deg": {"neck_pitch": 2.8648, "neck_yaw": 0.5},
+          "head_stddev_deg": {"neck_pitch": 0.3, "neck_yaw": 0.75},
+          "nuisance": {"mesh_scale": 0.01, "dilation_px": 0.2},
+          "nuisance_stddev": {"mesh_scale": 0.002, "dilation_px": 0.1}}})";
     return export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out", anyway);
   }
   ~ExportCorrection() override { fs::remove_all(folder_); }
@@ -61,7 +64,8 @@ TEST_F(ExportCorrection, TheCorrectedUrdfGivesTheCorrectedPose) {
   for (const auto& name : setup.estimated_joints) {
     correction.offsets_rad.emplace_back(name, radians(10.0 * uniform(random)));
   }
-  correction.nuisances = {{"neck_pitch", 0.05}, {"mesh_scale", 0.01}};
+  correction.head_offsets_rad = {{"neck_pitch", 0.05}};
+  correction.nuisances = {{"mesh_scale", 0.01}};
   write_corrected_urdf(setup.model.urdf, correction, folder_ / "corrected.urdf");
   RobotModelOptions corrected_options = setup.model;
   corrected_options.urdf = folder_ / "corrected.urdf";
@@ -137,6 +141,31 @@ TEST_F(ExportCorrection, AJointThatTheMotionHardlyToldIsNamedInEveryFile) {
   RobotModelOptions options = setup_.model;
   options.urdf = folder_ / "out/corrected.urdf";
   EXPECT_NO_THROW(RobotModel::load(options));
+}
+
+TEST_F(ExportCorrection, AHeadJointHasDegreesADeviationAndTheWarningOfAnyJoint) {
+  const std::string warning = "neck_yaw: known to 0.75 deg only (one sigma); this motion hardly told it";
+  EXPECT_THAT(export_of("converged"), ::testing::HasSubstr(warning));
+  for (const char* file : {"out/offsets.yaml", "out/calibration_delta.txt", "out/corrected.urdf"}) {
+    EXPECT_THAT(content(file), ::testing::HasSubstr(warning)) << file;
+  }
+  const Configuration yaml = Configuration::load(folder_ / "out/offsets.yaml");
+  EXPECT_DOUBLE_EQ(yaml.number("head_offset_deg.neck_pitch"), 2.8648);
+  EXPECT_DOUBLE_EQ(yaml.number("head_stddev_deg.neck_yaw"), 0.75);
+  EXPECT_DOUBLE_EQ(yaml.number("nuisance.dilation_px"), 0.2);
+}
+
+TEST_F(ExportCorrection, HeadJointsInRadiansWithoutADeviationAreRefused) {
+  std::ofstream(folder_ / "summary.json")
+      << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1},
+          "nuisance": {"neck_pitch": 0.05, "mesh_scale": 0.01}}})";
+  try {
+    export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+    ADD_FAILURE() << "no error";
+  } catch (const FileError& e) {
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("summary.json: estimate.nuisance"));
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("replay the log again"));
+  }
 }
 
 // Arm and head offsets hold together: a calibrator that gets one without the other is wrong.

@@ -124,6 +124,8 @@ TEST_F(ReplayTest, WritesEstimatesSummaryAndPictures) {
   EXPECT_EQ(last["state"], "converged");
   EXPECT_EQ(last["offset_deg"].size(), 7u);
   EXPECT_EQ(last["stddev_deg"].size(), 7u);
+  EXPECT_TRUE(last["head_offset_deg"].contains("neck_pitch"));
+  EXPECT_EQ(last["head_stddev_deg"].size(), last["head_offset_deg"].size());
   EXPECT_EQ(last["hand_pose_left_camera"].size(), 4u);
   EXPECT_GT(last["likelihood"].get<double>(), 0.95);
   EXPECT_LT(last["error_left"]["position_mm"].get<double>(), 1.0);

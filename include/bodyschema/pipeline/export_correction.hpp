@@ -25,7 +25,10 @@ struct Correction {
   /// encoder - true, by joint name, rad.
   std::vector<std::pair<std::string, double>> offsets_rad;
   std::vector<std::pair<std::string, double>> sd_rad;
-  /// What was estimated beside them; head joints among them are corrected in the URDF too.
+  /// The same of the head's joints; without them those of the arm would be wrong.
+  std::vector<std::pair<std::string, double>> head_offsets_rad;
+  std::vector<std::pair<std::string, double>> head_sd_rad;
+  /// What else was estimated beside them, by name and unit ("dilation_px"); no file applies it.
   std::vector<std::pair<std::string, double>> nuisances;
   /// What whoever applies it must know, one line each; stands in every file.
   std::vector<std::string> warnings;
