@@ -15,6 +15,7 @@
 #include "bodyschema/geometry/pose.hpp"
 #include "bodyschema/robot/urdf_origin.hpp"
 #include "estimate_json.hpp"
+#include "model_hash.hpp"
 
 namespace bodyschema {
 namespace {
@@ -104,11 +105,9 @@ XMLElement* find_joint(XMLElement* robot, const std::string& name) {
 }
 
 /// Offsets that were found with an extended model are wrong without it, and the other way round.
-void check_same_model(const std::filesystem::path& summary, const RobotSetup& setup,
-                      const std::optional<ErrorModel>& model) {
-  std::ifstream stream(summary);
-  const auto json = nlohmann::ordered_json::parse(stream, nullptr, false);
-  const bool made_with = json.is_object() && json.contains("extended_model");
+void check_same_extended_model(const std::filesystem::path& summary, const nlohmann::ordered_json& json,
+                               const RobotSetup& setup, const std::optional<ErrorModel>& model) {
+  const bool made_with = json.contains("extended_model");
   if (made_with && !model) {
     throw ConfigurationError(summary.string() +
                              ": made with an extended model; expected the same one here (--extended-model)");
@@ -121,6 +120,20 @@ void check_same_model(const std::filesystem::path& summary, const RobotSetup& se
     throw ConfigurationError(summary.string() + ": made with another extended model than '" +
                              setup.extended_model.string() + "'; expected the one of the replay");
   }
+}
+
+/// Offsets that were found with one URDF are wrong in another; in one that has been corrected by them, double.
+/// @param warnings  out: what is wrong, where that is accepted
+void check_same_robot(const std::filesystem::path& summary, const nlohmann::ordered_json& json, const RobotSetup& setup,
+                      const std::string& hash, bool anyway, std::vector<std::string>& warnings) {
+  if (!json.contains("model_hash") || json["model_hash"] == hash) return;
+  const std::string difference =
+      fmt::format("made with the robot of model_hash {}, but robot.urdf '{}' with its meshes has \"{}\"",
+                  json["model_hash"].dump(), setup.model.urdf.string(), hash);
+  if (!anyway) {
+    throw ConfigurationError(summary.string() + ": " + difference + "; expected the URDF of the replay (--anyway)");
+  }
+  warnings.push_back(difference);
 }
 
 std::string joints_yaml(const std::vector<std::pair<std::string, double>>& angles_rad) {
@@ -264,14 +277,17 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
 std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup, const StereoRig& rig,
                               const std::filesystem::path& out, bool anyway) {
   Correction correction = read_correction(summary, anyway);
+  const auto robot = setup.load();
   std::optional<ErrorModel> model;
   std::vector<AppliedEffect> applied;
   if (!setup.extended_model.empty()) {
-    const auto robot = setup.load();
     model = ErrorModel::load(setup.extended_model, JointRoles::of(robot, setup, rig));
     applied = add_extended_model(*model, robot, setup, rig, correction);
   }
-  check_same_model(summary, setup, model);
+  std::ifstream stream(summary);
+  const auto json = nlohmann::ordered_json::parse(stream);
+  check_same_extended_model(summary, json, setup, model);
+  check_same_robot(summary, json, setup, model_hash_of(setup, *robot, model), anyway, correction.warnings);
   std::error_code error;
   std::filesystem::create_directories(out, error);
   write_corrected_urdf(setup.model.urdf, correction, out / "corrected.urdf");

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <random>
 
+#include "../../src/pipeline/model_hash.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/effects/corrected_kinematics.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
@@ -141,6 +142,29 @@ TEST_F(ExportCorrection, AJointThatTheMotionHardlyToldIsNamedInEveryFile) {
   RobotModelOptions options = setup_.model;
   options.urdf = folder_ / "out/corrected.urdf";
   EXPECT_NO_THROW(RobotModel::load(options));
+}
+
+TEST_F(ExportCorrection, AResultOfAnotherUrdfIsOnlyAppliedAnyway) {
+  const auto hash = [&] { return model_hash_of(setup_, *setup_.load(), std::nullopt); };
+  const std::string made_with = hash();
+  const fs::path summary = folder_ / "summary.json";
+  write_summary(R"(, "model_hash": ")" + made_with + '"');
+  export_correction(summary, setup_, rig_, folder_ / "out");
+  // Into the URDF that has been corrected by it already: twice.
+  setup_.model.urdf = folder_ / "out/corrected.urdf";
+  const std::string difference = "made with the robot of model_hash \"" + made_with + "\", but robot.urdf '" +
+                                 setup_.model.urdf.string() + "' with its meshes has \"" + hash() + '"';
+  try {
+    export_correction(summary, setup_, rig_, folder_ / "twice");
+    ADD_FAILURE() << "no error";
+  } catch (const ConfigurationError& e) {
+    EXPECT_EQ(e.what(), summary.string() + ": " + difference + "; expected the URDF of the replay (--anyway)");
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "twice"));
+  EXPECT_THAT(export_correction(summary, setup_, rig_, folder_ / "twice", true), ::testing::HasSubstr(difference));
+  EXPECT_THAT(content("twice/offsets.yaml"), ::testing::HasSubstr(difference));
+  write_summary();  // older ones do not say
+  EXPECT_NO_THROW(export_correction(summary, setup_, rig_, folder_ / "out"));
 }
 
 TEST_F(ExportCorrection, AHeadJointHasDegreesADeviationAndTheWarningOfAnyJoint) {

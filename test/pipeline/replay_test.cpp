@@ -12,6 +12,7 @@
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/bus/messages.hpp"
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/pipeline/export_correction.hpp"
 #include "bodyschema/pipeline/hand_errors.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
@@ -132,6 +133,9 @@ TEST_F(ReplayTest, WritesEstimatesSummaryAndPictures) {
   const auto summary = nlohmann::json::parse(content(o.out / "summary.json"));
   EXPECT_LT(summary["errors"]["left"]["last_frames"]["position_mm"]["after"].get<double>(),
             0.1 * summary["errors"]["left"]["last_frames"]["position_mm"]["before"].get<double>());
+  const RobotSetup setup = RobotSetup::from(configuration().section("robot"));
+  const StereoRig rig = StereoRig::from(configuration().section("cameras"));
+  EXPECT_NO_THROW(export_correction(o.out / "summary.json", setup, rig, o.out / "apply"));
   EXPECT_TRUE(fs::exists(o.out / "overlay_final.png"));
   EXPECT_FALSE(fs::is_empty(o.out / "masks"));
 }

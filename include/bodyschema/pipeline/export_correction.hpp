@@ -69,8 +69,11 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
 /// to each joint's calibrationDelta in an iCub's calibrator file, deg) into `out`, head joints that
 /// were estimated included: arm and head offsets hold together. With an extended model in `setup` also `cameras.yaml`
 /// (where it changes intrinsics) and `what_was_applied.txt`: which of its effects these files hold, and which only work
-/// where the model itself is loaded. Throws as read_correction does, and ConfigurationError when the summary was made
-/// with another extended model than `setup` has. Returns warnings and files, for people.
+/// where the model itself is loaded.
+/// @param anyway  as of read_correction, and also when the summary's `model_hash` is another robot's, with a warning
+/// Throws as read_correction does, and ConfigurationError when the summary
+/// was made with another URDF, other meshes or another extended model than `setup` has. Returns warnings and files,
+/// for people.
 std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup, const StereoRig& rig,
                               const std::filesystem::path& out, bool anyway = false);
 
