@@ -182,10 +182,21 @@ std::string applied_text(const std::vector<AppliedEffect>& applied) {
   return text.empty() ? "The extended model holds joint offsets alone; those of the replay are used.\n" : text;
 }
 
+/// All of the text or, on an error, what stood there before. What is no plain file is written to as it is.
 void write_text(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream stream(file);
+  std::error_code error;
+  const bool plain = !std::filesystem::exists(file, error) || std::filesystem::is_regular_file(file, error);
+  const std::filesystem::path part = plain ? file.string() + ".part" : file.string();
+  std::ofstream stream(part);
   stream << text;
-  if (!stream.flush()) throw FileError(file.string() + ": cannot be written");
+  stream.close();
+  bool written = stream.good();
+  if (plain && written) {
+    std::filesystem::rename(part, file, error);
+    written = !error;
+  }
+  if (plain && !written) std::filesystem::remove(part, error);
+  if (!written) throw FileError(file.string() + ": cannot be written; is the disk full?");
 }
 
 }  // namespace
@@ -269,9 +280,9 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
     for (auto at = text.find("--"); at != std::string::npos; at = text.find("--")) text.erase(at, 1);  // ends it
     robot->InsertFirstChild(document.NewComment(text.c_str()));
   }
-  if (document.SaveFile(out.c_str()) != tinyxml2::XML_SUCCESS) {
-    throw FileError(out.string() + ": cannot be written");
-  }
+  tinyxml2::XMLPrinter text;
+  document.Print(&text);
+  write_text(out, text.CStr());
 }
 
 std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup, const StereoRig& rig,

@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <fstream>
 #include <random>
 
@@ -165,6 +167,46 @@ TEST_F(ExportCorrection, AResultOfAnotherUrdfIsOnlyAppliedAnyway) {
   EXPECT_THAT(content("twice/offsets.yaml"), ::testing::HasSubstr(difference));
   write_summary();  // older ones do not say
   EXPECT_NO_THROW(export_correction(summary, setup_, rig_, folder_ / "out"));
+}
+
+TEST_F(ExportCorrection, WhatADeviceDoesNotTakeIsAnError) {
+  write_summary();
+  for (const char* file : {"corrected.urdf", "offsets.yaml", "calibration_delta.txt"}) {
+    const fs::path full = folder_ / "out" / file;
+    fs::create_directories(folder_ / "out");
+    fs::create_symlink("/dev/full", full);
+    try {
+      export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+      ADD_FAILURE() << "no error: " << file;
+    } catch (const FileError& e) {
+      EXPECT_THAT(e.what(), ::testing::HasSubstr(full.string()));
+    }
+    fs::remove_all(folder_ / "out");
+  }
+}
+
+TEST_F(ExportCorrection, AFullDiskIsAnErrorAndLeavesWhatWasThereWhole) {
+  export_of("converged");
+  const std::string before = content("out/corrected.urdf");
+  constexpr rlim_t kRoom_bytes = 4096;
+  ASSERT_GT(before.size(), kRoom_bytes);
+  write_summary();
+  rlimit limit{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &limit), 0);
+  const rlimit little{kRoom_bytes, limit.rlim_max};
+  const auto usual = std::signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &little);
+  std::string message;
+  try {
+    export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+  } catch (const FileError& e) {
+    message = e.what();
+  }
+  setrlimit(RLIMIT_FSIZE, &limit);
+  std::signal(SIGXFSZ, usual);
+  EXPECT_EQ(message, (folder_ / "out/corrected.urdf").string() + ": cannot be written; is the disk full?");
+  EXPECT_EQ(content("out/corrected.urdf"), before);
+  EXPECT_FALSE(fs::exists(folder_ / "out/corrected.urdf.part"));
 }
 
 TEST_F(ExportCorrection, AHeadJointHasDegreesADeviationAndTheWarningOfAnyJoint) {
