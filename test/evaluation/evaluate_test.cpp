@@ -5,6 +5,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 
 #include "bodyschema/core/error.hpp"
 #include "test_data.hpp"
@@ -45,6 +46,17 @@ TEST(Evaluate, AMistypedKeyIsAnErrorBeforeTheWork) {
 
 TEST(Evaluate, AModeIsRefusedAsEveryExperimentRunsItsOwn) {
   EXPECT_THAT(refusal("likelihood", {"estimator.mode=paper"}), HasSubstr("estimator.mode: 'paper'"));
+}
+
+TEST(Evaluate, ExperimentsThatRunAnotherNumberOfTrialsSaySo) {
+  const std::map<std::string, std::string> meanings(experiment_names().begin(), experiment_names().end());
+  for (const auto& [name, words] : std::map<std::string, std::string>{{"slip", "at most 14 trials"},
+                                                                      {"leave", "at most 14 trials"},
+                                                                      {"camera", "at most 14 trials"},
+                                                                      {"ablation", "at most 10 trials"},
+                                                                      {"offsets", "always 6 trials"}}) {
+    EXPECT_THAT(meanings.at(name), HasSubstr(words)) << name;
+  }
 }
 
 TEST(Evaluate, WhatIsSetAboutEstimatingReachesTheRecordingToo) {
