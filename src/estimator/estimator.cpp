@@ -458,7 +458,7 @@ struct Estimator::Impl {
       estimate.X_CP.push_back(body.hand_pose(*seen, frame_state.x, c));
       estimate.X_CP_nominal.push_back(body.hand_pose(seen->joints.q, uncorrected(), c));
       if (c == 0 || estimate.hand_sd_m == 0.0) {
-        estimate.hand_sd_m = hand_sd(*seen, c);
+        estimate.hand_sd_m = std::sqrt(std::max(0.0, hand_covariance_m2(*seen, c).trace()));
       }
     }
     estimate.weakest = weakest_direction(estimate.covariance_rad2, setup.estimated_joints);
@@ -515,9 +515,8 @@ struct Estimator::Impl {
     return x;
   }
 
-  /// How well the hand is known in a camera, by this frame's covariance: the root of the summed variances
-  /// of x, y and z.
-  double hand_sd(const Exposure& at, std::size_t camera) {
+  /// How well the hand is known in a camera, by this frame's covariance.
+  Eigen::Matrix3d hand_covariance_m2(const Exposure& at, std::size_t camera) {
     constexpr double kStep = 1e-4;
     const Eigen::Index n = std::min<Eigen::Index>(state.size(), frame_state.covariance.rows());
     Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, n);
@@ -530,7 +529,7 @@ struct Estimator::Impl {
       J.col(k) = (plus - body.hand_pose(at, x, camera).translation()) / (2.0 * kStep);
       x(k) = value;
     }
-    return std::sqrt(std::max(0.0, (J * frame_state.covariance * J.transpose()).trace()));
+    return J * frame_state.covariance * J.transpose();
   }
 
   void reset() {
@@ -649,6 +648,10 @@ Pose Estimator::hand_pose(const Exposure& at, std::size_t camera, bool corrected
 
 Pose Estimator::hand_pose(const Exposure& at, std::size_t camera, const Estimate& estimate) {
   return impl_->body.hand_pose(at, impl_->state_of(estimate), camera);
+}
+
+Eigen::Matrix3d Estimator::hand_covariance_m2(const Exposure& at, std::size_t camera) {
+  return impl_->hand_covariance_m2(at, camera);
 }
 
 std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& at, std::size_t camera, bool corrected) {

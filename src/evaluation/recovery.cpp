@@ -3,13 +3,14 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace bodyschema {
 
 Recovery recovery(const std::vector<FrameRecord>& frames, std::size_t event, std::size_t camera) {
-  // 99.9 % of a 3-D normal lies within 4.03 sd along one axis; hand_sd adds the three axes.
-  constexpr double kRegion = 4.03;
+  // 99.9 % of a normal distribution in three dimensions lies nearer: chi-square, three degrees of freedom.
+  const double region_sd = std::sqrt(16.266);
   Recovery result;
   double until = 0.0;
   for (std::size_t i = event; i < frames.size(); ++i) {
@@ -21,7 +22,7 @@ Recovery recovery(const std::vector<FrameRecord>& frames, std::size_t event, std
     } else {
       result.frames = until;
     }
-    if (error_mm > kRegion * frames[i].hand_sd_mm) ++result.frames_outside_999;
+    if (frames[i].position_sd[camera] > region_sd) ++result.frames_outside_999;
   }
   return result;
 }

@@ -13,7 +13,7 @@ namespace bodyschema {
 /// From an event on: how long until the hand is known again, and whether the uncertainty said so.
 struct Recovery {
   std::optional<double> frames;     ///< until below 1 mm for good; nothing: not within the run
-  double frames_outside_999 = 0.0;  ///< with the truth outside the published 99.9 % region
+  double frames_outside_999 = 0.0;  ///< with the truth outside the estimate's own 99.9 % region
 };
 
 /// @param event  index of the first frame that counts

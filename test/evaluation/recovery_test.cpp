@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "../../src/evaluation/reach_figures.hpp"
 
 namespace bodyschema {
@@ -53,6 +55,28 @@ TEST(ReachFigures, ATrialThatNeverConvergesHasNoNumberOfFrames) {
   EXPECT_EQ(one["frames_to_converge"], (Json{{"mean", 2.0}, {"never", 1}}));
   const Json none = to_json(reach_result(trials, 1, kLeft));
   EXPECT_EQ(none["frames_to_converge"], (Json{{"mean", nullptr}, {"never", 2}}));
+}
+
+/// Whatever the covariance, one error in a thousand that was drawn from it lies outside.
+TEST(Recovery, TheRegionHoldsItsShare) {
+  const auto seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  const auto drawn = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
+  Eigen::Matrix3d mixed;
+  mixed << 3.0, 0.5, -2.0, 0.0, 0.7, 0.4, 0.0, 0.0, 0.05;
+  for (const Eigen::Matrix3d& root : {Eigen::Matrix3d(0.4 * Eigen::Matrix3d::Identity()), mixed}) {
+    constexpr int kFrames = 100'000;
+    std::vector<FrameRecord> frames(kFrames);
+    for (auto& frame : frames) {
+      const Eigen::Vector3d error_mm = root * drawn();
+      frame.position_mm[kLeft] = error_mm.norm();
+      frame.position_sd[kLeft] = distance_sd(error_mm, root * root.transpose());
+    }
+    const double five_sigma = 5.0 * std::sqrt(1e-3 * (1.0 - 1e-3) / kFrames);
+    EXPECT_NEAR(recovery(frames, 0, kLeft).frames_outside_999 / kFrames, 1e-3, five_sigma);
+  }
 }
 
 }  // namespace
