@@ -25,7 +25,9 @@ void add_evaluate(CLI::App& app) {
   footer += "\nExample:\n  bodyschema evaluate paper --trials 10 --seed 1 --out out/paper";
   command->footer(footer);
   command->add_option("experiment", a->options.experiment, "Which experiment")->required();
-  command->add_option("--trials", a->options.trials, "Seeded trials of each experiment")
+  command
+      ->add_option("--trials", a->options.trials,
+                   "Seeded trials of each experiment, unless its line below says otherwise")
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
   command->add_option("--seed", a->options.seed, "Seed of the first trial")

@@ -417,6 +417,7 @@ struct Estimator::Impl {
       estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
       for (std::size_t k = static_cast<std::size_t>(joints); k < parameters.size(); ++k) {
         estimate.nuisance_names.push_back(parameters[k].name);
+        estimate.head_joints += parameters[k].kind == ParameterKind::kJointOffset ? 1 : 0;
         estimate.nuisance_units.push_back(unit_of(parameters[k].kind));
       }
       estimate.nuisance = state.tail(state.size() - joints);
@@ -430,7 +431,7 @@ struct Estimator::Impl {
       estimate.X_CP.push_back(body.hand_pose(*at, frame_state.x, c));
       estimate.X_CP_nominal.push_back(body.hand_pose(at->q, uncorrected(), c));
       if (c == 0 || estimate.hand_sd_m == 0.0) {
-        estimate.hand_sd_m = hand_sd(*at, c);
+        estimate.hand_sd_m = std::sqrt(std::max(0.0, hand_covariance_m2(*at, c).trace()));
       }
     }
     estimate.weakest = weakest_direction(estimate.covariance_rad2, setup.estimated_joints);
@@ -494,9 +495,16 @@ struct Estimator::Impl {
   /// The state of a robot that is as its encoders and model say.
   [[nodiscard]] Eigen::VectorXd uncorrected() const { return Eigen::VectorXd::Zero(state.size()); }
 
-  /// How well the hand is known in a camera, by this frame's covariance: the root of the summed variances
-  /// of x, y and z.
-  double hand_sd(const Exposure& at, std::size_t camera) {
+  /// The state that an estimate reports.
+  [[nodiscard]] Eigen::VectorXd state_of(const Estimate& estimate) const {
+    Eigen::VectorXd x = uncorrected();
+    x.head(joints) = estimate.offset_rad;
+    x.segment(joints, estimate.nuisance.size()) = estimate.nuisance;
+    return x;
+  }
+
+  /// How well the hand is known in a camera, by this frame's covariance.
+  Eigen::Matrix3d hand_covariance_m2(const Exposure& at, std::size_t camera) {
     constexpr double kStep = 1e-4;
     const Eigen::Index n = std::min<Eigen::Index>(state.size(), frame_state.covariance.rows());
     Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, n);
@@ -509,7 +517,7 @@ struct Estimator::Impl {
       J.col(k) = (plus - body.hand_pose(at, x, camera).translation()) / (2.0 * kStep);
       x(k) = value;
     }
-    return std::sqrt(std::max(0.0, (J * frame_state.covariance * J.transpose()).trace()));
+    return J * frame_state.covariance * J.transpose();
   }
 
   void reset() {
@@ -601,9 +609,24 @@ BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::
   return impl_->scorer.render(X_CB, camera);
 }
 
+BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::size_t camera,
+                                           const Estimate& estimate) {
+  std::vector<Eigen::Isometry3f> X_CB(impl_->body.part_count());
+  impl_->body.compute(*observation.cameras[camera], impl_->state_of(estimate), camera, X_CB);
+  return impl_->scorer.render(X_CB, camera);
+}
+
 Pose Estimator::hand_pose(const Exposure& at, std::size_t camera, bool corrected) {
   return corrected ? impl_->body.hand_pose(at, impl_->state, camera)
                    : impl_->body.hand_pose(at.q, impl_->uncorrected(), camera);
+}
+
+Pose Estimator::hand_pose(const Exposure& at, std::size_t camera, const Estimate& estimate) {
+  return impl_->body.hand_pose(at, impl_->state_of(estimate), camera);
+}
+
+Eigen::Matrix3d Estimator::hand_covariance_m2(const Exposure& at, std::size_t camera) {
+  return impl_->hand_covariance_m2(at, camera);
 }
 
 std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& at, std::size_t camera, bool corrected) {

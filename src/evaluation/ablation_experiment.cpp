@@ -7,8 +7,6 @@
 namespace bodyschema {
 namespace {
 
-constexpr int kMostTrials = 10;
-
 struct Ablation {
   std::string name;  ///< key in the summary
   std::string what;
@@ -40,7 +38,7 @@ void run_ablations(ExperimentContext& context) {
   const std::vector<Ablation> rows = ablations(context);
   std::vector<Contestant> contestants;
   for (const auto& row : rows) contestants.push_back({row.what, row.options, false});
-  const int trials = std::min(context.options.trials, kMostTrials);
+  const int trials = std::min(context.options.trials, kMostAblationTrials);
 
   struct Condition {
     const char* key;
@@ -53,7 +51,7 @@ void run_ablations(ExperimentContext& context) {
                                    [&](std::uint64_t seed) { return mismatch_setting(context, seed); }}};
   for (const auto& condition : conditions) {
     const auto records = run_trials(context, condition.title, trials, condition.setting, contestants);
-    add_heading(context, condition.title);
+    add_heading(context, condition.title, trials);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const ReachResult result = reach_result(records, i, kLeft);
       context.summary["ablation"][rows[i].name][condition.key] = to_json(result);

@@ -3,10 +3,10 @@
 #include <algorithm>
 
 #include "bodyschema/core/error.hpp"
-#include "bodyschema/evaluation/statistics.hpp"
 #include "bodyschema/simulator/motion_planner.hpp"
 #include "experiments.hpp"
 #include "reach_figures.hpp"
+#include "recovery.hpp"
 #include "trial_runner.hpp"
 
 namespace bodyschema {
@@ -15,62 +15,13 @@ namespace {
 using simulator::FaultSpec;
 
 constexpr std::size_t kEventFrame = 45;
-constexpr int kMostTrials = 14;
-
-/// From an event on: how long until the hand is known again, and whether the uncertainty said so.
-struct Recovery {
-  double frames_to_recover = 0.0;   ///< until below 1 mm for good
-  double frames_outside_999 = 0.0;  ///< with the truth outside the published 99.9 % region
-};
-
-Recovery recovery(const std::vector<FrameRecord>& frames, std::size_t event, std::size_t camera) {
-  // 99.9 % of a 3-D normal lies within 4.03 sd along one axis; hand_sd adds the three axes.
-  constexpr double kRegion = 4.03;
-  Recovery result;
-  for (std::size_t i = event; i < frames.size(); ++i) {
-    const double error_mm = frames[i].position_mm[camera];
-    if (error_mm < 0.0) continue;
-    if (error_mm >= 1.0) result.frames_to_recover = static_cast<double>(i - event + 1);
-    if (error_mm > kRegion * frames[i].hand_sd_mm) ++result.frames_outside_999;
-  }
-  return result;
-}
-
-struct RecoveryFigures {
-  Statistics frames_to_recover;
-  Statistics frames_outside_999;
-  std::size_t slowest = 0;  ///< trial that took longest, for those who want to look at it
-};
-
-RecoveryFigures figures_of(const std::vector<Recovery>& recoveries) {
-  std::vector<double> recover, outside;
-  for (const auto& r : recoveries) {
-    recover.push_back(r.frames_to_recover);
-    outside.push_back(r.frames_outside_999);
-  }
-  const auto slowest = std::max_element(recover.begin(), recover.end()) - recover.begin();
-  return {Statistics::of(recover), Statistics::of(outside), static_cast<std::size_t>(slowest)};
-}
-
-Json to_json(const RecoveryFigures& figures) {
-  return {
-      {"frames_to_recover", {{"mean", figures.frames_to_recover.mean}, {"max", figures.frames_to_recover.worst}}},
-      {"frames_outside_999", {{"mean", figures.frames_outside_999.mean}, {"max", figures.frames_outside_999.worst}}}};
-}
-
-void add_row(ExperimentContext& context, const std::string& name, const RecoveryFigures& f) {
-  context.table +=
-      fmt::format("{:<38} below 1 mm within {:>3.0f} frames (mean {:.1f}, slowest seed {}), outside 99.9 %: {:.0f}\n",
-                  name, f.frames_to_recover.worst, f.frames_to_recover.mean, context.options.seed + f.slowest,
-                  f.frames_outside_999.worst);
-}
 
 /// Runs both modes and judges each trial by `judge(trial, contestant)`.
 void run_adaptation(ExperimentContext& context, const std::string& title, const std::string& key,
                     const std::function<TrialSetting(std::uint64_t)>& setting_of,
                     const std::function<Recovery(const TrialRecord&, std::size_t)>& judge) {
   const std::vector<Contestant> contestants = stereo_contestants(context);
-  const int trials = std::min(context.options.trials, kMostTrials);
+  const int trials = std::min(context.options.trials, kMostAdaptationTrials);
   const auto records = run_trials(context, title, trials, setting_of, contestants);
   chart_errors(context, title, records, contestants, kLeft);
   context.table += fmt::format("\n{} ({} trials)\n", title, trials);
@@ -79,7 +30,7 @@ void run_adaptation(ExperimentContext& context, const std::string& title, const 
     for (const auto& record : records) recoveries.push_back(judge(record, i));
     const RecoveryFigures figures = figures_of(recoveries);
     context.summary[modes()[i]][key] = to_json(figures);
-    add_row(context, contestants[i].name, figures);
+    context.table += fmt::format("{:<38} {}\n", contestants[i].name, describe(figures, context.options.seed));
   }
 }
 

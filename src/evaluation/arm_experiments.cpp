@@ -14,7 +14,7 @@ void compare_modes(ExperimentContext& context, const std::string& title, const s
                    const std::function<TrialSetting(std::uint64_t)>& setting_of, std::size_t camera) {
   const std::vector<Contestant> contestants = stereo_contestants(context);
   const auto records = run_trials(context, title, trials, setting_of, contestants);
-  add_heading(context, title);
+  add_heading(context, title, trials);
   chart_errors(context, title, records, contestants, camera);
   for (std::size_t i = 0; i < contestants.size(); ++i) {
     const ReachResult result = reach_result(records, i, camera);
@@ -40,7 +40,7 @@ void run_experiment1(ExperimentContext& context, bool paper_only) {
   const auto records = run_trials(
       context, "experiment 1: offsets in the arm", context.options.trials,
       [&](std::uint64_t) { return standard_setting(context); }, contestants);
-  add_heading(context, "experiment 1: offsets in the arm");
+  add_heading(context, "experiment 1: offsets in the arm", context.options.trials);
   chart_errors(context, "experiment 1: offsets in the arm", records, contestants, kLeft);
   for (std::size_t i = 0; i < contestants.size(); ++i) {
     const ReachResult result = reach_result(records, i, kLeft);

@@ -1,5 +1,8 @@
 #include "bodyschema/evaluation/evaluate.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
 #include <fstream>
 
 #include "bodyschema/core/error.hpp"
@@ -9,6 +12,13 @@
 #include "experiments.hpp"
 
 namespace bodyschema {
+namespace {
+
+std::string at_most(int trials) {
+  return fmt::format("; at most {} trials", trials);
+}
+
+}  // namespace
 
 const std::vector<std::pair<std::string, std::string>>& experiment_names() {
   static const std::vector<std::pair<std::string, std::string>> names = {
@@ -17,12 +27,13 @@ const std::vector<std::pair<std::string, std::string>>& experiment_names() {
       {"clutter", "experiment 1 before a cluttered background"},
       {"mismatch", "camera, mesh size and fingers differ a little from the model"},
       {"experiment2", "offsets in arm and head (Fig. 8)"},
-      {"offsets", "the offsets themselves and their intervals after 60 s of babbling"},
-      {"slip", "a joint slips by 5 degrees in mid-run"},
-      {"leave", "the hand leaves the view and comes back"},
-      {"camera", "one camera dies"},
-      {"likelihood", "likelihood over one offset, two arm postures (Fig. 2)"},
-      {"ablation", "best with one part taken away at a time"},
+      {"offsets",
+       fmt::format("the offsets themselves and their intervals after 60 s of babbling; always {} trials", kOffsetLogs)},
+      {"slip", "a joint slips by 5 degrees in mid-run" + at_most(kMostAdaptationTrials)},
+      {"leave", "the hand leaves the view and comes back" + at_most(kMostAdaptationTrials)},
+      {"camera", "one camera dies" + at_most(kMostAdaptationTrials)},
+      {"likelihood", "likelihood over one offset, two arm postures (Fig. 2); always one trial"},
+      {"ablation", "best with one part taken away at a time" + at_most(kMostAblationTrials)},
       {"reach", "hand to target with the nominal and with the corrected model"},
       {"recording", "the public recording, exact and nominal robot (needs BODYSCHEMA_DATA)"},
       {"diagnosis", "rates of the diagnosis on logs with hidden faults; --trials sets the single-cause logs"},
@@ -71,14 +82,16 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   if (wanted("reach")) run_reach(context);
   if (wanted("recording")) run_recording(context);
   if (options.experiment == "diagnosis") run_diagnosis(context);
-  summary["trials"] = options.trials;
+  summary["trials_asked_for"] = options.trials;
   summary["seed"] = options.seed;
   file << summary.dump(2) << '\n';
   if (!file.flush()) throw FileError((options.out / "summary.json").string() + ": cannot be written");
-  report.figures_first(table, "Trials: " + std::to_string(options.trials) + ", seed " + std::to_string(options.seed) +
-                                  (options.experiment == "diagnosis"
-                                       ? "."
-                                       : ". Simulated robot; means over trials of the mean over the last ten frames."));
+  report.figures_first(
+      table, options.experiment == "diagnosis"
+                 ? fmt::format("Trials: {}, seed {}.", options.trials, options.seed)
+                 : fmt::format("Seeds from {} on, as many trials as the tables say. Simulated robot; means over trials "
+                               "of the mean over the last ten frames.",
+                               options.seed));
   report.write(options.out / "report.html");
   return table;
 }

@@ -10,10 +10,9 @@
 namespace bodyschema {
 
 void run_offsets(ExperimentContext& context) {
-  constexpr int kLogs = 6;
   const std::vector<Contestant> contestants = stereo_contestants(context);
   const auto records = run_trials(
-      context, "offsets after 60 s of babbling", kLogs,
+      context, "offsets after 60 s of babbling", kOffsetLogs,
       [&](std::uint64_t seed) {
         TrialSetting setting = standard_setting(context);
         setting.plan.motion = simulator::Motion::kBabble;
@@ -24,7 +23,7 @@ void run_offsets(ExperimentContext& context) {
         return setting;
       },
       contestants);
-  context.table += "\noffsets after 60 s of babbling\n";
+  context.table += fmt::format("\noffsets after 60 s of babbling ({} trials)\n", kOffsetLogs);
   for (std::size_t i = 0; i < contestants.size(); ++i) {
     double squares = 0.0;
     int covered = 0;
@@ -45,7 +44,7 @@ void run_offsets(ExperimentContext& context) {
     const double coverage = static_cast<double>(covered) / n;
     const double half_width = Statistics::of(half_widths).median;
     context.summary[modes()[i]]["offsets"] = {
-        {"rms_deg", rms}, {"coverage95", coverage}, {"half_width95_median_deg", half_width}};
+        {"trials", kOffsetLogs}, {"rms_deg", rms}, {"coverage95", coverage}, {"half_width95_median_deg", half_width}};
     context.table += fmt::format("{:<38} rms {:.3f} deg, 95 % intervals cover {:.0f} %, median half-width {:.3f} deg\n",
                                  contestants[i].name, rms, 100.0 * coverage, half_width);
   }

@@ -3,19 +3,28 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <map>
+#include <optional>
 
 namespace bodyschema {
 namespace {
 
 constexpr std::size_t kLastFrames = 10;
 
-/// Frames until below 1 mm and 1 degree for good; all of them when that never happens.
-double frames_to_converge(const std::vector<FrameRecord>& frames, std::size_t camera) {
+/// Frames until below 1 mm and 1 degree for good; nothing when that never happens.
+std::optional<double> frames_to_converge(const std::vector<FrameRecord>& frames, std::size_t camera) {
   std::size_t last_bad = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (frames[i].position_mm[camera] >= 1.0 || frames[i].rotation_deg[camera] >= 1.0) last_bad = i + 1;
   }
+  if (last_bad == frames.size()) return std::nullopt;
   return static_cast<double>(last_bad);
+}
+
+std::string frames_text(const ReachResult& r) {
+  if (r.never == r.trials) return "never";
+  std::string text = fmt::format("{:.1f}", r.frames_to_converge.mean);
+  if (r.never > 0) text += fmt::format(", never in {}", r.never);
+  return text;
 }
 
 /// The same estimator in the same colour in every chart.
@@ -48,27 +57,31 @@ ReachResult reach_result(const std::vector<TrialRecord>& trials, std::size_t con
     if (record.empty()) continue;
     position.push_back(mean_of_last(record, camera, &FrameRecord::position_mm));
     rotation.push_back(mean_of_last(record, camera, &FrameRecord::rotation_deg));
-    frames.push_back(frames_to_converge(record, camera));
+    if (const auto converged = frames_to_converge(record, camera)) frames.push_back(*converged);
   }
-  return {Statistics::of(position), Statistics::of(rotation), Statistics::of(frames)};
+  return {position.size(), Statistics::of(position), Statistics::of(rotation), position.size() - frames.size(),
+          Statistics::of(frames)};
 }
 
 Json to_json(const ReachResult& r) {
   const auto figures = [](const Statistics& s) { return Json{{"mean", s.mean}, {"sd", s.sd}, {"worst", s.worst}}; };
-  return {{"position_mm", figures(r.position_mm)},
+  Json frames = {{"mean", nullptr}, {"never", r.never}};
+  if (r.never < r.trials) frames["mean"] = r.frames_to_converge.mean;
+  return {{"trials", r.trials},
+          {"position_mm", figures(r.position_mm)},
           {"orientation_deg", figures(r.rotation_deg)},
-          {"frames_to_converge", {{"mean", r.frames_to_converge.mean}}}};
+          {"frames_to_converge", frames}};
 }
 
 void add_row(ExperimentContext& context, const std::string& name, const ReachResult& r) {
-  context.table += fmt::format("{:<38} {:>5.2f} +- {:<5.2f} {:>5.2f} +- {:<5.2f} {:>6.2f} {:>6.2f} {:>7.1f}\n", name,
+  context.table += fmt::format("{:<38} {:>5.2f} +- {:<5.2f} {:>5.2f} +- {:<5.2f} {:>6.2f} {:>6.2f} {:>7}\n", name,
                                r.position_mm.mean, r.position_mm.sd, r.rotation_deg.mean, r.rotation_deg.sd,
-                               r.position_mm.worst, r.rotation_deg.worst, r.frames_to_converge.mean);
+                               r.position_mm.worst, r.rotation_deg.worst, frames_text(r));
 }
 
-void add_heading(ExperimentContext& context, const std::string& title) {
-  context.table += fmt::format("\n{:<38} {:>14} {:>14} {:>6} {:>6} {:>7}\n", title, "position mm", "rotation deg",
-                               "worst", "worst", "frames");
+void add_heading(ExperimentContext& context, const std::string& title, int trials) {
+  context.table += fmt::format("\n{} ({} trials)\n{:<38} {:>14} {:>14} {:>6} {:>6} {:>7}\n", title, trials, "",
+                               "position mm", "rotation deg", "worst", "worst", "frames");
 }
 
 void chart_errors(ExperimentContext& context, const std::string& title, const std::vector<TrialRecord>& trials,

@@ -13,9 +13,11 @@ inline constexpr std::size_t kRight = 1;
 
 /// What the trials of one contestant come to, in one camera.
 struct ReachResult {
+  std::size_t trials = 0;
   Statistics position_mm;         ///< of each trial's mean over its last ten frames
   Statistics rotation_deg;        ///< the same
-  Statistics frames_to_converge;  ///< until below 1 mm and 1 degree for good
+  std::size_t never = 0;          ///< trials that did not end below 1 mm and 1 degree
+  Statistics frames_to_converge;  ///< until below both for good, of the others
 };
 
 /// One of a frame's figures in a camera, averaged over the last ten frames that have it.
@@ -26,7 +28,7 @@ ReachResult reach_result(const std::vector<TrialRecord>& trials, std::size_t con
 Json to_json(const ReachResult& result);
 
 /// Lines of the printed table.
-void add_heading(ExperimentContext& context, const std::string& title);
+void add_heading(ExperimentContext& context, const std::string& title, int trials);
 void add_row(ExperimentContext& context, const std::string& name, const ReachResult& result);
 
 /// Errors of the hand over the frames, mean over trials (Figs. 6 and 8).

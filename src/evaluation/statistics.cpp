@@ -1,7 +1,9 @@
 #include "bodyschema/evaluation/statistics.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace bodyschema {
@@ -19,6 +21,12 @@ Statistics Statistics::of(std::vector<double> values) {
   s.median = values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
   s.worst = values.back();
   return s;
+}
+
+double distance_sd(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
+  const Eigen::LLT<Eigen::Matrix3d> root(covariance);
+  if (root.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+  return root.matrixL().solve(error).norm();
 }
 
 }  // namespace bodyschema

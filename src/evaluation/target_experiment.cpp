@@ -57,12 +57,14 @@ void run_reach(ExperimentContext& context) {
     nominal_mm.push_back(record.contestants[0].frames.back().nominal_mm[kLeft]);
   }
   const double nominal = Statistics::of(nominal_mm).median;
-  context.table += fmt::format("\nreach to a target, hand to target, median: nominal model {:.1f} mm", nominal);
+  context.table += fmt::format("\nreach to a target ({} trials), hand to target, median: nominal model {:.1f} mm",
+                               records.size(), nominal);
   for (std::size_t i = 0; i < contestants.size(); ++i) {
     std::vector<double> corrected_mm;
     for (const auto& record : records) corrected_mm.push_back(record.contestants[i].reach_miss_mm);
     const double median = Statistics::of(corrected_mm).median;
-    context.summary[modes()[i]]["reach"] = {{"median_mm", median}, {"improvement", nominal / std::max(median, 1e-9)}};
+    context.summary[modes()[i]]["reach"] = {
+        {"trials", records.size()}, {"median_mm", median}, {"improvement", nominal / std::max(median, 1e-9)}};
     context.table += fmt::format(", {} {:.2f} mm", modes()[i], median);
   }
   context.table += '\n';

@@ -1,15 +1,18 @@
 #include "bodyschema/evaluation/trial.hpp"
 
+#include "bodyschema/evaluation/statistics.hpp"
 #include "bodyschema/pipeline/hand_errors.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 
 namespace bodyschema {
 namespace {
 
-FrameRecord record_of(const Estimate& estimate, const simulator::SimulatedFrame& frame) {
+/// @param estimator  whose last estimate this is
+/// @param seen  what it was made of
+FrameRecord record_of(const Estimate& estimate, Estimator& estimator, const Observation& seen,
+                      const simulator::SimulatedFrame& frame) {
   FrameRecord record;
   record.state = estimate.state;
-  record.hand_sd_mm = 1e3 * estimate.hand_sd_m;
   record.offset_deg = estimate.offset_rad * (180.0 / kPi);
   record.covariance_deg2 = estimate.covariance_rad2 * (180.0 / kPi) * (180.0 / kPi);
   record.likelihood = estimate.best_likelihood;
@@ -17,7 +20,11 @@ FrameRecord record_of(const Estimate& estimate, const simulator::SimulatedFrame&
   for (std::size_t c = 0; c < estimate.X_CP.size() && c < 2; ++c) {
     if (!frame.cameras[c]) continue;
     const Pose& truth = frame.truth[c].X_CP;
-    record.position_mm[c] = 1e3 * (estimate.X_CP[c].translation() - truth.translation()).norm();
+    const Eigen::Vector3d error_m = estimate.X_CP[c].translation() - truth.translation();
+    record.position_mm[c] = 1e3 * error_m.norm();
+    if (seen.cameras[c]) {
+      record.position_sd[c] = distance_sd(error_m, estimator.hand_covariance_m2(*seen.cameras[c], c));
+    }
     record.rotation_deg[c] = degrees(rotation_distance(truth.linear(), estimate.X_CP[c].linear()));
     record.nominal_mm[c] = 1e3 * (estimate.X_CP_nominal[c].translation() - truth.translation()).norm();
   }
@@ -70,7 +77,7 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
       }
       const Observation& seen = contestants[i].mono ? one_eye : observation;
       const Estimate estimate = estimators[i].step(seen);
-      trial.contestants[i].frames.push_back(record_of(estimate, *frame));
+      trial.contestants[i].frames.push_back(record_of(estimate, estimators[i], seen, *frame));
       trial.contestants[i].weakest = estimate.weakest;
       if (setting.on_frame) setting.on_frame(estimators[i], seen, trial, motion_frame);
     }

@@ -19,6 +19,11 @@ Json matrix_json(const Pose& X) {
   return rows;
 }
 
+/// "vergence_rad", "focal_scale" (relative: has no unit).
+std::string with_unit(const std::string& name, const std::string& unit) {
+  return unit == "1" ? name : name + '_' + unit;
+}
+
 }  // namespace
 
 nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
@@ -31,7 +36,15 @@ nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
     json["stddev_deg"][e.joint_names[k]] = degrees(std::sqrt(std::max(0.0, e.covariance_rad2(i, i))));
   }
   for (std::size_t k = 0; k < e.nuisance_names.size(); ++k) {
-    json["nuisance"][e.nuisance_names[k]] = e.nuisance(static_cast<Eigen::Index>(k));
+    const auto i = static_cast<Eigen::Index>(k);
+    if (k < e.head_joints) {
+      json["head_offset_deg"][e.nuisance_names[k]] = degrees(e.nuisance(i));
+      json["head_stddev_deg"][e.nuisance_names[k]] = degrees(e.nuisance_sd(i));
+    } else {
+      const std::string name = with_unit(e.nuisance_names[k], e.nuisance_units[k]);
+      json["nuisance"][name] = e.nuisance(i);
+      json["nuisance_stddev"][name] = e.nuisance_sd(i);
+    }
   }
   for (std::size_t c = 0; c < e.X_CP.size(); ++c) {
     json["hand_pose_" + rig.cameras[c].name + "_camera"] = matrix_json(e.X_CP[c]);

@@ -15,6 +15,7 @@
 #include "bodyschema/geometry/pose.hpp"
 #include "bodyschema/robot/urdf_origin.hpp"
 #include "estimate_json.hpp"
+#include "model_hash.hpp"
 
 namespace bodyschema {
 namespace {
@@ -104,11 +105,9 @@ XMLElement* find_joint(XMLElement* robot, const std::string& name) {
 }
 
 /// Offsets that were found with an extended model are wrong without it, and the other way round.
-void check_same_model(const std::filesystem::path& summary, const RobotSetup& setup,
-                      const std::optional<ErrorModel>& model) {
-  std::ifstream stream(summary);
-  const auto json = nlohmann::ordered_json::parse(stream, nullptr, false);
-  const bool made_with = json.is_object() && json.contains("extended_model");
+void check_same_extended_model(const std::filesystem::path& summary, const nlohmann::ordered_json& json,
+                               const RobotSetup& setup, const std::optional<ErrorModel>& model) {
+  const bool made_with = json.contains("extended_model");
   if (made_with && !model) {
     throw ConfigurationError(summary.string() +
                              ": made with an extended model; expected the same one here (--extended-model)");
@@ -123,8 +122,30 @@ void check_same_model(const std::filesystem::path& summary, const RobotSetup& se
   }
 }
 
-bool is_one_of(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
+/// Offsets that were found with one URDF are wrong in another; in one that has been corrected by them, double.
+/// @param warnings  out: what is wrong, where that is accepted
+void check_same_robot(const std::filesystem::path& summary, const nlohmann::ordered_json& json, const RobotSetup& setup,
+                      const std::string& hash, bool anyway, std::vector<std::string>& warnings) {
+  if (!json.contains("model_hash") || json["model_hash"] == hash) return;
+  const std::string difference =
+      fmt::format("made with the robot of model_hash {}, but robot.urdf '{}' with its meshes has \"{}\"",
+                  json["model_hash"].dump(), setup.model.urdf.string(), hash);
+  if (!anyway) {
+    throw ConfigurationError(summary.string() + ": " + difference + "; expected the URDF of the replay (--anyway)");
+  }
+  warnings.push_back(difference);
+}
+
+std::string joints_yaml(const std::vector<std::pair<std::string, double>>& angles_rad) {
+  std::string text;
+  for (const auto& [joint, angle] : angles_rad) text += fmt::format("  {}: {:.4f}\n", joint, degrees(angle));
+  return text;
+}
+
+std::string joints_delta(const std::vector<std::pair<std::string, double>>& offsets_rad) {
+  std::string text;
+  for (const auto& [joint, offset] : offsets_rad) text += fmt::format("{:<24} {:+.4f}\n", joint, degrees(offset));
+  return text;
 }
 
 std::string cameras_yaml(const StereoRig& rig) {
@@ -161,10 +182,21 @@ std::string applied_text(const std::vector<AppliedEffect>& applied) {
   return text.empty() ? "The extended model holds joint offsets alone; those of the replay are used.\n" : text;
 }
 
+/// All of the text or, on an error, what stood there before. What is no plain file is written to as it is.
 void write_text(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream stream(file);
+  std::error_code error;
+  const bool plain = !std::filesystem::exists(file, error) || std::filesystem::is_regular_file(file, error);
+  const std::filesystem::path part = plain ? file.string() + ".part" : file.string();
+  std::ofstream stream(part);
   stream << text;
-  if (!stream.flush()) throw FileError(file.string() + ": cannot be written");
+  stream.close();
+  bool written = stream.good();
+  if (plain && written) {
+    std::filesystem::rename(part, file, error);
+    written = !error;
+  }
+  if (plain && !written) std::filesystem::remove(part, error);
+  if (!written) throw FileError(file.string() + ": cannot be written; is the disk full?");
 }
 
 }  // namespace
@@ -177,13 +209,23 @@ Correction read_correction(const std::filesystem::path& summary, bool anyway) {
   try {
     const auto estimate = nlohmann::ordered_json::parse(stream).at("estimate");
     state = estimate.at("state").get<std::string>();
-    for (const auto& [joint, value] : estimate.at("offset_deg").items()) {
-      correction.offsets_rad.emplace_back(joint, radians(value.get<double>()));
-    }
-    for (const auto& [joint, value] : estimate.at("stddev_deg").items()) {
-      correction.sd_rad.emplace_back(joint, radians(value.get<double>()));
+    const auto read_joints = [&](const char* key, std::vector<std::pair<std::string, double>>& list) {
+      for (const auto& [joint, value] : estimate.at(key).items()) {
+        list.emplace_back(joint, radians(value.get<double>()));
+      }
+    };
+    read_joints("offset_deg", correction.offsets_rad);
+    read_joints("stddev_deg", correction.sd_rad);
+    if (estimate.contains("head_offset_deg")) {
+      read_joints("head_offset_deg", correction.head_offsets_rad);
+      read_joints("head_stddev_deg", correction.head_sd_rad);
     }
     if (estimate.contains("nuisance")) {
+      if (!estimate.contains("nuisance_stddev")) {
+        throw FileError(summary.string() +
+                        ": estimate.nuisance is that of an older version, which does not say how well the head's "
+                        "joints are known; expected head_offset_deg and head_stddev_deg: replay the log again");
+      }
       for (const auto& [name, value] : estimate.at("nuisance").items()) {
         correction.nuisances.emplace_back(name, value.get<double>());
       }
@@ -196,10 +238,12 @@ Correction read_correction(const std::filesystem::path& summary, bool anyway) {
     if (!anyway) throw DataError(summary.string() + ": " + ending + " (--anyway)");
     correction.warnings.push_back(ending);
   }
-  for (const auto& [joint, sd] : correction.sd_rad) {
-    if (degrees(sd) <= kHardlyKnown_deg) continue;
-    correction.warnings.push_back(
-        fmt::format("{}: known to {:.2f} deg only (one sigma); this motion hardly told it", joint, degrees(sd)));
+  for (const auto* list : {&correction.sd_rad, &correction.head_sd_rad}) {
+    for (const auto& [joint, sd] : *list) {
+      if (degrees(sd) <= kHardlyKnown_deg) continue;
+      correction.warnings.push_back(
+          fmt::format("{}: known to {:.2f} deg only (one sigma); this motion hardly told it", joint, degrees(sd)));
+    }
   }
   return correction;
 }
@@ -228,34 +272,33 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
     if (joint == nullptr) throw FileError(urdf.string() + ": no joint carries camera link '" + link + "'");
     move_joint(document, joint, {shift, 0.0, 0.0});
   }
-  for (const auto* list : {&correction.offsets_rad, &correction.known_offsets_rad}) {
+  for (const auto* list : {&correction.offsets_rad, &correction.known_offsets_rad, &correction.head_offsets_rad}) {
     for (const auto& [name, offset] : *list) correct_joint(document, joint_named(name), offset);
-  }
-  // The arm's offsets hold together with the head's: one without the other would be wrong.
-  for (const auto& [name, value] : correction.nuisances) {
-    if (XMLElement* joint = find_joint(robot, name)) correct_joint(document, joint, value);
   }
   for (auto warning = correction.warnings.rbegin(); warning != correction.warnings.rend(); ++warning) {
     std::string text = ' ' + *warning + ' ';
     for (auto at = text.find("--"); at != std::string::npos; at = text.find("--")) text.erase(at, 1);  // ends it
     robot->InsertFirstChild(document.NewComment(text.c_str()));
   }
-  if (document.SaveFile(out.c_str()) != tinyxml2::XML_SUCCESS) {
-    throw FileError(out.string() + ": cannot be written");
-  }
+  tinyxml2::XMLPrinter text;
+  document.Print(&text);
+  write_text(out, text.CStr());
 }
 
 std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup, const StereoRig& rig,
                               const std::filesystem::path& out, bool anyway) {
   Correction correction = read_correction(summary, anyway);
+  const auto robot = setup.load();
   std::optional<ErrorModel> model;
   std::vector<AppliedEffect> applied;
   if (!setup.extended_model.empty()) {
-    const auto robot = setup.load();
     model = ErrorModel::load(setup.extended_model, JointRoles::of(robot, setup, rig));
     applied = add_extended_model(*model, robot, setup, rig, correction);
   }
-  check_same_model(summary, setup, model);
+  std::ifstream stream(summary);
+  const auto json = nlohmann::ordered_json::parse(stream);
+  check_same_extended_model(summary, json, setup, model);
+  check_same_robot(summary, json, setup, model_hash_of(setup, *robot, model), anyway, correction.warnings);
   std::error_code error;
   std::filesystem::create_directories(out, error);
   write_corrected_urdf(setup.model.urdf, correction, out / "corrected.urdf");
@@ -276,24 +319,20 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
     yaml += "# " + warning + '\n';
     delta += "# " + warning + '\n';
   }
-  yaml += "version: 1\noffset_deg:\n";
-  for (const auto& [joint, offset] : correction.offsets_rad) {
-    yaml += fmt::format("  {}: {:.4f}\n", joint, degrees(offset));
-    delta += fmt::format("{:<24} {:+.4f}\n", joint, degrees(offset));
+  yaml += "version: 1\noffset_deg:\n" + joints_yaml(correction.offsets_rad);
+  yaml += "stddev_deg:\n" + joints_yaml(correction.sd_rad);
+  delta += joints_delta(correction.offsets_rad);
+  if (!correction.head_offsets_rad.empty()) {
+    yaml += "# Of the head's joints. Arm and head offsets hold together: apply both or neither.\n";
+    yaml += "head_offset_deg:\n" + joints_yaml(correction.head_offsets_rad);
+    yaml += "head_stddev_deg:\n" + joints_yaml(correction.head_sd_rad);
+    delta += "# head; holds together with the arm: apply both or neither\n";
+    delta += joints_delta(correction.head_offsets_rad);
   }
   if (!correction.nuisances.empty()) {
-    yaml +=
-        "# Estimated beside the offsets; joints in rad, encoder - true. Arm and head offsets hold together:\n"
-        "# apply both or neither.\nnuisance:\n";
-    std::string head;
-    for (const auto& [name, value] : correction.nuisances) {
-      yaml += fmt::format("  {}: {:.6g}\n", name, value);
-      if (is_one_of(setup.head_joints, name)) head += fmt::format("{:<24} {:+.4f}\n", name, degrees(value));
-    }
-    if (!head.empty()) delta += "# head; holds together with the arm: apply both or neither\n" + head;
+    yaml += "# Estimated beside the offsets; not to be applied.\nnuisance:\n";
+    for (const auto& [name, value] : correction.nuisances) yaml += fmt::format("  {}: {:.6g}\n", name, value);
   }
-  yaml += "stddev_deg:\n";
-  for (const auto& [joint, sd] : correction.sd_rad) yaml += fmt::format("  {}: {:.4f}\n", joint, degrees(sd));
   write_text(out / "offsets.yaml", yaml);
   write_text(out / "calibration_delta.txt", delta);
   std::string files =

@@ -40,12 +40,12 @@ void draw_outline(cv::Mat& picture, const BinaryMask& mask, int enlargement, con
 
 }  // namespace
 
-std::vector<OverlayView> overlay_views(Pipeline& pipeline, const Observation& observation) {
+std::vector<OverlayView> overlay_views(Pipeline& pipeline, const Observation& observation, const Estimate& estimate) {
   std::vector<OverlayView> views;
   for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
     if (!observation.cameras[c]) continue;
     views.push_back({&observation.cameras[c]->image, pipeline.estimator().predicted_silhouette(observation, c, false),
-                     pipeline.estimator().predicted_silhouette(observation, c, true)});
+                     pipeline.estimator().predicted_silhouette(observation, c, estimate)});
   }
   return views;
 }

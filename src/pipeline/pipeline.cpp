@@ -3,14 +3,13 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <chrono>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 #include "bodyschema/bus/yarp_import.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/effects/online_error_model.hpp"
+#include "model_hash.hpp"
 
 namespace bodyschema {
 namespace {
@@ -18,19 +17,6 @@ namespace {
 /// A picture that does not change while a joint moves this far was not taken anew; beyond the noise
 /// and rounding of encoders.
 constexpr double kFrozenMotion_rad = 0.005;
-
-/// FNV-1a, 64 bit: names a model, protects nothing.
-class Digest {
- public:
-  void add(const void* data, std::size_t bytes) {
-    const auto* byte = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < bytes; ++i) state_ = (state_ ^ byte[i]) * 0x100000001b3ull;
-  }
-  [[nodiscard]] std::string text() const { return fmt::format("{:016x}", state_); }
-
- private:
-  std::uint64_t state_ = 0xcbf29ce484222325ull;
-};
 
 std::optional<ErrorModel> load_error_model(const RobotSetup& setup, const std::shared_ptr<const RobotModel>& robot,
                                            const StereoRig& rig) {
@@ -40,23 +26,6 @@ std::optional<ErrorModel> load_error_model(const RobotSetup& setup, const std::s
 
 StereoRig corrected(const StereoRig& rig, const std::optional<ErrorModel>& model) {
   return model ? model->corrected(rig) : rig;
-}
-
-std::string digest_of(const RobotSetup& setup, const RobotModel& robot, const std::optional<ErrorModel>& error_model) {
-  Digest digest;
-  std::ifstream file(setup.model.urdf, std::ios::binary);
-  const std::string urdf((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  digest.add(urdf.data(), urdf.size());
-  for (const auto& part : robot.meshes()) {
-    digest.add(part.link.data(), part.link.size());
-    digest.add(part.mesh.vertices.data(), part.mesh.vertices.size() * sizeof(part.mesh.vertices[0]));
-    digest.add(part.mesh.triangles.data(), part.mesh.triangles.size() * sizeof(part.mesh.triangles[0]));
-  }
-  if (error_model) {
-    const std::string text = error_model->to_yaml();
-    digest.add(text.data(), text.size());
-  }
-  return digest.text();
 }
 
 std::vector<std::string> links_of(const StereoRig& rig) {
@@ -93,7 +62,7 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
       rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
       background_watch_(robot_, links_of(rig_)), background_turned_rad_(rig_.cameras.size(), 0.0),
       estimator_(robot_, setup_, rig_, options_), configuration_hash_(configuration.hash()),
-      model_hash_(digest_of(setup_, *robot_, error_model_)) {
+      model_hash_(model_hash_of(setup_, *robot_, error_model_)) {
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
   for (const auto& camera : rig_.cameras) {

@@ -71,9 +71,9 @@ struct SeenFrame {
   [[nodiscard]] Exposure exposure(std::size_t c) const { return {q[c], corrections[c] ? &*corrections[c] : nullptr}; }
 };
 
-void write_overlay(Pipeline& pipeline, const Observation& observation, const std::filesystem::path& file,
-                   const std::string& caption) {
-  const auto views = overlay_views(pipeline, observation);
+void write_overlay(Pipeline& pipeline, const Observation& observation, const Estimate& estimate,
+                   const std::filesystem::path& file, const std::string& caption) {
+  const auto views = overlay_views(pipeline, observation, estimate);
   if (!views.empty()) write_png(file, draw_overlay(views, caption));
 }
 
@@ -119,8 +119,9 @@ class Replay {
     }
     estimates_.flush();
     if (!estimates_) throw FileError(options_.out.string() + ": disk full? estimates.jsonl is cut short");
+    end_where_it_converged();
     if (last_view_) {
-      write_overlay(pipeline_, *last_view_, options_.out / "overlay_final.png", "last frame");
+      write_overlay(pipeline_, *last_view_, last_, options_.out / "overlay_final.png", "last frame");
     }
     return finish();
   }
@@ -190,7 +191,7 @@ class Replay {
         options_.overlays > 0 ? std::max<std::size_t>(1, expected / static_cast<std::size_t>(options_.overlays)) : 0;
     if (every > 0 && frames_.size() % every == every / 2) {
       const std::string name = fmt::format("overlay_{:05d}.png", frames_.size());
-      write_overlay(pipeline_, observation, options_.out / name, fmt::format("frame {}", frames_.size()));
+      write_overlay(pipeline_, observation, estimate, options_.out / name, fmt::format("frame {}", frames_.size()));
     }
     if (options_.masks) {
       for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
@@ -247,7 +248,6 @@ class Replay {
   }
 
   std::string finish() {
-    end_where_it_converged();
     Json summary;
     summary["log"] = options_.log.filename().string();
     summary["frames"] = frames_.size();
@@ -355,7 +355,7 @@ class Replay {
         if (truth == nullptr) continue;
         const auto& intrinsics = pipeline_.rig().cameras[c].intrinsics;
         all.add(hand_error(pipeline_.estimator().hand_pose(frame.exposure(c), c, false), *truth, c, intrinsics),
-                hand_error(pipeline_.estimator().hand_pose(frame.exposure(c), c, true), *truth, c, intrinsics));
+                hand_error(pipeline_.estimator().hand_pose(frame.exposure(c), c, last_), *truth, c, intrinsics));
       }
       row(fmt::format("{} eye, last {} frames", name, tail), last_frames);
       row(fmt::format("{} eye, final offsets, all frames", name), all);

@@ -71,6 +71,20 @@ TEST_F(EstimatorOnOwnRobot, BestModeFindsTheHandWithinTenFrames) {
   EXPECT_FALSE(estimate.weakest.text.empty());
 }
 
+TEST_F(EstimatorOnOwnRobot, AnEarlierEstimatePredictsWhatItDidThen) {
+  Estimator estimator(robot_, setup_, rig_, options_);
+  const Observation last = seen(*reach_, 4, 9.0);
+  follow(estimator, *reach_, 0, 4, 9.0);
+  const Estimate earlier = estimator.step(last);
+  EXPECT_NEAR(estimator.hand_covariance_m2(*last.cameras[0], 0).trace(), earlier.hand_sd_m * earlier.hand_sd_m, 1e-15);
+  const Pose hand = estimator.hand_pose(*last.cameras[1], 1, true);
+  const BinaryMask silhouette = estimator.predicted_silhouette(last, 1, true);
+  follow(estimator, *reach_, 5, 8, 9.0);
+  EXPECT_NE(estimator.hand_pose(*last.cameras[1], 1, true).matrix(), hand.matrix());
+  EXPECT_EQ(estimator.hand_pose(*last.cameras[1], 1, earlier).matrix(), hand.matrix());
+  EXPECT_TRUE(estimator.predicted_silhouette(last, 1, earlier) == silhouette);
+}
+
 TEST_F(EstimatorOnOwnRobot, LikelihoodIsLargestAtTheTruthForAnyNumberOfHypotheses) {
   options_.filter.particles = 8;  // fewer than hypotheses: several batches
   Estimator estimator(robot_, setup_, rig_, options_);

@@ -5,6 +5,8 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <map>
+#include <optional>
 
 #include "bodyschema/core/error.hpp"
 #include "test_data.hpp"
@@ -47,6 +49,33 @@ TEST(Evaluate, AModeIsRefusedAsEveryExperimentRunsItsOwn) {
   EXPECT_THAT(refusal("likelihood", {"estimator.mode=paper"}), HasSubstr("estimator.mode: 'paper'"));
 }
 
+/// The environment without the variable that names the data, for as long as this lives.
+class WithoutData {
+ public:
+  WithoutData() {
+    if (const char* value = std::getenv(kName)) before_ = value;
+    unsetenv(kName);
+  }
+  ~WithoutData() {
+    if (before_) setenv(kName, before_->c_str(), 1);
+  }
+
+ private:
+  static constexpr const char* kName = "BODYSCHEMA_DATA";
+  std::optional<std::string> before_;
+};
+
+TEST(Evaluate, ExperimentsThatRunAnotherNumberOfTrialsSaySo) {
+  const std::map<std::string, std::string> meanings(experiment_names().begin(), experiment_names().end());
+  for (const auto& [name, words] : std::map<std::string, std::string>{{"slip", "at most 14 trials"},
+                                                                      {"leave", "at most 14 trials"},
+                                                                      {"camera", "at most 14 trials"},
+                                                                      {"ablation", "at most 10 trials"},
+                                                                      {"offsets", "always 6 trials"}}) {
+    EXPECT_THAT(meanings.at(name), HasSubstr(words)) << name;
+  }
+}
+
 TEST(Evaluate, WhatIsSetAboutEstimatingReachesTheRecordingToo) {
   SKIP_WITHOUT("eyehand-sim");
   EvaluationOptions options;
@@ -55,12 +84,14 @@ TEST(Evaluate, WhatIsSetAboutEstimatingReachesTheRecordingToo) {
   options.out = std::filesystem::path(testing::TempDir()) / "bodyschema-evaluate-recording";
   // The simulator's robot is another one; how it is estimated is not.
   options.overrides = {"robot.urdf=/nowhere.urdf", "simulator.seed=1", "filter.particles=minus_one"};
+  const WithoutData environment;
   try {
     evaluate(Configuration::load(kConfigs / "icub_right/evaluation.yaml"), kConfigs, options);
     ADD_FAILURE() << "no error";
   } catch (const ConfigurationError& error) {
     EXPECT_THAT(error.what(), HasSubstr("filter.particles"));
   }
+  EXPECT_EQ(std::getenv("BODYSCHEMA_DATA"), nullptr) << "what is in the environment is not the library's to change";
   std::filesystem::remove_all(options.out);
 }
 

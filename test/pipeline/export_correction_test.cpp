@@ -2,11 +2,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <fstream>
 #include <random>
 
+#include "../../src/pipeline/model_hash.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/effects/corrected_kinematics.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
@@ -41,7 +44,10 @@ class ExportCorrection : public ::testing::Test {
     std::ofstream(folder_ / "summary.json")
         << R"({"estimate": {"state": ")" << state << R"(", "offset_deg": {"r_elbow": -2.0, "r_wrist_yaw": 3.0},
           "stddev_deg": {"r_elbow": 0.1, "r_wrist_yaw": 1.234},
-          "nuisance": {"neck_pitch": 0.05, "mesh_scale": 0.01}}})";
+          "head_offset_deg": {"neck_pitch": 2.8648, "neck_yaw": 0.5},
+          "head_stddev_deg": {"neck_pitch": 0.3, "neck_yaw": 0.75},
+          "nuisance": {"mesh_scale": 0.01, "dilation_px": 0.2},
+          "nuisance_stddev": {"mesh_scale": 0.002, "dilation_px": 0.1}}})";
     return export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out", anyway);
   }
   ~ExportCorrection() override { fs::remove_all(folder_); }
@@ -61,7 +67,8 @@ TEST_F(ExportCorrection, TheCorrectedUrdfGivesTheCorrectedPose) {
   for (const auto& name : setup.estimated_joints) {
     correction.offsets_rad.emplace_back(name, radians(10.0 * uniform(random)));
   }
-  correction.nuisances = {{"neck_pitch", 0.05}, {"mesh_scale", 0.01}};
+  correction.head_offsets_rad = {{"neck_pitch", 0.05}};
+  correction.nuisances = {{"mesh_scale", 0.01}};
   write_corrected_urdf(setup.model.urdf, correction, folder_ / "corrected.urdf");
   RobotModelOptions corrected_options = setup.model;
   corrected_options.urdf = folder_ / "corrected.urdf";
@@ -137,6 +144,94 @@ TEST_F(ExportCorrection, AJointThatTheMotionHardlyToldIsNamedInEveryFile) {
   RobotModelOptions options = setup_.model;
   options.urdf = folder_ / "out/corrected.urdf";
   EXPECT_NO_THROW(RobotModel::load(options));
+}
+
+TEST_F(ExportCorrection, AResultOfAnotherUrdfIsOnlyAppliedAnyway) {
+  const auto hash = [&] { return model_hash_of(setup_, *setup_.load(), std::nullopt); };
+  const std::string made_with = hash();
+  const fs::path summary = folder_ / "summary.json";
+  write_summary(R"(, "model_hash": ")" + made_with + '"');
+  export_correction(summary, setup_, rig_, folder_ / "out");
+  // Into the URDF that has been corrected by it already: twice.
+  setup_.model.urdf = folder_ / "out/corrected.urdf";
+  const std::string difference = "made with the robot of model_hash \"" + made_with + "\", but robot.urdf '" +
+                                 setup_.model.urdf.string() + "' with its meshes has \"" + hash() + '"';
+  try {
+    export_correction(summary, setup_, rig_, folder_ / "twice");
+    ADD_FAILURE() << "no error";
+  } catch (const ConfigurationError& e) {
+    EXPECT_EQ(e.what(), summary.string() + ": " + difference + "; expected the URDF of the replay (--anyway)");
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "twice"));
+  EXPECT_THAT(export_correction(summary, setup_, rig_, folder_ / "twice", true), ::testing::HasSubstr(difference));
+  EXPECT_THAT(content("twice/offsets.yaml"), ::testing::HasSubstr(difference));
+  write_summary();  // older ones do not say
+  EXPECT_NO_THROW(export_correction(summary, setup_, rig_, folder_ / "out"));
+}
+
+TEST_F(ExportCorrection, WhatADeviceDoesNotTakeIsAnError) {
+  write_summary();
+  for (const char* file : {"corrected.urdf", "offsets.yaml", "calibration_delta.txt"}) {
+    const fs::path full = folder_ / "out" / file;
+    fs::create_directories(folder_ / "out");
+    fs::create_symlink("/dev/full", full);
+    try {
+      export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+      ADD_FAILURE() << "no error: " << file;
+    } catch (const FileError& e) {
+      EXPECT_THAT(e.what(), ::testing::HasSubstr(full.string()));
+    }
+    fs::remove_all(folder_ / "out");
+  }
+}
+
+TEST_F(ExportCorrection, AFullDiskIsAnErrorAndLeavesWhatWasThereWhole) {
+  export_of("converged");
+  const std::string before = content("out/corrected.urdf");
+  constexpr rlim_t kRoom_bytes = 4096;
+  ASSERT_GT(before.size(), kRoom_bytes);
+  write_summary();
+  rlimit limit{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &limit), 0);
+  const rlimit little{kRoom_bytes, limit.rlim_max};
+  const auto usual = std::signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &little);
+  std::string message;
+  try {
+    export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+  } catch (const FileError& e) {
+    message = e.what();
+  }
+  setrlimit(RLIMIT_FSIZE, &limit);
+  std::signal(SIGXFSZ, usual);
+  EXPECT_EQ(message, (folder_ / "out/corrected.urdf").string() + ": cannot be written; is the disk full?");
+  EXPECT_EQ(content("out/corrected.urdf"), before);
+  EXPECT_FALSE(fs::exists(folder_ / "out/corrected.urdf.part"));
+}
+
+TEST_F(ExportCorrection, AHeadJointHasDegreesADeviationAndTheWarningOfAnyJoint) {
+  const std::string warning = "neck_yaw: known to 0.75 deg only (one sigma); this motion hardly told it";
+  EXPECT_THAT(export_of("converged"), ::testing::HasSubstr(warning));
+  for (const char* file : {"out/offsets.yaml", "out/calibration_delta.txt", "out/corrected.urdf"}) {
+    EXPECT_THAT(content(file), ::testing::HasSubstr(warning)) << file;
+  }
+  const Configuration yaml = Configuration::load(folder_ / "out/offsets.yaml");
+  EXPECT_DOUBLE_EQ(yaml.number("head_offset_deg.neck_pitch"), 2.8648);
+  EXPECT_DOUBLE_EQ(yaml.number("head_stddev_deg.neck_yaw"), 0.75);
+  EXPECT_DOUBLE_EQ(yaml.number("nuisance.dilation_px"), 0.2);
+}
+
+TEST_F(ExportCorrection, HeadJointsInRadiansWithoutADeviationAreRefused) {
+  std::ofstream(folder_ / "summary.json")
+      << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1},
+          "nuisance": {"neck_pitch": 0.05, "mesh_scale": 0.01}}})";
+  try {
+    export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+    ADD_FAILURE() << "no error";
+  } catch (const FileError& e) {
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("summary.json: estimate.nuisance"));
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("replay the log again"));
+  }
 }
 
 // Arm and head offsets hold together: a calibrator that gets one without the other is wrong.

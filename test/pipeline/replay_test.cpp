@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/fmt/fmt.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -11,6 +12,9 @@
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/bus/messages.hpp"
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/pipeline/export_correction.hpp"
+#include "bodyschema/pipeline/hand_errors.hpp"
+#include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/simulator/recording.hpp"
 
@@ -73,6 +77,33 @@ class ReplayTest : public ::testing::Test {
     (void)simulator::SimulatorSettings::from(c.section("simulator"));  // its keys are known here
     return c;
   }
+  /// The reach, but its last four pictures show these cameras the empty room.
+  static void record_with_an_empty_room_at_the_end(const fs::path& file, const std::vector<std::size_t>& cameras) {
+    std::vector<LogEvent> events;
+    LogReader reader(folder_ / "reach.log");
+    for (LogEvent event; reader.next(event);) events.push_back(event);
+    std::vector<std::size_t> pictures;
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      if (events[i].channel == "ICUB_CAMERAS") pictures.push_back(i);
+    }
+    const auto decoded = [&](std::size_t i) {
+      bot_core::images_t message;
+      message.decode(events[i].data.data(), 0, static_cast<int>(events[i].data.size()));
+      return message;
+    };
+    const bot_core::images_t empty_room = decoded(pictures.front());
+    LogWriter log(file);
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      const auto from_end = std::find(pictures.end() - 4, pictures.end(), i);
+      if (from_end == pictures.end()) {
+        log.publish(events[i].channel, events[i].time_us, events[i].data);
+        continue;
+      }
+      bot_core::images_t message = decoded(i);
+      for (const std::size_t c : cameras) message.images.at(c).data = empty_room.images.at(c).data;
+      log.publish_message(events[i].channel, events[i].time_us, message);
+    }
+  }
   static inline fs::path folder_;
 };
 
@@ -94,12 +125,17 @@ TEST_F(ReplayTest, WritesEstimatesSummaryAndPictures) {
   EXPECT_EQ(last["state"], "converged");
   EXPECT_EQ(last["offset_deg"].size(), 7u);
   EXPECT_EQ(last["stddev_deg"].size(), 7u);
+  EXPECT_TRUE(last["head_offset_deg"].contains("neck_pitch"));
+  EXPECT_EQ(last["head_stddev_deg"].size(), last["head_offset_deg"].size());
   EXPECT_EQ(last["hand_pose_left_camera"].size(), 4u);
   EXPECT_GT(last["likelihood"].get<double>(), 0.95);
   EXPECT_LT(last["error_left"]["position_mm"].get<double>(), 1.0);
   const auto summary = nlohmann::json::parse(content(o.out / "summary.json"));
   EXPECT_LT(summary["errors"]["left"]["last_frames"]["position_mm"]["after"].get<double>(),
             0.1 * summary["errors"]["left"]["last_frames"]["position_mm"]["before"].get<double>());
+  const RobotSetup setup = RobotSetup::from(configuration().section("robot"));
+  const StereoRig rig = StereoRig::from(configuration().section("cameras"));
+  EXPECT_NO_THROW(export_correction(o.out / "summary.json", setup, rig, o.out / "apply"));
   EXPECT_TRUE(fs::exists(o.out / "overlay_final.png"));
   EXPECT_FALSE(fs::is_empty(o.out / "masks"));
 }
@@ -181,36 +217,77 @@ TEST_F(ReplayTest, ALogWhoseArmLeavesThePicturesAtTheEndHasConverged) {
   ReplayOptions o = options("leaves");
   o.log = folder_ / "leaves.log";
   o.overlays = 0;
-  std::vector<LogEvent> events;
-  LogReader reader(folder_ / "reach.log");
-  for (LogEvent event; reader.next(event);) events.push_back(event);
-  std::vector<std::size_t> pictures;
-  for (std::size_t i = 0; i < events.size(); ++i) {
-    if (events[i].channel == "ICUB_CAMERAS") pictures.push_back(i);
-  }
-  const auto decoded = [&](std::size_t i) {
-    bot_core::images_t message;
-    message.decode(events[i].data.data(), 0, static_cast<int>(events[i].data.size()));
-    return message;
-  };
-  const bot_core::images_t empty_room = decoded(pictures.front());
-  {
-    LogWriter log(o.log);
-    for (std::size_t i = 0; i < events.size(); ++i) {
-      const auto from_end = std::find(pictures.end() - 4, pictures.end(), i);
-      if (from_end == pictures.end()) {
-        log.publish(events[i].channel, events[i].time_us, events[i].data);
-        continue;
-      }
-      bot_core::images_t message = decoded(i);
-      for (std::size_t c = 0; c < message.images.size(); ++c) message.images[c].data = empty_room.images.at(c).data;
-      log.publish_message(events[i].channel, events[i].time_us, message);
-    }
-  }
+  record_with_an_empty_room_at_the_end(o.log, {0, 1});
   const std::string table = replay(configuration(), o);
   EXPECT_THAT(table, ::testing::Not(HasSubstr("NOT CONVERGED")));
   EXPECT_THAT(table, HasSubstr("The last frames (hand_not_in_view) tell the hand less well"));
   EXPECT_EQ(nlohmann::json::parse(content(o.out / "summary.json"))["estimate"]["state"], "converged");
+}
+
+/// The offsets of a log that has converged before its end are those of then, not the estimator's last.
+TEST_F(ReplayTest, ErrorsAndTheLastPictureAreOfTheOffsetsThatAreReported) {
+  ReplayOptions o = options("one_eye");
+  o.log = folder_ / "one_eye.log";
+  o.truth = folder_ / "truth.json";
+  o.learn_background_online = true;
+  record_with_an_empty_room_at_the_end(o.log, {1});
+  std::vector<Observation> seen;
+  std::vector<Estimate> estimates;
+  const auto watch = [&](Pipeline& pipeline) {
+    seen.clear();
+    estimates.clear();
+    ObservationStream stream = pipeline.make_stream();
+    const auto drain = [&] {
+      while (auto arrived = stream.next()) {
+        estimates.push_back(pipeline.process(arrived->observation));
+        seen.push_back(std::move(arrived->observation));
+      }
+    };
+    LogReader log(o.log);
+    for (LogEvent event; log.next(event);) {
+      if (stream.receive(event.channel, event.data, event.time_us)) drain();
+    }
+    stream.finish();
+    drain();
+  };
+  // One eye tells the hand less well than two: what is asked for lies between.
+  Pipeline first(configuration());
+  watch(first);
+  ASSERT_GT(estimates.size(), 10u);
+  const double both_m = (estimates.end() - 5)->hand_sd_m, one_m = estimates.back().hand_sd_m;
+  ASSERT_GT(one_m, 1.01 * both_m);
+  const Configuration demanding =
+      configuration({fmt::format("estimator.best.converged_hand_sd_mm={}", 1e3 * std::sqrt(both_m * one_m))});
+  Pipeline pipeline(demanding);
+  watch(pipeline);
+  ASSERT_EQ(estimates.back().state, EstimatorState::kConverging);
+  const auto converged = std::find_if(estimates.rbegin(), estimates.rend(),
+                                      [](const auto& e) { return e.state == EstimatorState::kConverged; });
+  ASSERT_NE(converged, estimates.rend());
+
+  const Truth truth = Truth::load(*o.truth);
+  const auto mean_mm = [&](const Estimate& estimate) {
+    double sum = 0.0;
+    int n = 0;
+    for (const auto& observation : seen) {
+      if (!observation.cameras[0]) continue;
+      const TruthInstant* instant = truth.at(observation.cameras[0]->utime);
+      if (instant == nullptr) continue;
+      const Pose hand = pipeline.estimator().hand_pose(*observation.cameras[0], 0, estimate);
+      sum += 1e3 * hand_error(hand, *instant, 0, pipeline.rig().cameras[0].intrinsics).position_m;
+      ++n;
+    }
+    return sum / n;
+  };
+  ASSERT_GT(std::abs(mean_mm(*converged) - mean_mm(estimates.back())), 1e-6);
+  EXPECT_THAT(replay(demanding, o), HasSubstr("The last frames (converging) tell the hand less well"));
+  const auto summary = nlohmann::json::parse(content(o.out / "summary.json"));
+  EXPECT_EQ(summary["estimate"]["utime"], converged->utime);
+  EXPECT_NEAR(summary["errors"]["left"]["final_on_all_frames"]["position_mm"]["after"].get<double>(),
+              mean_mm(*converged), 1e-9);
+  const fs::path picture = folder_ / "expected.png";
+  write_png(picture, draw_overlay(overlay_views(pipeline, seen.back(), *converged), "last frame"));
+  EXPECT_TRUE(content(o.out / "overlay_final.png") == content(picture));
 }
 
 TEST_F(ReplayTest, SaysSoWhenLeftAndRightAreSwapped) {

@@ -39,6 +39,7 @@ struct Estimate {
   Eigen::VectorXd offset_rad;            ///< one per name
   Eigen::MatrixXd covariance_rad2;
   std::vector<std::string> nuisance_names;  ///< head offsets, camera and size parameters, if any
+  std::size_t head_joints = 0;              ///< so many of these, the first, are offsets of head joints
   std::vector<std::string> nuisance_units;  ///< "rad", "px" or "1" (relative), one per name
   Eigen::VectorXd nuisance;                 ///< in that unit
   Eigen::VectorXd nuisance_sd;              ///< in that unit

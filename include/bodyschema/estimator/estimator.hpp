@@ -41,8 +41,14 @@ class Estimator {
   /// @param corrected  with the current estimate and the observation's known corrections, otherwise
   ///   with the encoders and the model as they are
   [[nodiscard]] BinaryMask predicted_silhouette(const Observation& observation, std::size_t camera, bool corrected);
-  /// Where the model puts hand and fingertips; `corrected` as above.
+  /// The same with an earlier estimate of this estimator.
+  [[nodiscard]] BinaryMask predicted_silhouette(const Observation& observation, std::size_t camera,
+                                                const Estimate& estimate);
+  /// Where the model puts hand and fingertips; `corrected` and `estimate` as above.
   [[nodiscard]] Pose hand_pose(const Exposure& at, std::size_t camera, bool corrected);
+  [[nodiscard]] Pose hand_pose(const Exposure& at, std::size_t camera, const Estimate& estimate);
+  /// Covariance of the last estimate's hand base in a camera, m^2; Estimate::hand_sd_m is the root of its trace.
+  [[nodiscard]] Eigen::Matrix3d hand_covariance_m2(const Exposure& at, std::size_t camera);
   [[nodiscard]] std::vector<Eigen::Vector3d> fingertips(const Exposure& at, std::size_t camera, bool corrected);
   [[nodiscard]] std::string engine_description() const;
 

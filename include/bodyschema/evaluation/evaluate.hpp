@@ -13,7 +13,7 @@ struct EvaluationOptions {
   /// "paper" (experiment 1 with the published filter), one experiment by name, or "all".
   std::string experiment = "all";
   std::filesystem::path out;  ///< folder for summary.json and report.html, created
-  int trials = 30;
+  int trials = 30;            ///< where experiment_names() says no other number
   std::uint64_t seed = 7;
   int threads = 0;  ///< trials run side by side; 0: one per core
   /// The recording eyehand-sim and the official models; experiments that need them are skipped

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <vector>
 
 namespace bodyschema {
@@ -12,5 +13,9 @@ struct Statistics {
   double worst = 0.0;
   static Statistics of(std::vector<double> values);
 };
+
+/// Length of an error in standard deviations, by its covariance in the same unit squared (Mahalanobis distance).
+/// Infinite for a covariance that is not positive definite.
+double distance_sd(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance);
 
 }  // namespace bodyschema

@@ -24,9 +24,9 @@ struct FrameRecord {
   EstimatorState state = EstimatorState::kHandNotInView;
   /// Errors in the left and right camera; negative where that camera gave no picture.
   std::array<double, 2> position_mm{-1, -1};
+  std::array<double, 2> position_sd{-1, -1};  ///< in standard deviations by the estimate's own covariance
   std::array<double, 2> rotation_deg{-1, -1};
   std::array<double, 2> nominal_mm{-1, -1};
-  double hand_sd_mm = 0.0;
   Eigen::VectorXd offset_deg;
   Eigen::MatrixXd covariance_deg2;
   double likelihood = 0.0;

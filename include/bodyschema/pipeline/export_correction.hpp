@@ -25,7 +25,10 @@ struct Correction {
   /// encoder - true, by joint name, rad.
   std::vector<std::pair<std::string, double>> offsets_rad;
   std::vector<std::pair<std::string, double>> sd_rad;
-  /// What was estimated beside them; head joints among them are corrected in the URDF too.
+  /// The same of the head's joints; without them those of the arm would be wrong.
+  std::vector<std::pair<std::string, double>> head_offsets_rad;
+  std::vector<std::pair<std::string, double>> head_sd_rad;
+  /// What else was estimated beside them, by name and unit ("dilation_px"); no file applies it.
   std::vector<std::pair<std::string, double>> nuisances;
   /// What whoever applies it must know, one line each; stands in every file.
   std::vector<std::string> warnings;
@@ -58,7 +61,7 @@ std::vector<AppliedEffect> add_extended_model(const ErrorModel& model, const std
 /// grow by it, so that FK_corrected(encoder) = FK_nominal(encoder - offset). Placements and shifts
 /// of an extended model move origins and axes. Everything else stays as it was. Relative mesh paths
 /// keep resolving only beside the original.
-/// Throws FileError naming URDF and joint.
+/// Throws FileError naming URDF and joint, or `out` when it cannot be written; that stays as it was then.
 void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& correction,
                           const std::filesystem::path& out);
 
@@ -66,8 +69,11 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
 /// to each joint's calibrationDelta in an iCub's calibrator file, deg) into `out`, head joints that
 /// were estimated included: arm and head offsets hold together. With an extended model in `setup` also `cameras.yaml`
 /// (where it changes intrinsics) and `what_was_applied.txt`: which of its effects these files hold, and which only work
-/// where the model itself is loaded. Throws as read_correction does, and ConfigurationError when the summary was made
-/// with another extended model than `setup` has. Returns warnings and files, for people.
+/// where the model itself is loaded. Each file is written whole or, where that fails, stays as it was.
+/// @param anyway  as of read_correction, and also when the summary's `model_hash` is another robot's, with a warning
+/// Throws as read_correction does, FileError for a file that cannot be written, and ConfigurationError when the summary
+/// was made with another URDF, other meshes or another extended model than `setup` has. Returns warnings and files,
+/// for people.
 std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup, const StereoRig& rig,
                               const std::filesystem::path& out, bool anyway = false);
 

@@ -11,6 +11,7 @@
 namespace bodyschema {
 
 class Pipeline;
+struct Estimate;
 struct Observation;
 
 /// One camera's picture with two predicted outlines: the encoders as they are (red) and with the
@@ -23,9 +24,9 @@ struct OverlayView {
   std::array<int, 4> part{};
 };
 
-/// Every camera that saw something, with the outlines that the pipeline's estimator predicts. Refers to
-/// the observation's pictures.
-std::vector<OverlayView> overlay_views(Pipeline& pipeline, const Observation& observation);
+/// Every camera that saw something, with the outlines that the pipeline's estimator predicts from one of its
+/// estimates. Refers to the observation's pictures.
+std::vector<OverlayView> overlay_views(Pipeline& pipeline, const Observation& observation, const Estimate& estimate);
 
 /// What the outlines are, for the legend.
 struct OverlayNames {
