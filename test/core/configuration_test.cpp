@@ -13,6 +13,7 @@ namespace bodyschema {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 template <class Action>
@@ -83,6 +84,41 @@ TEST(Configuration, WrongTypeAndRangeSayWhatWasExpected) {
   EXPECT_THAT(error_of([&] { (void)a.number("s"); }), HasSubstr("is a list"));
   EXPECT_THAT(error_of([&] { (void)a.number("inf"); }), HasSubstr("expected a number"));
   EXPECT_THAT(error_of([&] { (void)a.number("gone"); }), HasSubstr("'a.gone' is missing"));
+}
+
+// A joint may be called finger.1.
+TEST(Configuration, EveryNameOfAMappingIsReadWhole) {
+  const auto c = Configuration::parse(
+      "robot:\n  fixed: {finger.1: 1, finger: 2, 1: 3, a..b: 4, .x.: 5, '': 6}\n  folders: {left.eye: {state.o: 7}}\n");
+  const auto robot = c.section("robot");
+  const auto fixed = robot.section("fixed");
+  EXPECT_THAT(fixed.keys(), ElementsAre("finger.1", "finger", "1", "a..b", ".x.", ""));
+  double expected = 1.0;
+  for (const auto& name : fixed.keys()) EXPECT_EQ(fixed.number(name), expected++) << name;
+  EXPECT_EQ(robot.section("folders").section("left.eye").number("state.o"), 7.0);
+  EXPECT_EQ(fixed.number_or("thumb.1", 8.0), 8.0);
+  EXPECT_THAT(c.print(), HasSubstr("thumb.1: 8"));
+  EXPECT_NO_THROW(c.reject_unknown_keys());
+  EXPECT_THAT(error_of([&] { (void)fixed.number("finger.2"); }), HasSubstr("'robot.fixed.finger.2' is missing"));
+}
+
+TEST_F(ConfigurationFiles, AnOverrideMeansTheLongestNameThatIsThere) {
+  const auto file = write("a.yaml", "fixed: {finger.1: 1, finger.1.tip: 2, finger: {1: 3}}\n");
+  const auto fixed =
+      Configuration::load(file, {"fixed.finger.1=4", "fixed.finger.1.tip=5", "fixed.thumb.1=6"}).section("fixed");
+  EXPECT_EQ(fixed.number("finger.1"), 4.0);
+  EXPECT_EQ(fixed.number("finger.1.tip"), 5.0);
+  EXPECT_EQ(fixed.section("finger").number("1"), 3.0);
+  EXPECT_EQ(fixed.section("thumb").number("1"), 6.0);
+}
+
+TEST_F(ConfigurationFiles, AKeysPlaceIsItsFileAndLine) {
+  write("robot.yaml", "robot:\n  hand: a\n");
+  const auto file = write("top.yaml", "include: robot.yaml\n");
+  const auto robot = Configuration::load(file, {"robot.head=b"}).section("robot");
+  EXPECT_EQ(robot.place("hand"), (directory_ / "robot.yaml").string() + ":2: key 'robot.hand'");
+  EXPECT_EQ(robot.place("head"), "--set robot.head=b: key 'robot.head'");
+  EXPECT_EQ(robot.place("none"), file.string() + ": key 'robot.none'");
 }
 
 TEST(Configuration, AnotherVersionIsRefused) {
