@@ -133,7 +133,8 @@ TEST_F(StarterConfiguration, JointsThatSlideAreGivenInMetresAndNotEstimated) {
 }
 
 TEST_F(StarterConfiguration, NamesOfAnyLettersComeBackAsTheyAre) {
-  const std::vector<std::string> names = {"lift's joint", "say \"a\": [b] # c", "back\\slash", "two\nlines"};
+  const std::vector<std::string> names = {"lift's joint", "say \"a\": [b] # c", "back\\slash", "two\nlines", "arm.5"};
+  const std::string finger = "finger.1";
   auto o = options();
   std::ifstream in(o.urdf);
   std::string text((std::istreambuf_iterator<char>(in)), {});
@@ -153,6 +154,13 @@ TEST_F(StarterConfiguration, NamesOfAnyLettersComeBackAsTheyAre) {
       text.replace(at, from.size(), "\"" + written(names[i]) + "\"");
     }
   }
+  const std::string fixed = "<joint name=\"left_finger_joint\" type=\"fixed\">";
+  const auto at = text.find(fixed);
+  ASSERT_NE(at, std::string::npos);
+  text.replace(at, fixed.size(),
+               "<joint name=\"" + finger +
+                   "\" type=\"revolute\"><limit lower=\"0\" upper=\"1\" effort=\"9\" "
+                   "velocity=\"1\"/>");
   fs::copy(o.urdf.parent_path(), folder_ / "arm", fs::copy_options::recursive);
   o.urdf = folder_ / "arm/it's.urdf";
   std::ofstream(o.urdf) << text;
@@ -160,6 +168,7 @@ TEST_F(StarterConfiguration, NamesOfAnyLettersComeBackAsTheyAre) {
   const auto setup = RobotSetup::from(Configuration::load(o.out / "robot.yaml").section("robot"));
   ASSERT_EQ(setup.estimated_joints.size(), 7u);
   for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ(setup.estimated_joints[i], names[i]);
+  EXPECT_THAT(setup.fixed_joints_rad, testing::Contains(testing::Key(finger)));
 }
 
 TEST_F(StarterConfiguration, ReplacesNothing) {
