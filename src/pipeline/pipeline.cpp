@@ -66,13 +66,13 @@ std::vector<std::string> links_of(const StereoRig& rig) {
 }
 
 /// The robot, with every camera on one of its links.
-std::shared_ptr<const RobotModel> load(const RobotSetup& setup, const StereoRig& rig) {
+std::shared_ptr<const RobotModel> load(const RobotSetup& setup, const Configuration& cameras) {
   auto robot = setup.load();
-  for (const auto& camera : rig.cameras) {
+  for (const auto& camera : StereoRig::from(cameras).cameras) {
     if (robot->has_link(camera.link)) continue;
-    throw ConfigurationError(fmt::format("cameras.{}.link: '{}' is not a link of robot '{}'; did you mean '{}'?",
-                                         camera.name, camera.link, robot->name(),
-                                         nearest_name(camera.link, robot->link_names())));
+    cameras.section(camera.name)
+        .fail("link", fmt::format("a link of robot '{}'; did you mean '{}'?", robot->name(),
+                                  nearest_name(camera.link, robot->link_names())));
   }
   return robot;
 }
@@ -88,7 +88,7 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
     : setup_(RobotSetup::from(configuration.section("robot"))),
       vision_(by(method, VisionSetup::from(configuration.section("vision")))),
       bus_(BusOptions::from(configuration.section("bus"))), options_(EstimatorOptions::from(configuration)),
-      robot_(load(setup_, StereoRig::from(configuration.section("cameras")))),
+      robot_(load(setup_, configuration.section("cameras"))),
       error_model_(load_error_model(setup_, robot_, StereoRig::from(configuration.section("cameras")))),
       rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
       background_watch_(robot_, links_of(rig_)), background_turned_rad_(rig_.cameras.size(), 0.0),
@@ -97,6 +97,10 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
   for (const auto& camera : rig_.cameras) {
+    if (vision_.method == SegmentationMethod::kBackgroundPicture &&
+        !vision_.background_pictures.contains(camera.name)) {
+      configuration.section("vision").section("background_pictures").fail(camera.name, "a file for each camera");
+    }
     eyes_.push_back({Segmenter(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height),
                      camera.has_distortion() ? std::optional<Undistorter>(camera) : std::nullopt});
   }

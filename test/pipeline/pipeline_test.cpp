@@ -1,18 +1,24 @@
 #include "bodyschema/pipeline/pipeline.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <stdexcept>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/simulator/simulator.hpp"
 
 namespace bodyschema {
 namespace {
 
-Configuration configuration(const std::string& method) {
+using ::testing::HasSubstr;
+
+Configuration configuration(const std::string& method, std::vector<std::string> overrides = {}) {
+  overrides.insert(overrides.end(), {"vision.method=" + method, "filter.particles=50", "silhouette.engine=contour"});
   return Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml",
-                             {"vision.method=" + method, "filter.particles=50", "silhouette.engine=contour"});
+                             overrides);
 }
 
 /// A learned background, then a short reach.
@@ -77,6 +83,37 @@ TEST_F(PipelineLooksAhead, AndComplainsOfAPictureAtItsOwnTurn) {
   EXPECT_NO_THROW(pipeline.process(seen[0], &seen[1]));
   EXPECT_THROW(pipeline.process(seen[1], &seen[2]), DataError);
   EXPECT_NO_THROW(pipeline.process(seen[2]));
+}
+
+class PipelineWithAGivenBackground : public testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::create_directories(folder_); }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  [[nodiscard]] std::string file() const { return (folder_ / "room.png").string(); }
+  [[nodiscard]] Configuration with_picture(std::vector<std::string> overrides = {}) const {
+    overrides.insert(overrides.end(),
+                     {"vision.background_pictures.left=" + file(), "vision.background_pictures.right=" + file()});
+    return configuration("background_picture", overrides);
+  }
+  static Image checkerboard(std::uint8_t dark, std::uint8_t bright) {
+    Image image(320, 240, 3);
+    for (int v = 0; v < 240; ++v) {
+      for (int u = 0; u < 320; ++u) {
+        const std::uint8_t level = (u / 16 + v / 16) % 2 == 0 ? dark : bright;
+        std::fill_n(image.pixel(u, v), 3, level);
+      }
+    }
+    return image;
+  }
+  std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / ("bodyschema_pipeline_" + std::to_string(getpid()));
+};
+
+TEST_F(PipelineWithAGivenBackground, MissesTheOneOfACameraByItsKey) {
+  write_png(file(), checkerboard(40, 200));
+  EXPECT_THAT([&] { Pipeline(configuration("background_picture", {"vision.background_pictures.left=" + file()})); },
+              testing::ThrowsMessage<ConfigurationError>(
+                  HasSubstr("key 'vision.background_pictures.right' is missing; expected a file for each camera")));
 }
 
 }  // namespace
