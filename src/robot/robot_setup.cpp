@@ -79,12 +79,12 @@ std::shared_ptr<const RobotModel> RobotSetup::load() const {
   const auto slides = [&](const std::string& name) {
     return robot->joints()[static_cast<std::size_t>(robot->joint_index(name))].slides;
   };
-  for (const auto& name : estimated_joints) {
-    const std::string at = place("estimated_joints");
+  const auto need_turning = [&](const std::string& at, const std::string& name) {
     need_joint(at, name);
     if (slides(name)) throw ConfigurationError(at + ": '" + name + "' slides; expected joints that turn");
-  }
-  for (const auto& name : head_joints) need_joint(place("head_joints"), name);
+  };
+  for (const auto& name : estimated_joints) need_turning(place("estimated_joints"), name);
+  for (const auto& name : head_joints) need_turning(place("head_joints"), name);
   const auto need_fixed = [&](const std::string& at, const std::string& name, bool sliding, const char* instead) {
     need_joint(at, name);
     if (slides(name) == sliding) return;

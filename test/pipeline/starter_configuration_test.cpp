@@ -132,6 +132,26 @@ TEST_F(StarterConfiguration, JointsThatSlideAreGivenInMetresAndNotEstimated) {
   EXPECT_THAT(pipeline.setup().estimated_joints, testing::Not(testing::Contains("joint1")));
 }
 
+TEST_F(StarterConfiguration, AHeadThatSlidesIsLeftOutOfItsJoints) {
+  auto o = options();
+  std::stringstream text;
+  text << std::ifstream(kSource / "meshes/icub_right/icub_right.urdf").rdbuf();
+  std::string urdf = text.str();
+  const std::string turns = "<joint name=\"neck_yaw\" type=\"revolute\">";
+  const auto at = urdf.find(turns);
+  ASSERT_NE(at, std::string::npos);
+  urdf.replace(at, turns.size(), "<joint name=\"neck_yaw\" type=\"prismatic\">");
+  fs::copy(kSource / "meshes/icub_right", folder_ / "sliding", fs::copy_options::recursive);
+  o.urdf = folder_ / "sliding/icub_right.urdf";
+  std::ofstream(o.urdf) << urdf;
+  o.hand_link = "r_hand";
+  o.camera_links = {"l_eye_optical", "r_eye_optical"};
+  EXPECT_THAT(write_starter_configuration(o), HasSubstr("robot and meshes load"));
+  const auto setup = RobotSetup::from(Configuration::load(o.out / "robot.yaml").section("robot"));
+  EXPECT_THAT(setup.head_joints,
+              testing::UnorderedElementsAre("neck_pitch", "neck_roll", "eyes_tilt", "l_eye_pan", "r_eye_pan"));
+}
+
 TEST_F(StarterConfiguration, NamesOfAnyLettersComeBackAsTheyAre) {
   const std::vector<std::string> names = {"lift's joint", "say \"a\": [b] # c", "back\\slash", "two\nlines", "arm.5"};
   const std::string finger = "finger.1";

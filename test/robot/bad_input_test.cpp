@@ -502,6 +502,9 @@ TEST(RobotSetupErrors, JointsThatSlideAreFixedInMetresAndNeverEstimated) {
   auto estimated = setup;
   estimated.estimated_joints = {"turn", "lift"};
   refused(estimated, "robot.estimated_joints: 'lift' slides");
+  auto head = setup;
+  head.head_joints = {"lift"};
+  refused(head, "robot.head_joints: 'lift' slides; expected joints that turn");
 }
 
 TEST(RobotSetupErrors, ValuesAreChecked) {

@@ -19,8 +19,8 @@ struct RobotSetup {
   FaceCulling culling = FaceCulling::kNone;
   std::string hand_link;                      ///< frame P, whose pose is reported
   std::vector<std::string> fingertip_links;   ///< may be empty
-  std::vector<std::string> estimated_joints;  ///< the arm joints whose offsets are estimated
-  std::vector<std::string> head_joints;       ///< between root and cameras
+  std::vector<std::string> estimated_joints;  ///< the arm joints whose offsets are estimated; they turn
+  std::vector<std::string> head_joints;       ///< between root and cameras; they turn
   /// Values of joints the robot does not publish: rad, of sliding ones m.
   std::map<std::string, double> fixed_joints_rad, fixed_joints_m;
   Eigen::Vector3d gravity_W = {0, 0, -9.81};  ///< m/s^2 in the root frame
