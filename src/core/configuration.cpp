@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -22,6 +23,10 @@ namespace fs = std::filesystem;
 constexpr std::uintmax_t kMaxFileBytes = 1 << 20;
 constexpr std::size_t kMaxEntries = 20000;  // bounds documents that multiply themselves by aliases
 constexpr int kMaxDepth = 32;
+
+/// Those of all programs; a file may hold them beside its version.
+constexpr std::array kSections = {"robot",  "cameras",    "vision",    "bus",        "estimator",
+                                  "filter", "silhouette", "simulator", "yarp_import"};
 
 }  // namespace
 
@@ -617,6 +622,15 @@ void Configuration::reject_unknown_keys() const {
   const Entry* mapping = document_->find(section_);
   if (mapping != nullptr && mapping->mapping) {
     reject_unknown(*mapping, section_.empty() ? "" : dotted(section_) + ".");
+  }
+}
+
+void Configuration::reject_unknown_sections() const {
+  const std::vector<std::string> valid(kSections.begin(), kSections.end());
+  for (const auto& [name, child] : document_->root.children) {
+    if (name == "version" || std::find(valid.begin(), valid.end(), name) != valid.end()) continue;
+    throw ConfigurationError(where(child) + ": unknown key '" + name + "'; did you mean '" + nearest_name(name, valid) +
+                             "'?");
   }
 }
 

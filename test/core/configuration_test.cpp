@@ -121,6 +121,23 @@ TEST_F(ConfigurationFiles, AKeysPlaceIsItsFileAndLine) {
   EXPECT_EQ(robot.place("none"), file.string() + ": key 'robot.none'");
 }
 
+TEST(Configuration, SectionsThatNoProgramReadsAreRefusedByName) {
+  EXPECT_NO_THROW(Configuration::parse("version: 1\nrobot: {a: 1}\nsimulator: {b: 2}\n").reject_unknown_sections());
+  EXPECT_THAT(error_of([] { Configuration::parse("robot: {}\nbuss: {x: 1}\n").reject_unknown_sections(); }),
+              HasSubstr("configuration.yaml:2: unknown key 'buss'; did you mean 'bus'?"));
+}
+
+TEST(Configuration, OfEveryShippedFileTheSectionsAreKnown) {
+  int files = 0;
+  const auto folder = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config";
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.path().extension() != ".yaml") continue;
+    ++files;
+    EXPECT_NO_THROW(Configuration::load(entry.path()).reject_unknown_sections()) << entry.path();
+  }
+  EXPECT_GT(files, 10);
+}
+
 TEST(Configuration, AnotherVersionIsRefused) {
   EXPECT_NO_THROW(Configuration::parse("version: 1\n").reject_unknown_keys());
   EXPECT_THAT(error_of([] { Configuration::parse("version: 2\n"); }),

@@ -71,6 +71,9 @@ class Configuration {
   /// Throws for the first key of this mapping, and of those below it, that no getter asked for, e.g.
   /// "config/a.yaml:12: unknown key 'filter.particle'; did you mean 'filter.particles'?".
   void reject_unknown_keys() const;
+  /// For programs that read some sections only: throws for the first key at the top of the document that is
+  /// no section of any program, e.g. "--set buss.channel_prefix=LAB: unknown key 'buss'; did you mean 'bus'?".
+  void reject_unknown_sections() const;
   /// The whole document with includes, overrides and defaults in force, as YAML.
   [[nodiscard]] std::string print() const;
   /// A short hexadecimal digest of print(), published so that a result names its configuration.
