@@ -520,7 +520,7 @@ bool Configuration::boolean(const std::string& key) const {
 std::string Configuration::text(const std::string& key) const {
   const Entry* entry = document_->find(below(section_, key));
   if (entry == nullptr || entry->mapping || !entry->leaf.IsScalar()) fail(key, "a text");
-  return substitute_environment(entry->leaf.Scalar(), where(*entry));
+  return substitute_environment(entry->leaf.Scalar(), place(key));
 }
 
 std::string Configuration::choice(const std::string& key, const std::vector<std::string>& choices) const {
@@ -554,7 +554,7 @@ std::vector<std::string> Configuration::texts(const std::string& key) const {
   std::vector<std::string> values;
   for (const auto& item : entry->leaf) {
     if (!item.IsScalar()) fail(key, "a list of texts");
-    values.push_back(substitute_environment(item.Scalar(), where(*entry)));
+    values.push_back(substitute_environment(item.Scalar(), place(key)));
   }
   return values;
 }
