@@ -101,8 +101,11 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
         !vision_.background_pictures.contains(camera.name)) {
       configuration.section("vision").section("background_pictures").fail(camera.name, "a file for each camera");
     }
-    eyes_.push_back({Segmenter(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height),
-                     camera.has_distortion() ? std::optional<Undistorter>(camera) : std::nullopt});
+    std::optional<Undistorter> undistorter;
+    if (camera.has_distortion()) undistorter.emplace(camera);
+    Segmenter segmenter(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height);
+    BinaryMask seen = undistorter ? undistorter->valid() : BinaryMask();
+    eyes_.push_back({std::move(segmenter), std::move(undistorter), std::move(seen)});
   }
   changes_.resize(eyes_.size());
 }
@@ -160,6 +163,19 @@ bool Pipeline::frozen(const PictureChange& change) {
   return change.repeated && change.moved_rad > kFrozenMotion_rad;
 }
 
+void Pipeline::Look::leave_out_all_but(const BinaryMask& seen) {
+  std::size_t i = 0;
+  for (int v = 0; v < seen.height(); ++v) {
+    for (int w = 0; w < seen.words_per_row(); ++w) {
+      valid.row(v)[w] &= seen.row(v)[w];
+      mask.row(v)[w] &= seen.row(v)[w];
+    }
+    for (int u = 0; u < seen.width(); ++u, ++i) {
+      if (!seen.at(u, v)) coverage[i] = 0;
+    }
+  }
+}
+
 /// All that can be done before the estimate of the observation before is known; asks nothing of the
 /// estimator but for `statistics`.
 Pipeline::Looks Pipeline::look(const Observation& observation) {
@@ -178,6 +194,7 @@ Pipeline::Looks Pipeline::look(const Observation& observation) {
     }
     eye.segmenter.segment(look.straightened ? *look.straightened : seen.image, look.mask, look.valid, look.coverage,
                           predicted ? &*predicted : nullptr);
+    if (!eye.seen.empty()) look.leave_out_all_but(eye.seen);
     look.learning = !eye.segmenter.ready();
   }
   return looks;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <random>
 #include <stdexcept>
 
 #include "bodyschema/core/error.hpp"
@@ -84,6 +85,70 @@ TEST_F(PipelineLooksAhead, AndComplainsOfAPictureAtItsOwnTurn) {
   EXPECT_THROW(pipeline.process(seen[1], &seen[2]), DataError);
   EXPECT_NO_THROW(pipeline.process(seen[2]));
 }
+
+/// Both cameras see this; the joints rest.
+Observation observation_of(const Pipeline& pipeline, const Image& image, Microseconds utime) {
+  CameraObservation seen;
+  seen.utime = utime;
+  seen.joints = {utime, pipeline.setup().default_joints(pipeline.robot()),
+                 Eigen::VectorXd::Zero(pipeline.robot().joint_count())};
+  seen.image = image;
+  return {utime, {seen, seen}};
+}
+
+std::vector<std::string> lens(const std::string& k1) {
+  return {"cameras.left.distortion=[" + k1 + ", 0, 0, 0, 0]", "cameras.right.distortion=[" + k1 + ", 0, 0, 0, 0]"};
+}
+
+/// With noise of two levels.
+Image grey_room(std::mt19937& random) {
+  Image image(320, 240, 3);
+  std::normal_distribution<double> level(120.0, 2.0);
+  for (auto& byte : image.data) byte = static_cast<std::uint8_t>(std::lround(level(random)));
+  return image;
+}
+
+class PipelineWithALens : public testing::TestWithParam<const char*> {};
+
+/// A pincushion: what is straight fills the picture's corners from beyond its border.
+TEST_P(PipelineWithALens, JudgesNothingThatTheLensNeverSaw) {
+  auto overrides = lens("0.3");
+  overrides.push_back("vision.learning_frames=6");
+  Pipeline pipeline(configuration(GetParam(), overrides));
+  const BinaryMask seen = Undistorter(pipeline.rig().cameras[0]).valid();
+  ASSERT_FALSE(seen.at(0, 0));
+  std::mt19937 random(3);
+  Microseconds utime = 0;
+  const auto look_at = [&](const Image& image) {
+    Observation observation = observation_of(pipeline, image, utime += 33'000);
+    pipeline.segment(observation);
+    return *observation.cameras[0];
+  };
+  CameraObservation room;
+  for (int i = 0; i < 8; ++i) room = look_at(grey_room(random));
+  EXPECT_EQ(room.mask.count(), 0u);
+  EXPECT_EQ(room.valid, seen);
+  // An arm that reaches in from the left border.
+  Image image = grey_room(random);
+  for (int v = 100; v < 140; ++v) std::fill(image.pixel(0, v), image.pixel(120, v), std::uint8_t{220});
+  const auto arm = look_at(image);
+  std::size_t covered = 0;
+  for (int v = 0; v < 240; ++v) {
+    for (int u = 0; u < 320; ++u) {
+      const auto coverage = arm.coverage[static_cast<std::size_t>(v * 320 + u)];
+      covered += coverage > 0;
+      if (seen.at(u, v)) continue;
+      ASSERT_FALSE(arm.valid.at(u, v) || arm.mask.at(u, v) || coverage > 0) << u << ", " << v;
+    }
+  }
+  EXPECT_GT(arm.mask.count(), 3000u);
+  EXPECT_GT(covered, 3000u);
+  int u = 0;
+  while (!seen.at(u, 120)) ++u;
+  EXPECT_TRUE(arm.mask.at(u, 120)) << "no outline along the border of what was seen";
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, PipelineWithALens, testing::Values("learned_background", "single_colour"));
 
 class PipelineWithAGivenBackground : public testing::Test {
  protected:

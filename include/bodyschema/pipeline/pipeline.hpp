@@ -88,6 +88,7 @@ class Pipeline {
   struct Eye {
     Segmenter segmenter;
     std::optional<Undistorter> undistorter;
+    BinaryMask seen;  ///< by the lens, in a straightened picture; empty: all of it
     FrozenPicture picture{};
   };
   /// What was found in one camera's picture.
@@ -97,6 +98,8 @@ class Pipeline {
     BinaryMask mask, valid;
     std::vector<std::uint8_t> coverage;
     bool learning = false;
+    /// What the lens never saw is neither robot nor background.
+    void leave_out_all_but(const BinaryMask& seen);
   };
   /// One per camera; absent where the camera saw nothing.
   struct Looks {
