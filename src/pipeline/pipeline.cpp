@@ -103,7 +103,8 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
     }
     std::optional<Undistorter> undistorter;
     if (camera.has_distortion()) undistorter.emplace(camera);
-    Segmenter segmenter(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height);
+    Segmenter segmenter(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height,
+                        undistorter ? &*undistorter : nullptr);
     BinaryMask seen = undistorter ? undistorter->valid() : BinaryMask();
     eyes_.push_back({std::move(segmenter), std::move(undistorter), std::move(seen)});
   }

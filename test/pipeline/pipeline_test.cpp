@@ -174,6 +174,18 @@ class PipelineWithAGivenBackground : public testing::Test {
       std::filesystem::temp_directory_path() / ("bodyschema_pipeline_" + std::to_string(getpid()));
 };
 
+TEST_F(PipelineWithAGivenBackground, StraightensItAsTheCamerasPictures) {
+  const Image room = checkerboard(40, 200);
+  write_png(file(), room);
+  for (const char* k1 : {"-0.3", "0.3"}) {
+    Pipeline pipeline(with_picture(lens(k1)));
+    Observation observation = observation_of(pipeline, room, 33'000);
+    pipeline.segment(observation);
+    EXPECT_EQ(observation.cameras[0]->mask.count(), 0u) << k1;
+    EXPECT_EQ(observation.cameras[0]->valid, Undistorter(pipeline.rig().cameras[0]).valid()) << k1;
+  }
+}
+
 TEST_F(PipelineWithAGivenBackground, MissesTheOneOfACameraByItsKey) {
   write_png(file(), checkerboard(40, 200));
   EXPECT_THAT([&] { Pipeline(configuration("background_picture", {"vision.background_pictures.left=" + file()})); },
