@@ -124,6 +124,7 @@ ObservationStream Pipeline::make_stream() const {
 
 void Pipeline::take_background_from(Pipeline& other) {
   if (!(vision_ == other.vision_) || rig_.cameras.size() != other.rig_.cameras.size()) return;
+  const bool given = vision_.method == SegmentationMethod::kBackgroundPicture;
   for (std::size_t c = 0; c < eyes_.size(); ++c) {
     const CameraModel& now = rig_.cameras[c];
     const CameraModel& before = other.rig_.cameras[c];
@@ -131,6 +132,8 @@ void Pipeline::take_background_from(Pipeline& other) {
         now.distortion != before.distortion) {
       return;
     }
+    // The file of the same name may hold another picture by now.
+    if (given && eyes_[c].segmenter.background().mean != other.eyes_[c].segmenter.background().mean) return;
   }
   for (std::size_t c = 0; c < eyes_.size(); ++c) eyes_[c].segmenter = std::move(other.eyes_[c].segmenter);
   background_watch_.take_from(other.background_watch_);

@@ -186,6 +186,21 @@ TEST_F(PipelineWithAGivenBackground, StraightensItAsTheCamerasPictures) {
   }
 }
 
+TEST_F(PipelineWithAGivenBackground, TakesItFromTheFileAndNotFromThePipelineBefore) {
+  write_png(file(), checkerboard(40, 200));
+  Pipeline before(with_picture());
+  Observation first = observation_of(before, checkerboard(40, 200), 33'000);
+  before.segment(first);
+  ASSERT_EQ(first.cameras[0]->mask.count(), 0u);
+  const Image now = checkerboard(90, 140);
+  write_png(file(), now);
+  Pipeline after(with_picture());
+  after.take_background_from(before);
+  Observation second = observation_of(after, now, 66'000);
+  after.segment(second);
+  EXPECT_EQ(second.cameras[0]->mask.count(), 0u);
+}
+
 TEST_F(PipelineWithAGivenBackground, MissesTheOneOfACameraByItsKey) {
   write_png(file(), checkerboard(40, 200));
   EXPECT_THAT([&] { Pipeline(configuration("background_picture", {"vision.background_pictures.left=" + file()})); },

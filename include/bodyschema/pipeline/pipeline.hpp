@@ -48,8 +48,8 @@ class Pipeline {
   void reset() { estimator_.reset(); }
 
   /// Takes over the background that the pipeline this one replaces has learned, where cameras and
-  /// vision settings are the same: a hand in view would be learned as background now. `other`
-  /// segments no more afterwards.
+  /// vision settings are the same: a hand in view would be learned as background now. Of a background that is
+  /// given, the picture read last counts. `other` segments no more afterwards.
   void take_background_from(Pipeline& other);
 
   /// Offline learning of the background, for methods that learn: every picture of a log, then
