@@ -15,10 +15,6 @@
 namespace bodyschema {
 namespace {
 
-/// A picture that does not change while a joint moves this far was not taken anew; beyond the noise
-/// and rounding of encoders.
-constexpr double kFrozenMotion_rad = 0.005;
-
 /// FNV-1a, 64 bit: names a model, protects nothing.
 class Digest {
  public:

@@ -208,5 +208,20 @@ TEST_F(PipelineWithAGivenBackground, MissesTheOneOfACameraByItsKey) {
                   HasSubstr("key 'vision.background_pictures.right' is missing; expected a file for each camera")));
 }
 
+TEST(Pipeline, LeavesOutAPictureThatStaysTheSameWhileTheArmMoves) {
+  Pipeline pipeline(configuration("single_colour"));
+  std::mt19937 random(4);
+  const Image image = grey_room(random);
+  const auto with_mask = [&](Microseconds utime, double moved_rad) {
+    Observation observation = observation_of(pipeline, image, utime);
+    for (auto& seen : observation.cameras) seen->joints.q[0] += moved_rad;
+    pipeline.segment(observation);
+    return !observation.cameras[0]->mask.empty();
+  };
+  EXPECT_TRUE(with_mask(33'000, 0.0));
+  EXPECT_TRUE(with_mask(66'000, 0.9 * kFrozenMotion_rad));
+  EXPECT_FALSE(with_mask(99'000, 1.1 * kFrozenMotion_rad));
+}
+
 }  // namespace
 }  // namespace bodyschema
