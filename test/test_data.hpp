@@ -7,11 +7,11 @@
 namespace bodyschema {
 
 /// Folder of the public recording and of the official models, which are no part of this project:
-/// BODYSCHEMA_DATA, or where a checkout beside it would be.
+/// BODYSCHEMA_DATA, to which the configurations of these robots refer; set to where a checkout beside this one would be
+/// where it is not.
 inline std::filesystem::path data_folder() {
-  const char* given = std::getenv("BODYSCHEMA_DATA");
-  return given != nullptr ? std::filesystem::path(given)
-                          : std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "../shared/data";
+  setenv("BODYSCHEMA_DATA", (std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "../shared/data").c_str(), 0);
+  return std::getenv("BODYSCHEMA_DATA");
 }
 
 /// Why a test that needs this part of the data is skipped; empty where it is there.

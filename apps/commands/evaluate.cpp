@@ -48,11 +48,8 @@ void add_evaluate(CLI::App& app) {
     }
     a->options.out = a->out;
     a->options.overrides = a->common.choices();
-    const char* data = std::getenv("BODYSCHEMA_DATA");
-    if (data != nullptr) a->options.data = data;
-    const auto recorded = find_data_file("config");
-    if (a->options.data.empty()) a->options.data = recorded / "../../shared/data";
-    std::fputs(evaluate(configuration, recorded, a->options).c_str(), stdout);
+    if (const char* data = std::getenv("BODYSCHEMA_DATA")) a->options.data = data;
+    std::fputs(evaluate(configuration, data_directory() / "config", a->options).c_str(), stdout);
     std::printf("\nresults in %s/summary.json and report.html\n", a->out.c_str());
   });
 }

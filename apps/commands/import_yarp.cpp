@@ -35,7 +35,8 @@ void add_import_yarp(CLI::App& app) {
   command->callback([a] {
     set_up_logging(a->log_level);
     const Configuration configuration = Configuration::load(find_data_file(a->config), a->overrides);
-    // The other sections of the file are checked by the programs that use them.
+    // What the other sections of the file hold is checked by the programs that use them.
+    configuration.reject_unknown_sections();
     const Configuration bus_section = configuration.section("bus");
     const BusOptions bus = BusOptions::from(bus_section);
     bus_section.reject_unknown_keys();

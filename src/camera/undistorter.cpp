@@ -31,7 +31,7 @@ Image Undistorter::apply(const Image& image) const {
   cv::Mat target(image.height, image.width, CV_8UC(image.channels), straight.data.data());
   const cv::Mat x(k.height, k.width, CV_32FC1, const_cast<float*>(map_x_.data()));
   const cv::Mat y(k.height, k.width, CV_32FC1, const_cast<float*>(map_y_.data()));
-  cv::remap(source, target, x, y, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+  cv::remap(source, target, x, y, cv::INTER_LINEAR, cv::BORDER_REFLECT_101);
   return straight;
 }
 

@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -22,6 +23,10 @@ namespace fs = std::filesystem;
 constexpr std::uintmax_t kMaxFileBytes = 1 << 20;
 constexpr std::size_t kMaxEntries = 20000;  // bounds documents that multiply themselves by aliases
 constexpr int kMaxDepth = 32;
+
+/// Those of all programs; a file may hold them beside its version.
+constexpr std::array kSections = {"robot",  "cameras",    "vision",    "bus",        "estimator",
+                                  "filter", "silhouette", "simulator", "yarp_import"};
 
 }  // namespace
 
@@ -322,20 +327,45 @@ YAML::Node list_node(const Items& items, Convert convert) {
   return node;
 }
 
+std::string dotted(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += text.empty() ? name : "." + name;
+  return text;
+}
+
+std::vector<std::string> below(std::vector<std::string> names, const std::string& key) {
+  names.push_back(key);
+  return names;
+}
+
+/// The names in a dotted key of the command line. A joint's name may hold dots itself: of what is there already the
+/// longest name is meant.
+std::vector<std::string> names_in(const std::string& key, Entry& root) {
+  std::vector<std::string> names;
+  Entry* entry = &root;
+  for (std::size_t begin = 0; begin <= key.size();) {
+    std::size_t end = std::min(key.find('.', begin), key.size());
+    for (std::size_t far = key.size(); entry != nullptr && far > end; far = key.rfind('.', far - 1)) {
+      if (entry->find(key.substr(begin, far - begin)) != nullptr) end = far;
+    }
+    names.push_back(key.substr(begin, end - begin));
+    if (entry != nullptr) entry = entry->find(names.back());
+    begin = end + 1;
+  }
+  return names;
+}
+
 }  // namespace
 
 struct Configuration::Document {
   Entry root;
 
-  /// The entry at a dotted path; marks every mapping on the way as known. Null when absent.
-  Entry* find(const std::string& prefix, const std::string& key) {
+  /// Marks every mapping on the way as known. Null when absent.
+  Entry* find(const std::vector<std::string>& names) {
     Entry* entry = &root;
-    std::string path = prefix.empty() ? key : (key.empty() ? prefix : prefix + "." + key);
-    std::stringstream stream(path);
-    std::string part;
-    while (std::getline(stream, part, '.')) {
+    for (const auto& name : names) {
       if (!entry->mapping) return nullptr;
-      entry = entry->find(part);
+      entry = entry->find(name);
       if (entry == nullptr) return nullptr;
       entry->known = true;
     }
@@ -343,14 +373,12 @@ struct Configuration::Document {
   }
 
   /// Records a default so that print() shows what is in force.
-  void remember(const std::string& prefix, const std::string& key, YAML::Node value) {
+  void remember(const std::vector<std::string>& section, const std::string& key, YAML::Node value) {
     Entry* entry = &root;
-    std::stringstream stream(prefix);
-    std::string part;
-    while (std::getline(stream, part, '.')) {
-      Entry* child = entry->find(part);
+    for (const auto& name : section) {
+      Entry* child = entry->find(name);
       if (child == nullptr) {
-        entry->children.push_back({part, Entry{}});
+        entry->children.push_back({name, Entry{}});
         child = &entry->children.back().entry;
       }
       if (!child->mapping) {
@@ -372,8 +400,8 @@ struct Configuration::Document {
   }
 };
 
-Configuration::Configuration(std::shared_ptr<Document> document, std::string prefix)
-    : document_(std::move(document)), prefix_(std::move(prefix)) {}
+Configuration::Configuration(std::shared_ptr<Document> document, std::vector<std::string> section)
+    : document_(std::move(document)), section_(std::move(section)) {}
 
 Configuration Configuration::load(const fs::path& file, const std::vector<std::string>& overrides) {
   Reader reader;
@@ -393,11 +421,8 @@ Configuration Configuration::load(const fs::path& file, const std::vector<std::s
     Entry top = reader.convert(value, fs::path(), 0);
     top.file = "--set " + assignment;
     top.line = 0;
-    std::vector<std::string> parts;
-    std::stringstream stream(assignment.substr(0, equals));
-    std::string part;
-    while (std::getline(stream, part, '.')) parts.push_back(part);
-    for (auto it = parts.rbegin(); it != parts.rend(); ++it) {
+    const std::vector<std::string> names = names_in(assignment.substr(0, equals), document->root);
+    for (auto it = names.rbegin(); it != names.rend(); ++it) {
       Entry parent;
       parent.mapping = true;
       parent.file = top.file;
@@ -406,7 +431,7 @@ Configuration Configuration::load(const fs::path& file, const std::vector<std::s
     }
     merge_into(document->root, std::move(top));
   }
-  Configuration configuration{document, ""};
+  Configuration configuration{document, {}};
   configuration.check_version();
   return configuration;
 }
@@ -415,7 +440,7 @@ Configuration Configuration::parse(std::string_view yaml, const fs::path& direct
   Reader reader;
   auto document = std::make_shared<Document>();
   document->root = reader.read_text(std::string(yaml), directory / "configuration.yaml");
-  Configuration configuration{document, ""};
+  Configuration configuration{document, {}};
   configuration.check_version();
   return configuration;
 }
@@ -425,21 +450,22 @@ void Configuration::check_version() const {
 }
 
 Configuration Configuration::section(const std::string& key) const {
-  if (const Entry* entry = document_->find(prefix_, key)) {
+  auto names = below(section_, key);
+  if (const Entry* entry = document_->find(names)) {
     const bool empty = !entry->mapping && (!entry->leaf.IsDefined() || entry->leaf.IsNull());
     if (!entry->mapping && !empty) fail(key, "a mapping of keys");
   }
-  return {document_, prefix_.empty() ? key : prefix_ + "." + key};
+  return {document_, std::move(names)};
 }
 
 bool Configuration::has(const std::string& key) const {
-  const Entry* entry = document_->find(prefix_, key);
+  const Entry* entry = document_->find(below(section_, key));
   return entry != nullptr && (entry->mapping || (entry->leaf.IsDefined() && !entry->leaf.IsNull()));
 }
 
 std::vector<std::string> Configuration::keys() const {
   std::vector<std::string> names;
-  if (Entry* entry = document_->find(prefix_, "")) {
+  if (Entry* entry = document_->find(section_)) {
     for (auto& [name, child] : entry->children) {
       child.known = true;
       names.push_back(name);
@@ -448,17 +474,20 @@ std::vector<std::string> Configuration::keys() const {
   return names;
 }
 
+std::string Configuration::place(const std::string& key) const {
+  const auto names = below(section_, key);
+  const Entry* entry = document_->find(names);
+  return where(entry != nullptr ? *entry : document_->root) + ": key '" + dotted(names) + "'";
+}
+
 void Configuration::fail(const std::string& key, const std::string& expected) const {
-  const Entry* entry = document_->find(prefix_, key);
-  const std::string dotted = prefix_.empty() ? key : (key.empty() ? prefix_ : prefix_ + "." + key);
-  if (entry == nullptr) {
-    throw ConfigurationError(where(document_->root) + ": key '" + dotted + "' is missing; expected " + expected);
-  }
-  throw ConfigurationError(where(*entry) + ": key '" + dotted + "' is " + shown(*entry) + "; expected " + expected);
+  const Entry* entry = document_->find(below(section_, key));
+  throw ConfigurationError(place(key) + " is " + (entry != nullptr ? shown(*entry) : "missing") + "; expected " +
+                           expected);
 }
 
 double Configuration::number(const std::string& key, double min, double max) const {
-  const Entry* entry = document_->find(prefix_, key);
+  const Entry* entry = document_->find(below(section_, key));
   if (entry != nullptr && !entry->mapping && entry->leaf.IsScalar()) {
     const auto value = parse_number(entry->leaf.Scalar());
     if (value && *value >= min && *value <= max) return *value;
@@ -467,7 +496,7 @@ double Configuration::number(const std::string& key, double min, double max) con
 }
 
 std::int64_t Configuration::integer(const std::string& key, std::int64_t min, std::int64_t max) const {
-  const Entry* entry = document_->find(prefix_, key);
+  const Entry* entry = document_->find(below(section_, key));
   if (entry != nullptr && !entry->mapping && entry->leaf.IsScalar()) {
     const std::string& text = entry->leaf.Scalar();
     std::int64_t value = 0;
@@ -480,7 +509,7 @@ std::int64_t Configuration::integer(const std::string& key, std::int64_t min, st
 }
 
 bool Configuration::boolean(const std::string& key) const {
-  const Entry* entry = document_->find(prefix_, key);
+  const Entry* entry = document_->find(below(section_, key));
   if (entry != nullptr && !entry->mapping && entry->leaf.IsScalar()) {
     bool value = false;
     if (YAML::convert<bool>::decode(entry->leaf, value)) return value;
@@ -489,13 +518,13 @@ bool Configuration::boolean(const std::string& key) const {
 }
 
 std::string Configuration::text(const std::string& key) const {
-  const Entry* entry = document_->find(prefix_, key);
+  const Entry* entry = document_->find(below(section_, key));
   if (entry == nullptr || entry->mapping || !entry->leaf.IsScalar()) fail(key, "a text");
-  return substitute_environment(entry->leaf.Scalar(), where(*entry));
+  return substitute_environment(entry->leaf.Scalar(), place(key));
 }
 
 std::string Configuration::choice(const std::string& key, const std::vector<std::string>& choices) const {
-  const Entry* entry = document_->find(prefix_, key);
+  const Entry* entry = document_->find(below(section_, key));
   if (entry != nullptr && !entry->mapping && entry->leaf.IsScalar()) {
     const std::string value = entry->leaf.Scalar();
     if (std::find(choices.begin(), choices.end(), value) != choices.end()) return value;
@@ -508,7 +537,7 @@ std::string Configuration::choice(const std::string& key, const std::vector<std:
 }
 
 std::vector<double> Configuration::numbers(const std::string& key) const {
-  const Entry* entry = document_->find(prefix_, key);
+  const Entry* entry = document_->find(below(section_, key));
   if (entry == nullptr || entry->mapping || !entry->leaf.IsSequence()) fail(key, "a list of numbers");
   std::vector<double> values;
   for (const auto& item : entry->leaf) {
@@ -520,12 +549,12 @@ std::vector<double> Configuration::numbers(const std::string& key) const {
 }
 
 std::vector<std::string> Configuration::texts(const std::string& key) const {
-  const Entry* entry = document_->find(prefix_, key);
+  const Entry* entry = document_->find(below(section_, key));
   if (entry == nullptr || entry->mapping || !entry->leaf.IsSequence()) fail(key, "a list of texts");
   std::vector<std::string> values;
   for (const auto& item : entry->leaf) {
     if (!item.IsScalar()) fail(key, "a list of texts");
-    values.push_back(substitute_environment(item.Scalar(), where(*entry)));
+    values.push_back(substitute_environment(item.Scalar(), place(key)));
   }
   return values;
 }
@@ -533,7 +562,7 @@ std::vector<std::string> Configuration::texts(const std::string& key) const {
 fs::path Configuration::path(const std::string& key) const {
   const fs::path value = text(key);
   if (value.is_absolute()) return value;
-  const Entry* entry = document_->find(prefix_, key);
+  const Entry* entry = document_->find(below(section_, key));
   const fs::path directory = entry->line > 0 ? entry->file.parent_path() : fs::path();
   return (directory / value).lexically_normal();
 }
@@ -541,7 +570,7 @@ fs::path Configuration::path(const std::string& key) const {
 std::vector<fs::path> Configuration::paths(const std::string& key) const {
   std::vector<fs::path> result;
   const std::vector<std::string> values = texts(key);
-  const Entry* entry = document_->find(prefix_, key);
+  const Entry* entry = document_->find(below(section_, key));
   const fs::path directory = entry->line > 0 ? entry->file.parent_path() : fs::path();
   for (const fs::path value : values) {
     result.push_back(value.is_absolute() ? value : (directory / value).lexically_normal());
@@ -550,49 +579,58 @@ std::vector<fs::path> Configuration::paths(const std::string& key) const {
 }
 
 double Configuration::number_or(const std::string& key, double fallback, double min, double max) const {
-  if (!has(key)) document_->remember(prefix_, key, number_node(fallback));
+  if (!has(key)) document_->remember(section_, key, number_node(fallback));
   return has(key) ? number(key, min, max) : fallback;
 }
 
 std::int64_t Configuration::integer_or(const std::string& key, std::int64_t fallback, std::int64_t min,
                                        std::int64_t max) const {
-  if (!has(key)) document_->remember(prefix_, key, YAML::Node(std::to_string(fallback)));
+  if (!has(key)) document_->remember(section_, key, YAML::Node(std::to_string(fallback)));
   return integer(key, min, max);
 }
 
 bool Configuration::boolean_or(const std::string& key, bool fallback) const {
-  if (!has(key)) document_->remember(prefix_, key, YAML::Node(fallback ? "true" : "false"));
+  if (!has(key)) document_->remember(section_, key, YAML::Node(fallback ? "true" : "false"));
   return boolean(key);
 }
 
 std::string Configuration::text_or(const std::string& key, const std::string& fallback) const {
-  if (!has(key)) document_->remember(prefix_, key, YAML::Node(fallback));
+  if (!has(key)) document_->remember(section_, key, YAML::Node(fallback));
   return text(key);
 }
 
 std::string Configuration::choice_or(const std::string& key, const std::string& fallback,
                                      const std::vector<std::string>& choices) const {
-  if (!has(key)) document_->remember(prefix_, key, YAML::Node(fallback));
+  if (!has(key)) document_->remember(section_, key, YAML::Node(fallback));
   return choice(key, choices);
 }
 
 std::vector<double> Configuration::numbers_or(const std::string& key, const std::vector<double>& fallback) const {
-  if (!has(key)) document_->remember(prefix_, key, list_node(fallback, number_node));
+  if (!has(key)) document_->remember(section_, key, list_node(fallback, number_node));
   return numbers(key);
 }
 
 std::vector<std::string> Configuration::texts_or(const std::string& key,
                                                  const std::vector<std::string>& fallback) const {
   if (!has(key)) {
-    document_->remember(prefix_, key, list_node(fallback, [](const std::string& s) { return YAML::Node(s); }));
+    document_->remember(section_, key, list_node(fallback, [](const std::string& s) { return YAML::Node(s); }));
   }
   return texts(key);
 }
 
 void Configuration::reject_unknown_keys() const {
-  const Entry* mapping = document_->find(prefix_, "");
+  const Entry* mapping = document_->find(section_);
   if (mapping != nullptr && mapping->mapping) {
-    reject_unknown(*mapping, prefix_.empty() ? "" : prefix_ + ".");
+    reject_unknown(*mapping, section_.empty() ? "" : dotted(section_) + ".");
+  }
+}
+
+void Configuration::reject_unknown_sections() const {
+  const std::vector<std::string> valid(kSections.begin(), kSections.end());
+  for (const auto& [name, child] : document_->root.children) {
+    if (name == "version" || std::find(valid.begin(), valid.end(), name) != valid.end()) continue;
+    throw ConfigurationError(where(child) + ": unknown key '" + name + "'; did you mean '" + nearest_name(name, valid) +
+                             "'?");
   }
 }
 

@@ -64,7 +64,8 @@ class LogDiagnosis {
         measurement_(pipeline_.shared_robot(), pipeline_.setup(), pipeline_.rig(), options.threads) {
     configuration.reject_unknown_keys();
     if (pipeline_.error_model()) {
-      throw ConfigurationError("robot.extended_model: '" + pipeline_.setup().extended_model.string() +
+      throw ConfigurationError(configuration.section("robot").place("extended_model") + ": '" +
+                               pipeline_.setup().extended_model.string() +
                                "': diagnose starts from the URDF as it is; leave it out "
                                "(--set robot.extended_model='')");
     }

@@ -79,6 +79,8 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
   auto setup = RobotSetup::from(configuration.section("robot"));
   const auto rig = StereoRig::from(configuration.section("cameras"));
   const auto bus = BusOptions::from(configuration.section("bus"));
+  configuration.reject_unknown_sections();
+  for (const char* read : {"robot", "cameras", "bus"}) configuration.section(read).reject_unknown_keys();
   const auto model = setup.load();
   Motion motion(model, setup, rig);
   diagnosis::JointStream joints(*model, setup, bus);

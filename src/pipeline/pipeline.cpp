@@ -14,10 +14,6 @@
 namespace bodyschema {
 namespace {
 
-/// A picture that does not change while a joint moves this far was not taken anew; beyond the noise
-/// and rounding of encoders.
-constexpr double kFrozenMotion_rad = 0.005;
-
 std::optional<ErrorModel> load_error_model(const RobotSetup& setup, const std::shared_ptr<const RobotModel>& robot,
                                            const StereoRig& rig) {
   if (setup.extended_model.empty()) return std::nullopt;
@@ -35,13 +31,13 @@ std::vector<std::string> links_of(const StereoRig& rig) {
 }
 
 /// The robot, with every camera on one of its links.
-std::shared_ptr<const RobotModel> load(const RobotSetup& setup, const StereoRig& rig) {
+std::shared_ptr<const RobotModel> load(const RobotSetup& setup, const Configuration& cameras) {
   auto robot = setup.load();
-  for (const auto& camera : rig.cameras) {
+  for (const auto& camera : StereoRig::from(cameras).cameras) {
     if (robot->has_link(camera.link)) continue;
-    throw ConfigurationError(fmt::format("cameras.{}.link: '{}' is not a link of robot '{}'; did you mean '{}'?",
-                                         camera.name, camera.link, robot->name(),
-                                         nearest_name(camera.link, robot->link_names())));
+    cameras.section(camera.name)
+        .fail("link", fmt::format("a link of robot '{}'; did you mean '{}'?", robot->name(),
+                                  nearest_name(camera.link, robot->link_names())));
   }
   return robot;
 }
@@ -57,7 +53,7 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
     : setup_(RobotSetup::from(configuration.section("robot"))),
       vision_(by(method, VisionSetup::from(configuration.section("vision")))),
       bus_(BusOptions::from(configuration.section("bus"))), options_(EstimatorOptions::from(configuration)),
-      robot_(load(setup_, StereoRig::from(configuration.section("cameras")))),
+      robot_(load(setup_, configuration.section("cameras"))),
       error_model_(load_error_model(setup_, robot_, StereoRig::from(configuration.section("cameras")))),
       rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
       background_watch_(robot_, links_of(rig_)), background_turned_rad_(rig_.cameras.size(), 0.0),
@@ -66,8 +62,16 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
   for (const auto& camera : rig_.cameras) {
-    eyes_.push_back({Segmenter(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height),
-                     camera.has_distortion() ? std::optional<Undistorter>(camera) : std::nullopt});
+    if (vision_.method == SegmentationMethod::kBackgroundPicture &&
+        !vision_.background_pictures.contains(camera.name)) {
+      configuration.section("vision").section("background_pictures").fail(camera.name, "a file for each camera");
+    }
+    std::optional<Undistorter> undistorter;
+    if (camera.has_distortion()) undistorter.emplace(camera);
+    Segmenter segmenter(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height,
+                        undistorter ? &*undistorter : nullptr);
+    BinaryMask seen = undistorter ? undistorter->valid() : BinaryMask();
+    eyes_.push_back({std::move(segmenter), std::move(undistorter), std::move(seen)});
   }
   changes_.resize(eyes_.size());
 }
@@ -85,6 +89,7 @@ ObservationStream Pipeline::make_stream() const {
 
 void Pipeline::take_background_from(Pipeline& other) {
   if (!(vision_ == other.vision_) || rig_.cameras.size() != other.rig_.cameras.size()) return;
+  const bool given = vision_.method == SegmentationMethod::kBackgroundPicture;
   for (std::size_t c = 0; c < eyes_.size(); ++c) {
     const CameraModel& now = rig_.cameras[c];
     const CameraModel& before = other.rig_.cameras[c];
@@ -92,6 +97,8 @@ void Pipeline::take_background_from(Pipeline& other) {
         now.distortion != before.distortion) {
       return;
     }
+    // The file of the same name may hold another picture by now.
+    if (given && eyes_[c].segmenter.background().mean != other.eyes_[c].segmenter.background().mean) return;
   }
   for (std::size_t c = 0; c < eyes_.size(); ++c) eyes_[c].segmenter = std::move(other.eyes_[c].segmenter);
   background_watch_.take_from(other.background_watch_);
@@ -125,6 +132,19 @@ bool Pipeline::frozen(const PictureChange& change) {
   return change.repeated && change.moved_rad > kFrozenMotion_rad;
 }
 
+void Pipeline::Look::leave_out_all_but(const BinaryMask& seen) {
+  std::size_t i = 0;
+  for (int v = 0; v < seen.height(); ++v) {
+    for (int w = 0; w < seen.words_per_row(); ++w) {
+      valid.row(v)[w] &= seen.row(v)[w];
+      mask.row(v)[w] &= seen.row(v)[w];
+    }
+    for (int u = 0; u < seen.width(); ++u, ++i) {
+      if (!seen.at(u, v)) coverage[i] = 0;
+    }
+  }
+}
+
 /// All that can be done before the estimate of the observation before is known; asks nothing of the
 /// estimator but for `statistics`.
 Pipeline::Looks Pipeline::look(const Observation& observation) {
@@ -143,6 +163,7 @@ Pipeline::Looks Pipeline::look(const Observation& observation) {
     }
     eye.segmenter.segment(look.straightened ? *look.straightened : seen.image, look.mask, look.valid, look.coverage,
                           predicted ? &*predicted : nullptr);
+    if (!eye.seen.empty()) look.leave_out_all_but(eye.seen);
     look.learning = !eye.segmenter.ready();
   }
   return looks;

@@ -199,7 +199,9 @@ Parts parts_of(const Tree& tree, const StarterOptions& options) {
   }
   parts.others.insert(parts.others.begin(), shared.begin(), shared.end());
   const auto slides = [&](const std::string& joint) { return tree.slides(joint); };
-  std::erase_if(parts.arm, slides);  // published like any other, but no offset of it is estimated
+  // Published like any other, but no offset of them is estimated.
+  std::erase_if(parts.arm, slides);
+  std::erase_if(parts.head, slides);
   std::copy_if(parts.others.begin(), parts.others.end(), std::back_inserter(parts.others_m), slides);
   std::erase_if(parts.others, slides);
   return parts;

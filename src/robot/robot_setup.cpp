@@ -9,10 +9,10 @@
 namespace bodyschema {
 namespace {
 
-void require(bool known, const std::string& key, const std::string& name, const std::string& robot,
+void require(bool known, const std::string& place, const std::string& name, const std::string& robot,
              const std::vector<std::string>& candidates) {
   if (known) return;
-  throw ConfigurationError("robot." + key + ": '" + name + "' is not in robot '" + robot + "'; did you mean '" +
+  throw ConfigurationError(place + ": '" + name + "' is not in robot '" + robot + "'; did you mean '" +
                            nearest_name(name, candidates) + "'?");
 }
 
@@ -34,10 +34,12 @@ RobotSetup RobotSetup::from(const Configuration& robot) {
   const Configuration fixed = robot.section("fixed_joints_deg");
   for (const std::string& joint : fixed.keys()) {
     setup.fixed_joints_rad[joint] = radians(fixed.number(joint, -3600.0, 3600.0));
+    setup.places["fixed_joints_deg." + joint] = fixed.place(joint);
   }
   const Configuration fixed_m = robot.section("fixed_joints_m");
   for (const std::string& joint : fixed_m.keys()) {
     setup.fixed_joints_m[joint] = fixed_m.number(joint, -100.0, 100.0);
+    setup.places["fixed_joints_m." + joint] = fixed_m.place(joint);
   }
   const std::vector<double> gravity = robot.numbers_or("gravity_m_s2", {0.0, 0.0, -9.81});
   if (gravity.size() != 3) robot.fail("gravity_m_s2", "three numbers [x, y, z]");
@@ -51,6 +53,9 @@ RobotSetup RobotSetup::from(const Configuration& robot) {
   if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) {
     robot.fail("estimated_joints", "each joint once");
   }
+  for (const char* key : {"hand_link", "fingertip_links", "estimated_joints", "head_joints"}) {
+    setup.places[key] = robot.place(key);
+  }
   return setup;
 }
 
@@ -58,32 +63,40 @@ std::shared_ptr<const RobotModel> RobotSetup::load() const {
   auto robot = RobotModel::load(model);
   std::vector<std::string> joint_names;
   for (const auto& joint : robot->joints()) joint_names.push_back(joint.name);
-  const auto need_link = [&](const char* key, const std::string& name) {
-    require(robot->has_link(name), key, name, robot->name(), robot->link_names());
+  /// @param entry  of the mapping that `key` is; empty: it is none
+  const auto place = [&](const std::string& key, const std::string& entry = "") {
+    const auto found = places.find(entry.empty() ? key : key + "." + entry);
+    return found != places.end() ? found->second : "robot." + key;
   };
-  const auto need_joint = [&](const char* key, const std::string& name) {
-    require(robot->find_joint(name).has_value(), key, name, robot->name(), joint_names);
+  const auto need_link = [&](const std::string& at, const std::string& name) {
+    require(robot->has_link(name), at, name, robot->name(), robot->link_names());
   };
-  need_link("hand_link", hand_link);
-  for (const auto& name : fingertip_links) need_link("fingertip_links", name);
+  const auto need_joint = [&](const std::string& at, const std::string& name) {
+    require(robot->find_joint(name).has_value(), at, name, robot->name(), joint_names);
+  };
+  need_link(place("hand_link"), hand_link);
+  for (const auto& name : fingertip_links) need_link(place("fingertip_links"), name);
   const auto slides = [&](const std::string& name) {
     return robot->joints()[static_cast<std::size_t>(robot->joint_index(name))].slides;
   };
-  for (const auto& name : estimated_joints) {
-    need_joint("estimated_joints", name);
-    if (slides(name)) {
-      throw ConfigurationError("robot.estimated_joints: '" + name + "' slides; expected joints that turn");
-    }
-  }
-  for (const auto& name : head_joints) need_joint("head_joints", name);
-  const auto need_fixed = [&](const char* key, const std::string& name, bool sliding, const char* instead) {
-    need_joint(key, name);
-    if (slides(name) == sliding) return;
-    throw ConfigurationError(std::string("robot.") + key + ": '" + name + (sliding ? "' turns" : "' slides") +
-                             "; give it under robot." + instead);
+  const auto need_turning = [&](const std::string& at, const std::string& name) {
+    need_joint(at, name);
+    if (slides(name)) throw ConfigurationError(at + ": '" + name + "' slides; expected joints that turn");
   };
-  for (const auto& [name, value] : fixed_joints_rad) need_fixed("fixed_joints_deg", name, false, "fixed_joints_m");
-  for (const auto& [name, value] : fixed_joints_m) need_fixed("fixed_joints_m", name, true, "fixed_joints_deg");
+  for (const auto& name : estimated_joints) need_turning(place("estimated_joints"), name);
+  for (const auto& name : head_joints) need_turning(place("head_joints"), name);
+  const auto need_fixed = [&](const std::string& at, const std::string& name, bool sliding, const char* instead) {
+    need_joint(at, name);
+    if (slides(name) == sliding) return;
+    throw ConfigurationError(at + ": '" + name + (sliding ? "' turns" : "' slides") + "; give it under robot." +
+                             instead);
+  };
+  for (const auto& [name, value] : fixed_joints_rad) {
+    need_fixed(place("fixed_joints_deg", name), name, false, "fixed_joints_m");
+  }
+  for (const auto& [name, value] : fixed_joints_m) {
+    need_fixed(place("fixed_joints_m", name), name, true, "fixed_joints_deg");
+  }
   return robot;
 }
 

@@ -6,16 +6,16 @@
 #include <optional>
 
 #include "bodyschema/geometry/pose.hpp"
+#include "bodyschema/pipeline/frozen_picture.hpp"
 
 namespace bodyschema {
 namespace {
 
-constexpr double kStale_ms = 1000.0;         // nothing for longer: stale
-constexpr double kStuck_ms = 2000.0;         // one frame for longer: the estimator is stuck
-constexpr double kCameraDead_ms = 1000.0;    // one camera silent while the other goes on
-constexpr double kFrozen_ms = 1000.0;        // the same picture for longer ...
-constexpr double kFrozenMotion_rad = 0.035;  // ... while a joint moved by more than this (2 deg)
-constexpr double kDark = 4.0;                // mean brightness below: no light
+constexpr double kStale_ms = 1000.0;       // nothing for longer: stale
+constexpr double kStuck_ms = 2000.0;       // one frame for longer: the estimator is stuck
+constexpr double kCameraDead_ms = 1000.0;  // one camera silent while the other goes on
+constexpr double kFrozen_ms = 1000.0;      // the same picture for longer while a joint moved (kFrozenMotion_rad)
+constexpr double kDark = 4.0;              // mean brightness below: no light
 constexpr double kLateEncoders_ms = 60.0;
 
 std::string age(double ms) {
@@ -163,8 +163,9 @@ std::optional<std::string> camera_warning(const HealthFacts& f) {
       return why ? text + "; " + *why : text;
     }
     if (is_frozen(camera)) {
-      return fmt::format("the {} camera has shown the same picture for {} while the arm moved by {:.0f} deg",
-                         camera.name, age(camera.unchanged_ms), degrees(camera.moved_meanwhile_rad));
+      const double moved_deg = degrees(camera.moved_meanwhile_rad);
+      return fmt::format("the {} camera has shown the same picture for {} while the arm moved by {:.{}f} deg",
+                         camera.name, age(camera.unchanged_ms), moved_deg, moved_deg < 9.95 ? 1 : 0);
     }
   }
   return std::nullopt;

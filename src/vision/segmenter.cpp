@@ -7,6 +7,7 @@
 #include <cstring>
 #include <optional>
 
+#include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/vision/mask_operations.hpp"
 #include "bodyschema/vision/mask_picture.hpp"
@@ -52,7 +53,8 @@ void pack_bits(const std::uint8_t* bytes, std::size_t count, std::uint64_t* word
   }
 }
 
-BackgroundModel load_background(const VisionSetup& setup, const std::string& camera, int width, int height) {
+BackgroundModel load_background(const VisionSetup& setup, const std::string& camera, int width, int height,
+                                const Undistorter* lens) {
   const auto found = setup.background_pictures.find(camera);
   if (found == setup.background_pictures.end()) {
     throw ConfigurationError("vision.background_pictures: no picture for camera '" + camera + "'");
@@ -63,19 +65,24 @@ BackgroundModel load_background(const VisionSetup& setup, const std::string& cam
                     std::to_string(size.height) + ", camera '" + camera + "' is " + std::to_string(width) + "x" +
                     std::to_string(height));
   };
-  const Image picture = read_picture(found->second, check_size);
+  Image picture = read_picture(found->second, check_size);
   check_size({picture.width, picture.height});  // a JPEG may be turned by what its header says besides
   BackgroundModel model(width, height, picture.channels);
   model.noise_sd = std::max(static_cast<float>(setup.noise_levels), kLeastNoiseSd);
+  constexpr std::uint8_t kKnown = 255;
+  Image known(width, height, 1);  // as the camera takes it: straightening mixes black with what lies beside it
   for (std::size_t i = 0; i < model.pixels(); ++i) {
-    int sum = 0;
-    const auto channels = static_cast<std::size_t>(picture.channels);
-    for (std::size_t k = i * channels; k < (i + 1) * channels; ++k) {
-      model.mean[k] = picture.data[k];
-      sum += picture.data[k];
-    }
-    const bool known = !setup.black_is_unknown || sum > 0;
-    model.precision[i] = known ? 1.0f / (model.noise_sd * model.noise_sd) : 0.0f;
+    const auto* pixel = picture.data.data() + i * static_cast<std::size_t>(picture.channels);
+    const bool black = std::all_of(pixel, pixel + picture.channels, [](std::uint8_t level) { return level == 0; });
+    known.data[i] = setup.black_is_unknown && black ? 0 : kKnown;
+  }
+  if (lens != nullptr) {
+    picture = lens->apply(picture);
+    known = lens->apply(known);
+  }
+  model.mean.assign(picture.data.begin(), picture.data.end());
+  for (std::size_t i = 0; i < model.pixels(); ++i) {
+    model.precision[i] = known.data[i] == kKnown ? 1.0f / (model.noise_sd * model.noise_sd) : 0.0f;
   }
   return model;
 }
@@ -287,14 +294,15 @@ void Segmenter::Impl::soften(BinaryMask& mask, std::vector<std::uint8_t>& covera
   }
 }
 
-Segmenter::Segmenter(const VisionSetup& setup, const std::string& camera, int width, int height)
+Segmenter::Segmenter(const VisionSetup& setup, const std::string& camera, int width, int height,
+                     const Undistorter* lens)
     : impl_(std::make_unique<Impl>(setup, camera, std::max(width, 0), std::max(height, 0))) {
   if (width <= 0 || height <= 0) {
     throw ConfigurationError("camera '" + camera + "': a picture of " + std::to_string(width) + "x" +
                              std::to_string(height) + " pixels cannot be segmented");
   }
   if (setup.method == SegmentationMethod::kBackgroundPicture) {
-    impl_->given = load_background(setup, camera, width, height);
+    impl_->given = load_background(setup, camera, width, height, lens);
     impl_->given_noise_known = setup.noise_levels > 0.0 || setup.edges == EdgeKind::kHard;
   }
 }

@@ -412,7 +412,6 @@ TEST_F(YarpImport, ConfigurationErrorsNameTheKey) {
 TEST_F(YarpImport, RecordingGivesTheHeldEncodersAtEveryPicture) {
   SKIP_WITHOUT("eyehand-sim");
   const auto recording = data_folder() / "eyehand-sim";
-  setenv("BODYSCHEMA_DATA", data_folder().c_str(), 0);
   const auto folder = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_unity";
   const auto import_configuration = Configuration::load(folder / "import.yaml");
   const auto bus = BusOptions::from(import_configuration.section("bus"));
@@ -482,7 +481,6 @@ TEST_F(YarpImport, RecordingGivesTheHeldEncodersAtEveryPicture) {
 
 TEST(YarpImportConfiguration, OfTheOfficialRobotNamesItsJoints) {
   SKIP_WITHOUT("icub-models");
-  setenv("BODYSCHEMA_DATA", data_folder().c_str(), 0);
   const auto folder = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_v2_5";
   const auto import_configuration = Configuration::load(folder / "import.yaml");
   const auto options = YarpImportOptions::from(import_configuration.section("yarp_import"));

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "bodyschema/camera/stereo_rig.hpp"
@@ -79,6 +80,13 @@ TEST(Undistorter, KnowsWhichPixelsTheCameraSaw) {
       EXPECT_EQ(valid.at(u, v), inside > 0) << u << " " << v;
     }
   }
+}
+
+TEST(Undistorter, BringsInNoColourThatIsNotInThePicture) {
+  const Undistorter undistorter(camera_with({0.3, 0, 0, 0, 0}));
+  Image image(160, 120, 1);
+  std::fill(image.data.begin(), image.data.end(), std::uint8_t{120});
+  EXPECT_EQ(undistorter.apply(image).data, image.data) << "nor where the camera did not look";
 }
 
 TEST(Undistorter, KeepsColoursApart) {

@@ -13,6 +13,7 @@ namespace bodyschema {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 template <class Action>
@@ -83,6 +84,58 @@ TEST(Configuration, WrongTypeAndRangeSayWhatWasExpected) {
   EXPECT_THAT(error_of([&] { (void)a.number("s"); }), HasSubstr("is a list"));
   EXPECT_THAT(error_of([&] { (void)a.number("inf"); }), HasSubstr("expected a number"));
   EXPECT_THAT(error_of([&] { (void)a.number("gone"); }), HasSubstr("'a.gone' is missing"));
+}
+
+// A joint may be called finger.1.
+TEST(Configuration, EveryNameOfAMappingIsReadWhole) {
+  const auto c = Configuration::parse(
+      "robot:\n  fixed: {finger.1: 1, finger: 2, 1: 3, a..b: 4, .x.: 5, '': 6}\n  folders: {left.eye: {state.o: 7}}\n");
+  const auto robot = c.section("robot");
+  const auto fixed = robot.section("fixed");
+  EXPECT_THAT(fixed.keys(), ElementsAre("finger.1", "finger", "1", "a..b", ".x.", ""));
+  double expected = 1.0;
+  for (const auto& name : fixed.keys()) EXPECT_EQ(fixed.number(name), expected++) << name;
+  EXPECT_EQ(robot.section("folders").section("left.eye").number("state.o"), 7.0);
+  EXPECT_EQ(fixed.number_or("thumb.1", 8.0), 8.0);
+  EXPECT_THAT(c.print(), HasSubstr("thumb.1: 8"));
+  EXPECT_NO_THROW(c.reject_unknown_keys());
+  EXPECT_THAT(error_of([&] { (void)fixed.number("finger.2"); }), HasSubstr("'robot.fixed.finger.2' is missing"));
+}
+
+TEST_F(ConfigurationFiles, AnOverrideMeansTheLongestNameThatIsThere) {
+  const auto file = write("a.yaml", "fixed: {finger.1: 1, finger.1.tip: 2, finger: {1: 3}}\n");
+  const auto fixed =
+      Configuration::load(file, {"fixed.finger.1=4", "fixed.finger.1.tip=5", "fixed.thumb.1=6"}).section("fixed");
+  EXPECT_EQ(fixed.number("finger.1"), 4.0);
+  EXPECT_EQ(fixed.number("finger.1.tip"), 5.0);
+  EXPECT_EQ(fixed.section("finger").number("1"), 3.0);
+  EXPECT_EQ(fixed.section("thumb").number("1"), 6.0);
+}
+
+TEST_F(ConfigurationFiles, AKeysPlaceIsItsFileAndLine) {
+  write("robot.yaml", "robot:\n  hand: a\n");
+  const auto file = write("top.yaml", "include: robot.yaml\n");
+  const auto robot = Configuration::load(file, {"robot.head=b"}).section("robot");
+  EXPECT_EQ(robot.place("hand"), (directory_ / "robot.yaml").string() + ":2: key 'robot.hand'");
+  EXPECT_EQ(robot.place("head"), "--set robot.head=b: key 'robot.head'");
+  EXPECT_EQ(robot.place("none"), file.string() + ": key 'robot.none'");
+}
+
+TEST(Configuration, SectionsThatNoProgramReadsAreRefusedByName) {
+  EXPECT_NO_THROW(Configuration::parse("version: 1\nrobot: {a: 1}\nsimulator: {b: 2}\n").reject_unknown_sections());
+  EXPECT_THAT(error_of([] { Configuration::parse("robot: {}\nbuss: {x: 1}\n").reject_unknown_sections(); }),
+              HasSubstr("configuration.yaml:2: unknown key 'buss'; did you mean 'bus'?"));
+}
+
+TEST(Configuration, OfEveryShippedFileTheSectionsAreKnown) {
+  int files = 0;
+  const auto folder = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config";
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.path().extension() != ".yaml") continue;
+    ++files;
+    EXPECT_NO_THROW(Configuration::load(entry.path()).reject_unknown_sections()) << entry.path();
+  }
+  EXPECT_GT(files, 10);
 }
 
 TEST(Configuration, AnotherVersionIsRefused) {
@@ -167,7 +220,9 @@ TEST(Configuration, EnvironmentIsSubstituted) {
       "a: ${BODYSCHEMA_TEST_DIRECTORY}/x\nb: ${BODYSCHEMA_TEST_NONE:-y}/z\nc: ${BODYSCHEMA_TEST_NONE}\n");
   EXPECT_EQ(c.text("a"), "/data/x");
   EXPECT_EQ(c.text("b"), "y/z");
-  EXPECT_THAT(error_of([&] { (void)c.text("c"); }), HasSubstr("BODYSCHEMA_TEST_NONE is not set"));
+  EXPECT_THAT(error_of([&] { (void)c.text("c"); }),
+              AllOf(HasSubstr("configuration.yaml:3: key 'c': environment variable BODYSCHEMA_TEST_NONE is not set"),
+                    HasSubstr("'${BODYSCHEMA_TEST_NONE}'")));
 }
 
 TEST(Configuration, HashFollowsContent) {

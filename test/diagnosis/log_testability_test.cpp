@@ -13,8 +13,9 @@ namespace {
 
 using testing::HasSubstr;
 
-Configuration robot() {
-  return Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml");
+Configuration robot(const std::vector<std::string>& overrides = {}) {
+  return Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml",
+                             overrides);
 }
 
 /// The elbow swings 40 deg to and fro every four seconds, or goes one way; nothing else moves.
@@ -73,6 +74,16 @@ TEST(LogTestability, OneWayTellsNoBacklash) {
   const auto result = testability_of(robot(), log_of("one_way", 12.0, false));
   EXPECT_FALSE(contains(result.testable, {"backlash", "r_elbow", ""}));
   EXPECT_THAT(result.text(), HasSubstr("backlash: r_elbow turned round never"));
+}
+
+TEST(LogTestability, AMistypedKeyIsRefusedByName) {
+  for (const auto& [wrong, named] : {std::pair{"buss.channel_prefix=LAB", "unknown key 'buss'"},
+                                     {"bus.channel_prefx=LAB", "unknown key 'bus.channel_prefx'"},
+                                     {"robot.hand_lnk=r_hand", "unknown key 'robot.hand_lnk'"},
+                                     {"cameras.left.distorsion=[0, 0, 0, 0, 0]", "unknown key 'cameras.left.disto"}}) {
+    EXPECT_THAT([&] { (void)testability_of(robot({wrong}), "none.lcmlog"); },
+                testing::ThrowsMessage<ConfigurationError>(HasSubstr(named)));
+  }
 }
 
 TEST(LogTestability, ShortAndEmptyLogs) {

@@ -1,5 +1,6 @@
 """Every program and command explains itself with an example; completion knows every command, option
-and choice; --print-config works wherever it is taken.
+and choice; --print-config works wherever it is taken; a mistyped key is refused where a part of the
+configuration is enough.
 
 usage: help.py MANUAL_PY SCRATCH_DIR PROGRAM...
 """
@@ -44,6 +45,22 @@ def configuration_is_checked(page, scratch):
     return [*wrong, *[f"{shown} --print-config makes {out}" for _ in [0] if out.exists()]]
 
 
+def mistyped_keys_are_refused(program, scratch):
+    """Also by commands that read some sections only: status 2, and the key is named."""
+    log = pathlib.Path(__file__).resolve().parents[1] / "pipeline/logs/version_0_1_0.lcmlog"
+    wrong = []
+    for words, keys in ((["export", "x", "--out", scratch / "not_made"], ("buss", "robot.hand_lnk")),
+                        (["import-yarp", "x", "--out", scratch / "not_made"], ("yarp_imports", "buss", "bus.prefx")),
+                        (["log", "info", log], ("buss", "cameras.left.fxx"))):
+        for key in keys:
+            setting = key if "." in key else f"{key}.x"
+            ran = subprocess.run([program, *words, "--config", "config/icub_right/estimator.yaml", "--set",
+                                  f"{setting}=1"], text=True, check=False, timeout=60, capture_output=True)
+            if ran.returncode != 2 or f"unknown key '{key}'" not in ran.stderr:
+                wrong.append(f"{' '.join(words[:2])} --set {setting}=1: status {ran.returncode}: {ran.stderr}")
+    return wrong
+
+
 def main():
     specification = importlib.util.spec_from_file_location("manual", sys.argv[1])
     manual = importlib.util.module_from_spec(specification)
@@ -52,6 +69,8 @@ def main():
     subprocess.run([sys.executable, sys.argv[1], out, "1.2.3", *programs], check=True, timeout=120)
     wrong, pages = [], 0
     for program in programs:
+        if pathlib.Path(program).name == "bodyschema":
+            wrong += mistyped_keys_are_refused(program, out)
         name, todo = pathlib.Path(program).name, [[program]]
         while todo:
             page = manual.Help(todo.pop(0))

@@ -1,18 +1,25 @@
 #include "bodyschema/pipeline/pipeline.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <random>
 #include <stdexcept>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/simulator/simulator.hpp"
 
 namespace bodyschema {
 namespace {
 
-Configuration configuration(const std::string& method) {
+using ::testing::HasSubstr;
+
+Configuration configuration(const std::string& method, std::vector<std::string> overrides = {}) {
+  overrides.insert(overrides.end(), {"vision.method=" + method, "filter.particles=50", "silhouette.engine=contour"});
   return Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml",
-                             {"vision.method=" + method, "filter.particles=50", "silhouette.engine=contour"});
+                             overrides);
 }
 
 /// A learned background, then a short reach.
@@ -77,6 +84,143 @@ TEST_F(PipelineLooksAhead, AndComplainsOfAPictureAtItsOwnTurn) {
   EXPECT_NO_THROW(pipeline.process(seen[0], &seen[1]));
   EXPECT_THROW(pipeline.process(seen[1], &seen[2]), DataError);
   EXPECT_NO_THROW(pipeline.process(seen[2]));
+}
+
+/// Both cameras see this; the joints rest.
+Observation observation_of(const Pipeline& pipeline, const Image& image, Microseconds utime) {
+  CameraObservation seen;
+  seen.utime = utime;
+  seen.joints = {utime, pipeline.setup().default_joints(pipeline.robot()),
+                 Eigen::VectorXd::Zero(pipeline.robot().joint_count())};
+  seen.image = image;
+  return {utime, {seen, seen}};
+}
+
+std::vector<std::string> lens(const std::string& k1) {
+  return {"cameras.left.distortion=[" + k1 + ", 0, 0, 0, 0]", "cameras.right.distortion=[" + k1 + ", 0, 0, 0, 0]"};
+}
+
+/// With noise of two levels.
+Image grey_room(std::mt19937& random) {
+  Image image(320, 240, 3);
+  std::normal_distribution<double> level(120.0, 2.0);
+  for (auto& byte : image.data) byte = static_cast<std::uint8_t>(std::lround(level(random)));
+  return image;
+}
+
+class PipelineWithALens : public testing::TestWithParam<const char*> {};
+
+/// A pincushion: what is straight fills the picture's corners from beyond its border.
+TEST_P(PipelineWithALens, JudgesNothingThatTheLensNeverSaw) {
+  auto overrides = lens("0.3");
+  overrides.push_back("vision.learning_frames=6");
+  Pipeline pipeline(configuration(GetParam(), overrides));
+  const BinaryMask seen = Undistorter(pipeline.rig().cameras[0]).valid();
+  ASSERT_FALSE(seen.at(0, 0));
+  std::mt19937 random(3);
+  Microseconds utime = 0;
+  const auto look_at = [&](const Image& image) {
+    Observation observation = observation_of(pipeline, image, utime += 33'000);
+    pipeline.segment(observation);
+    return *observation.cameras[0];
+  };
+  CameraObservation room;
+  for (int i = 0; i < 8; ++i) room = look_at(grey_room(random));
+  EXPECT_EQ(room.mask.count(), 0u);
+  EXPECT_EQ(room.valid, seen);
+  // An arm that reaches in from the left border.
+  Image image = grey_room(random);
+  for (int v = 100; v < 140; ++v) std::fill(image.pixel(0, v), image.pixel(120, v), std::uint8_t{220});
+  const auto arm = look_at(image);
+  std::size_t covered = 0;
+  for (int v = 0; v < 240; ++v) {
+    for (int u = 0; u < 320; ++u) {
+      const auto coverage = arm.coverage[static_cast<std::size_t>(v * 320 + u)];
+      covered += coverage > 0;
+      if (seen.at(u, v)) continue;
+      ASSERT_FALSE(arm.valid.at(u, v) || arm.mask.at(u, v) || coverage > 0) << u << ", " << v;
+    }
+  }
+  EXPECT_GT(arm.mask.count(), 3000u);
+  EXPECT_GT(covered, 3000u);
+  int u = 0;
+  while (!seen.at(u, 120)) ++u;
+  EXPECT_TRUE(arm.mask.at(u, 120)) << "no outline along the border of what was seen";
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, PipelineWithALens, testing::Values("learned_background", "single_colour"));
+
+class PipelineWithAGivenBackground : public testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::create_directories(folder_); }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  [[nodiscard]] std::string file() const { return (folder_ / "room.png").string(); }
+  [[nodiscard]] Configuration with_picture(std::vector<std::string> overrides = {}) const {
+    overrides.insert(overrides.end(),
+                     {"vision.background_pictures.left=" + file(), "vision.background_pictures.right=" + file()});
+    return configuration("background_picture", overrides);
+  }
+  static Image checkerboard(std::uint8_t dark, std::uint8_t bright) {
+    Image image(320, 240, 3);
+    for (int v = 0; v < 240; ++v) {
+      for (int u = 0; u < 320; ++u) {
+        const std::uint8_t level = (u / 16 + v / 16) % 2 == 0 ? dark : bright;
+        std::fill_n(image.pixel(u, v), 3, level);
+      }
+    }
+    return image;
+  }
+  std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / ("bodyschema_pipeline_" + std::to_string(getpid()));
+};
+
+TEST_F(PipelineWithAGivenBackground, StraightensItAsTheCamerasPictures) {
+  const Image room = checkerboard(40, 200);
+  write_png(file(), room);
+  for (const char* k1 : {"-0.3", "0.3"}) {
+    Pipeline pipeline(with_picture(lens(k1)));
+    Observation observation = observation_of(pipeline, room, 33'000);
+    pipeline.segment(observation);
+    EXPECT_EQ(observation.cameras[0]->mask.count(), 0u) << k1;
+    EXPECT_EQ(observation.cameras[0]->valid, Undistorter(pipeline.rig().cameras[0]).valid()) << k1;
+  }
+}
+
+TEST_F(PipelineWithAGivenBackground, TakesItFromTheFileAndNotFromThePipelineBefore) {
+  write_png(file(), checkerboard(40, 200));
+  Pipeline before(with_picture());
+  Observation first = observation_of(before, checkerboard(40, 200), 33'000);
+  before.segment(first);
+  ASSERT_EQ(first.cameras[0]->mask.count(), 0u);
+  const Image now = checkerboard(90, 140);
+  write_png(file(), now);
+  Pipeline after(with_picture());
+  after.take_background_from(before);
+  Observation second = observation_of(after, now, 66'000);
+  after.segment(second);
+  EXPECT_EQ(second.cameras[0]->mask.count(), 0u);
+}
+
+TEST_F(PipelineWithAGivenBackground, MissesTheOneOfACameraByItsKey) {
+  write_png(file(), checkerboard(40, 200));
+  EXPECT_THAT([&] { Pipeline(configuration("background_picture", {"vision.background_pictures.left=" + file()})); },
+              testing::ThrowsMessage<ConfigurationError>(
+                  HasSubstr("key 'vision.background_pictures.right' is missing; expected a file for each camera")));
+}
+
+TEST(Pipeline, LeavesOutAPictureThatStaysTheSameWhileTheArmMoves) {
+  Pipeline pipeline(configuration("single_colour"));
+  std::mt19937 random(4);
+  const Image image = grey_room(random);
+  const auto with_mask = [&](Microseconds utime, double moved_rad) {
+    Observation observation = observation_of(pipeline, image, utime);
+    for (auto& seen : observation.cameras) seen->joints.q[0] += moved_rad;
+    pipeline.segment(observation);
+    return !observation.cameras[0]->mask.empty();
+  };
+  EXPECT_TRUE(with_mask(33'000, 0.0));
+  EXPECT_TRUE(with_mask(66'000, 0.9 * kFrozenMotion_rad));
+  EXPECT_FALSE(with_mask(99'000, 1.1 * kFrozenMotion_rad));
 }
 
 }  // namespace

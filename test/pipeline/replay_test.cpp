@@ -409,9 +409,10 @@ TEST_F(ReplayTest, ACameraOnALinkThatIsNotThereIsRefusedByItsKey) {
     replay(configuration({"cameras.right.link=r_eye_optica"}), options("link"));
     FAIL() << "no error";
   } catch (const ConfigurationError& e) {
-    EXPECT_STREQ(e.what(),
-                 "cameras.right.link: 'r_eye_optica' is not a link of robot 'icub_right'; "
-                 "did you mean 'r_eye_optical'?");
+    EXPECT_STREQ(
+        e.what(),
+        "--set cameras.right.link=r_eye_optica: key 'cameras.right.link' is 'r_eye_optica'; expected a link of "
+        "robot 'icub_right'; did you mean 'r_eye_optical'?");
   }
 }
 

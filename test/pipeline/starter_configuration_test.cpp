@@ -132,8 +132,29 @@ TEST_F(StarterConfiguration, JointsThatSlideAreGivenInMetresAndNotEstimated) {
   EXPECT_THAT(pipeline.setup().estimated_joints, testing::Not(testing::Contains("joint1")));
 }
 
+TEST_F(StarterConfiguration, AHeadThatSlidesIsLeftOutOfItsJoints) {
+  auto o = options();
+  std::stringstream text;
+  text << std::ifstream(kSource / "meshes/icub_right/icub_right.urdf").rdbuf();
+  std::string urdf = text.str();
+  const std::string turns = "<joint name=\"neck_yaw\" type=\"revolute\">";
+  const auto at = urdf.find(turns);
+  ASSERT_NE(at, std::string::npos);
+  urdf.replace(at, turns.size(), "<joint name=\"neck_yaw\" type=\"prismatic\">");
+  fs::copy(kSource / "meshes/icub_right", folder_ / "sliding", fs::copy_options::recursive);
+  o.urdf = folder_ / "sliding/icub_right.urdf";
+  std::ofstream(o.urdf) << urdf;
+  o.hand_link = "r_hand";
+  o.camera_links = {"l_eye_optical", "r_eye_optical"};
+  EXPECT_THAT(write_starter_configuration(o), HasSubstr("robot and meshes load"));
+  const auto setup = RobotSetup::from(Configuration::load(o.out / "robot.yaml").section("robot"));
+  EXPECT_THAT(setup.head_joints,
+              testing::UnorderedElementsAre("neck_pitch", "neck_roll", "eyes_tilt", "l_eye_pan", "r_eye_pan"));
+}
+
 TEST_F(StarterConfiguration, NamesOfAnyLettersComeBackAsTheyAre) {
-  const std::vector<std::string> names = {"lift's joint", "say \"a\": [b] # c", "back\\slash", "two\nlines"};
+  const std::vector<std::string> names = {"lift's joint", "say \"a\": [b] # c", "back\\slash", "two\nlines", "arm.5"};
+  const std::string finger = "finger.1";
   auto o = options();
   std::ifstream in(o.urdf);
   std::string text((std::istreambuf_iterator<char>(in)), {});
@@ -153,6 +174,13 @@ TEST_F(StarterConfiguration, NamesOfAnyLettersComeBackAsTheyAre) {
       text.replace(at, from.size(), "\"" + written(names[i]) + "\"");
     }
   }
+  const std::string fixed = "<joint name=\"left_finger_joint\" type=\"fixed\">";
+  const auto at = text.find(fixed);
+  ASSERT_NE(at, std::string::npos);
+  text.replace(at, fixed.size(),
+               "<joint name=\"" + finger +
+                   "\" type=\"revolute\"><limit lower=\"0\" upper=\"1\" effort=\"9\" "
+                   "velocity=\"1\"/>");
   fs::copy(o.urdf.parent_path(), folder_ / "arm", fs::copy_options::recursive);
   o.urdf = folder_ / "arm/it's.urdf";
   std::ofstream(o.urdf) << text;
@@ -160,6 +188,7 @@ TEST_F(StarterConfiguration, NamesOfAnyLettersComeBackAsTheyAre) {
   const auto setup = RobotSetup::from(Configuration::load(o.out / "robot.yaml").section("robot"));
   ASSERT_EQ(setup.estimated_joints.size(), 7u);
   for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ(setup.estimated_joints[i], names[i]);
+  EXPECT_THAT(setup.fixed_joints_rad, testing::Contains(testing::Key(finger)));
 }
 
 TEST_F(StarterConfiguration, ReplacesNothing) {

@@ -428,13 +428,50 @@ TEST(RobotSetupErrors, NamesAreCheckedAgainstTheRobot) {
     return std::string("nothing was thrown");
   };
   EXPECT_EQ(text_of([](RobotSetup&) {}), "nothing was thrown");
-  EXPECT_EQ(text_of([](RobotSetup& s) { s.hand_link = "r_hnd"; }),
-            "robot.hand_link: 'r_hnd' is not in robot 'icub_right'; did you mean 'r_hand'?");
+  EXPECT_THAT(text_of([](RobotSetup& s) { s.hand_link = "r_hnd"; }),
+              AllOf(testing::StartsWith(BODYSCHEMA_SOURCE_DIR "/config/icub_right/robot.yaml:"),
+                    testing::EndsWith(
+                        ": key 'robot.hand_link': 'r_hnd' is not in robot 'icub_right'; did you mean 'r_hand'?")));
   EXPECT_THAT(text_of([](RobotSetup& s) { s.estimated_joints[0] = "r_elbo"; }),
               AllOf(HasSubstr("robot.estimated_joints"), HasSubstr("'r_elbow'")));
   EXPECT_THAT(text_of([](RobotSetup& s) { s.head_joints[0] = "x"; }), HasSubstr("robot.head_joints"));
   EXPECT_THAT(text_of([](RobotSetup& s) { s.fingertip_links[0] = "x"; }), HasSubstr("robot.fingertip_links"));
   EXPECT_THAT(text_of([](RobotSetup& s) { s.fixed_joints_rad["x"] = 0; }), HasSubstr("robot.fixed_joints_deg"));
+}
+
+TEST(RobotSetupErrors, NameFileAndLineOfTheWrongName) {
+  TemporaryFolder folder;
+  (void)folder.write("r.urdf",
+                     "<robot name='r'><link name='base'/><link name='hand'/>"
+                     "<joint name='turn' type='revolute'><parent link='base'/><child link='hand'/>"
+                     "<axis xyz='0 0 1'/><limit lower='-1' upper='1' effort='1' velocity='1'/></joint>"
+                     "</robot>");
+  const std::vector<std::string> good = {"urdf: r.urdf", "rendered_links: [hand]", "hand_link: hand",
+                                         "estimated_joints: [turn]"};
+  const auto text_of = [&](std::size_t line, const std::string& wrong) {
+    auto lines = good;
+    lines.resize(std::max(lines.size(), line + 1));
+    lines[line] = wrong;
+    std::string text = "robot:\n";
+    for (const auto& one : lines) text += "  " + one + '\n';
+    auto setup = RobotSetup::from(Configuration::load(folder.write("r.yaml", text)).section("robot"));
+    setup.model.rendered_links.clear();
+    try {
+      (void)setup.load();
+    } catch (const ConfigurationError& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing was thrown");
+  };
+  EXPECT_EQ(text_of(2, good[2]), "nothing was thrown");
+  EXPECT_THAT(text_of(2, "hand_link: hnd"), HasSubstr("r.yaml:4: key 'robot.hand_link': 'hnd' is not in robot 'r'"));
+  EXPECT_THAT(text_of(3, "estimated_joints: [trn]"), HasSubstr("r.yaml:5: key 'robot.estimated_joints': 'trn' is"));
+  EXPECT_THAT(text_of(4, "head_joints: [trn]"), HasSubstr("r.yaml:6: key 'robot.head_joints': 'trn' is"));
+  EXPECT_THAT(text_of(4, "fingertip_links: [tip]"), HasSubstr("r.yaml:6: key 'robot.fingertip_links': 'tip' is"));
+  EXPECT_THAT(text_of(4, "fixed_joints_deg: {trn: 1}"),
+              HasSubstr("r.yaml:6: key 'robot.fixed_joints_deg.trn': 'trn' is"));
+  EXPECT_THAT(text_of(4, "fixed_joints_m: {turn: 1}"),
+              HasSubstr("r.yaml:6: key 'robot.fixed_joints_m.turn': 'turn' turns; give it under"));
 }
 
 TEST(RobotSetupErrors, JointsThatSlideAreFixedInMetresAndNeverEstimated) {
@@ -465,6 +502,9 @@ TEST(RobotSetupErrors, JointsThatSlideAreFixedInMetresAndNeverEstimated) {
   auto estimated = setup;
   estimated.estimated_joints = {"turn", "lift"};
   refused(estimated, "robot.estimated_joints: 'lift' slides");
+  auto head = setup;
+  head.head_joints = {"lift"};
+  refused(head, "robot.head_joints: 'lift' slides; expected joints that turn");
 }
 
 TEST(RobotSetupErrors, ValuesAreChecked) {

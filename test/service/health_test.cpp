@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "bodyschema/pipeline/frozen_picture.hpp"
+
 namespace bodyschema {
 namespace {
 
@@ -185,6 +187,17 @@ TEST(Health, FrozenPictureOnlyWhenTheArmMoves) {
   facts.cameras[0].moved_meanwhile_rad = 0.2094;
   expect(facts, HealthLevel::kWarn,
          "the left camera has shown the same picture for 3.0 s while the arm moved by 12 deg");
+}
+
+TEST(Health, APictureThatIsLeftOutAsFrozenIsSaidToBe) {
+  HealthFacts facts = well();
+  facts.cameras[0].unchanged_ms = 3000.0;
+  facts.cameras[0].moved_meanwhile_rad = 0.99 * kFrozenMotion_rad;
+  expect(facts, HealthLevel::kOk, "converged");
+  facts.cameras[0].moved_meanwhile_rad = 1.2 * kFrozenMotion_rad;
+  facts.cameras[0].mask_px = 0;  // it has no mask
+  expect(facts, HealthLevel::kWarn,
+         "the left camera has shown the same picture for 3.0 s while the arm moved by 0.3 deg");
 }
 
 TEST(Health, MaskEmptyInOneCamera) {

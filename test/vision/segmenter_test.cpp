@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/vision/mask_picture.hpp"
 #include "vision/scene.hpp"
@@ -421,6 +422,36 @@ TEST(Segmenter, GivenCleanPictureAndNoisyFrames) {
   EXPECT_NEAR(segmenter.background().noise_sd, 2.5, 0.4);
   EXPECT_GT(iou(out.mask, scene.true_mask()), 0.98);
   EXPECT_THROW(segmenter.segment(Image(scene.width, scene.height, 1), out.mask, out.valid, out.coverage), DataError);
+}
+
+TEST(Segmenter, AGivenPictureIsStraightenedAndBesideUnknownPixelsNothingIsKnown) {
+  CameraModel camera;
+  camera.name = "left";
+  camera.intrinsics = {160, 120, 130.0, 130.0, 79.5, 59.5};
+  camera.distortion = {-0.3, 0.0, 0.0, 0.0, 0.0};
+  const Undistorter lens(camera);
+  Image behind(160, 120, 3);
+  for (std::size_t i = 0; i < behind.data.size(); ++i) behind.data[i] = (i / 3 / 10 + i / 480 / 10) % 2 == 0 ? 60 : 190;
+  // Where the arm never left, the picture is black.
+  Image picture = behind;
+  for (int v = 20; v < 100; ++v) std::fill(picture.pixel(20, v), picture.pixel(60, v), std::uint8_t{0});
+  const auto file = std::filesystem::temp_directory_path() / "bodyschema_segmenter_lens.png";
+  write_overlay_png(file, picture, BinaryMask(160, 120));
+  auto setup = setup_for(SegmentationMethod::kBackgroundPicture);
+  setup.background_pictures["left"] = file;
+  setup.black_is_unknown = true;
+  for (const auto edges : {EdgeKind::kBlurred, EdgeKind::kHard}) {
+    setup.edges = edges;
+    setup.min_component_px = 1;
+    Segmenter segmenter(setup, "left", 160, 120, &lens);
+    Output out;
+    segmenter.segment(lens.apply(behind), out.mask, out.valid, out.coverage);
+    EXPECT_EQ(out.mask.count(), 0u);
+    EXPECT_FALSE(out.valid.at(40, 60));
+    EXPECT_TRUE(out.valid.at(100, 60));
+    EXPECT_NEAR(static_cast<double>(out.valid.count()), 160 * 120 - 40 * 80, 1000);
+  }
+  std::filesystem::remove(file);
 }
 
 }  // namespace

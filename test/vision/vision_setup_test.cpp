@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "bodyschema/core/error.hpp"
+#include "test_data.hpp"
 
 namespace bodyschema {
 namespace {
@@ -55,6 +56,7 @@ TEST(VisionSetup, RefusesNonsense) {
 }
 
 TEST(VisionSetup, ShippedFilesAreReadInFull) {
+  (void)data_folder();  // to which the recording's refers
   for (const char* name : {"vision.yaml", "icub_unity/vision.yaml"}) {
     const auto file = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config" / name;
     const auto configuration = Configuration::load(file);

@@ -29,8 +29,9 @@ struct StereoRig {
   [[nodiscard]] std::vector<PinholeIntrinsics> intrinsics() const;
 };
 
-/// Straightens pictures of a distorted camera to its own pinhole intrinsics (bilinear; black where
-/// the camera did not look); a copy when there is no distortion. Maps are computed once.
+/// Straightens pictures of a distorted camera to its own pinhole intrinsics (bilinear); a copy when there
+/// is no distortion. Where the camera did not look, see valid(), the picture is mirrored at its border: colours
+/// and noise there are those of what lies beside. Maps are computed once.
 class Undistorter {
  public:
   explicit Undistorter(const CameraModel& camera);

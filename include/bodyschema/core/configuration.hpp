@@ -23,7 +23,8 @@ namespace bodyschema {
 /// Every getter marks its key as known and remembers the value in force, for `--print-config`.
 /// After all readers are done, `reject_unknown_keys()` throws for any key nobody asked for and
 /// names the nearest valid one. A value of the wrong type or outside its range throws
-/// ConfigurationError naming file, key, value and what was expected.
+/// ConfigurationError naming file, key, value and what was expected. Keys are taken whole: as names of
+/// joints they may hold dots; of the keys that a document has, `overrides` mean the longest.
 ///
 /// Copies share one document. Not thread-safe; configurations are read at start-up.
 class Configuration {
@@ -70,20 +71,25 @@ class Configuration {
   /// Throws for the first key of this mapping, and of those below it, that no getter asked for, e.g.
   /// "config/a.yaml:12: unknown key 'filter.particle'; did you mean 'filter.particles'?".
   void reject_unknown_keys() const;
+  /// For programs that read some sections only: throws for the first key at the top of the document that is
+  /// no section of any program, e.g. "--set buss.channel_prefix=LAB: unknown key 'buss'; did you mean 'bus'?".
+  void reject_unknown_sections() const;
   /// The whole document with includes, overrides and defaults in force, as YAML.
   [[nodiscard]] std::string print() const;
   /// A short hexadecimal digest of print(), published so that a result names its configuration.
   [[nodiscard]] std::string hash() const;
+  /// "config/a.yaml:12: key 'filter.particles'", for errors found later, when the values are used.
+  [[nodiscard]] std::string place(const std::string& key) const;
   /// An error about `key` of this section in this class's wording, for checks made by readers.
   [[noreturn]] void fail(const std::string& key, const std::string& expected) const;
 
  private:
   static constexpr double kInf = std::numeric_limits<double>::infinity();
   struct Document;
-  Configuration(std::shared_ptr<Document> document, std::string prefix);
+  Configuration(std::shared_ptr<Document> document, std::vector<std::string> section);
   void check_version() const;
   std::shared_ptr<Document> document_;
-  std::string prefix_;
+  std::vector<std::string> section_;  ///< names from the top
 };
 
 }  // namespace bodyschema

@@ -7,6 +7,10 @@
 
 namespace bodyschema {
 
+/// A picture that stays the same, bit for bit, while a joint moves this far was not taken anew: beyond the noise and
+/// rounding of encoders. Such pictures are left out, and the service says so of a camera that goes on with them.
+inline constexpr double kFrozenMotion_rad = 0.005;
+
 /// What is known of one camera's picture against those before it.
 struct PictureChange {
   bool repeated = false;   ///< the last picture was the same as the one before

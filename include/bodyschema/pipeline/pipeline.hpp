@@ -48,8 +48,8 @@ class Pipeline {
   void reset() { estimator_.reset(); }
 
   /// Takes over the background that the pipeline this one replaces has learned, where cameras and
-  /// vision settings are the same: a hand in view would be learned as background now. `other`
-  /// segments no more afterwards.
+  /// vision settings are the same: a hand in view would be learned as background now. Of a background that is
+  /// given, the picture read last counts. `other` segments no more afterwards.
   void take_background_from(Pipeline& other);
 
   /// Offline learning of the background, for methods that learn: every picture of a log, then
@@ -88,6 +88,7 @@ class Pipeline {
   struct Eye {
     Segmenter segmenter;
     std::optional<Undistorter> undistorter;
+    BinaryMask seen;  ///< by the lens, in a straightened picture; empty: all of it
     FrozenPicture picture{};
   };
   /// What was found in one camera's picture.
@@ -97,6 +98,8 @@ class Pipeline {
     BinaryMask mask, valid;
     std::vector<std::uint8_t> coverage;
     bool learning = false;
+    /// What the lens never saw is neither robot nor background.
+    void leave_out_all_but(const BinaryMask& seen);
   };
   /// One per camera; absent where the camera saw nothing.
   struct Looks {

@@ -13,6 +13,8 @@
 
 namespace bodyschema {
 
+class Undistorter;
+
 /// Tells the robot from the background in the pictures of one camera.
 ///
 /// For every picture it gives
@@ -39,9 +41,12 @@ namespace bodyschema {
 class Segmenter {
  public:
   /// @param camera  name under which the background picture of this camera is configured
+  /// @param lens  what straightens the pictures that come: the background picture is as the camera takes it and
+  ///   is straightened alike; null: they come as the camera takes them
   /// Throws FileError for a background picture that is missing or of another size,
   /// ConfigurationError when none is configured for this camera.
-  Segmenter(const VisionSetup& setup, const std::string& camera, int width, int height);
+  Segmenter(const VisionSetup& setup, const std::string& camera, int width, int height,
+            const Undistorter* lens = nullptr);
   ~Segmenter();
   Segmenter(Segmenter&&) noexcept;
   Segmenter& operator=(Segmenter&&) noexcept;

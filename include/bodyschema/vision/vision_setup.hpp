@@ -47,7 +47,7 @@ struct VisionSetup {
   /// single_colour: the colour, RGB; absent: the dominant colour of the first frame.
   std::optional<std::array<double, 3>> background_rgb;
 
-  /// background_picture: one file per camera name.
+  /// background_picture: one file per camera name, as the camera takes it, its lens's distortion included.
   std::map<std::string, std::filesystem::path> background_pictures;
   /// background_picture: exactly black pixels of the picture are unknown, not black.
   bool black_is_unknown = false;
