@@ -13,6 +13,13 @@
 namespace bodyschema {
 namespace {
 
+/// @param picture  RGB
+void write_ppm(const std::filesystem::path& file, const Image& picture) {
+  std::ofstream(file, std::ios::binary) << "P6\n"
+                                        << picture.width << ' ' << picture.height << "\n255\n"
+                                        << std::string(picture.data.begin(), picture.data.end());
+}
+
 using test::Scene;
 using test::Texture;
 
@@ -409,9 +416,7 @@ TEST(Segmenter, GivenCleanPictureAndNoisyFrames) {
   clean.noise_levels = 0;
   const Image background = clean.picture(random);
   const auto file = std::filesystem::temp_directory_path() / "bodyschema_segmenter_clean.ppm";
-  std::ofstream(file, std::ios::binary) << "P6\n"
-                                        << scene.width << ' ' << scene.height << "\n255\n"
-                                        << std::string(background.data.begin(), background.data.end());
+  write_ppm(file, background);
   auto setup = setup_for(SegmentationMethod::kBackgroundPicture);
   setup.background_pictures["left"] = file;
   Segmenter segmenter(setup, "left", scene.width, scene.height);
@@ -435,8 +440,8 @@ TEST(Segmenter, AGivenPictureIsStraightenedAndBesideUnknownPixelsNothingIsKnown)
   // Where the arm never left, the picture is black.
   Image picture = behind;
   for (int v = 20; v < 100; ++v) std::fill(picture.pixel(20, v), picture.pixel(60, v), std::uint8_t{0});
-  const auto file = std::filesystem::temp_directory_path() / "bodyschema_segmenter_lens.png";
-  write_overlay_png(file, picture, BinaryMask(160, 120));
+  const auto file = std::filesystem::temp_directory_path() / "bodyschema_segmenter_lens.ppm";
+  write_ppm(file, picture);
   auto setup = setup_for(SegmentationMethod::kBackgroundPicture);
   setup.background_pictures["left"] = file;
   setup.black_is_unknown = true;
