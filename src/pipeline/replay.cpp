@@ -118,7 +118,7 @@ class Replay {
                    camera.name);
     }
     estimates_.flush();
-    if (!estimates_) throw FileError(options_.out.string() + ": disk full? estimates.jsonl is cut short");
+    if (!estimates_) throw DeviceError(options_.out.string() + ": disk full? estimates.jsonl is cut short");
     end_where_it_converged();
     if (last_view_) {
       write_overlay(pipeline_, *last_view_, last_, options_.out / "overlay_final.png", "last frame");

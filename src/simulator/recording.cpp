@@ -194,7 +194,7 @@ void TruthWriter::close() {
   if (!stream_.is_open()) return;
   stream_ << "\n]\n}\n";
   stream_.close();
-  if (!stream_) throw FileError(file_.string() + ": cannot be written (disk full?)");
+  if (!stream_) throw DeviceError(file_.string() + ": cannot be written (disk full?)");
 }
 
 }  // namespace bodyschema::simulator
