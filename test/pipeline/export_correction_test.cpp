@@ -216,9 +216,9 @@ TEST_F(ExportCorrection, AHeadJointHasDegreesADeviationAndTheWarningOfAnyJoint) 
     EXPECT_THAT(content(file), ::testing::HasSubstr(warning)) << file;
   }
   const Configuration yaml = Configuration::load(folder_ / "out/offsets.yaml");
-  EXPECT_DOUBLE_EQ(yaml.number("head_offset_deg.neck_pitch"), 2.8648);
-  EXPECT_DOUBLE_EQ(yaml.number("head_stddev_deg.neck_yaw"), 0.75);
-  EXPECT_DOUBLE_EQ(yaml.number("nuisance.dilation_px"), 0.2);
+  EXPECT_DOUBLE_EQ(yaml.section("head_offset_deg").number("neck_pitch"), 2.8648);
+  EXPECT_DOUBLE_EQ(yaml.section("head_stddev_deg").number("neck_yaw"), 0.75);
+  EXPECT_DOUBLE_EQ(yaml.section("nuisance").number("dilation_px"), 0.2);
 }
 
 TEST_F(ExportCorrection, HeadJointsInRadiansWithoutADeviationAreRefused) {
