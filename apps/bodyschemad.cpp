@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
       "  bodyschemad --config config/icub_right/estimator.yaml\n"
       "  bodyschemad --config config/icub_right/estimator.yaml --record reach.lcmlog --page 8080\n"
       "SIGTERM stops, SIGHUP reads the configuration again. Exit status: 0 stopped as asked, 2 wrong\n"
-      "command line, configuration or file, 3 data that cannot be used, 1 any other failure.");
+      "command line, configuration or file, 1 any other failure.");
   apps::CommonOptions common;
   DaemonOptions options;
   options.version = BODYSCHEMA_VERSION;

@@ -29,13 +29,13 @@ void add_evaluate(CLI::App& app) {
       ->add_option("--trials", a->options.trials,
                    "Seeded trials of each experiment, unless its line below says otherwise")
       ->capture_default_str()
-      ->check(CLI::Range(1, 100000));
+      ->check(number_in(1, 100000));
   command->add_option("--seed", a->options.seed, "Seed of the first trial")
       ->capture_default_str()
       ->check(whole_number());
   command->add_option("--threads", a->options.threads, "Trials side by side; 0: one per core")
       ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
+      ->check(number_in(0, 1024));
   command->add_option("-o,--out", a->out, "Folder for summary.json and report.html")->required();
   a->common.add_to(*command);
   command->get_option("--config")->required(false);

@@ -18,7 +18,9 @@
 namespace bodyschema::apps {
 namespace {
 
+/// Refuses sections that no program reads and keys of the robot's that nobody knows.
 std::set<std::string> sliding_joints(const Configuration& configuration) {
+  configuration.reject_unknown_sections();
   const Configuration robot = configuration.section("robot");
   const auto model = RobotSetup::from(robot).load();
   robot.reject_unknown_keys();
@@ -65,6 +67,7 @@ void add_info(CLI::App& log) {
 void add_to_mcap(CLI::App& log) {
   auto options = std::make_shared<McapExportOptions>();
   auto config = std::make_shared<std::string>();
+  auto overrides = std::make_shared<std::vector<std::string>>();
   CLI::App* command = log.add_subcommand("to-mcap", "Rewrite a log as MCAP, for Foxglove and PlotJuggler");
   command->footer(
       "Example:\n"
@@ -74,13 +77,14 @@ void add_to_mcap(CLI::App& log) {
   command->add_option("log", options->log, "LCM log")->required();
   command->add_option("-o,--out", options->out, "MCAP file to write")->required();
   command->add_option("-c,--config", *config, "The robot's configuration, where it has joints that slide");
+  command->add_option("--set", *overrides, "Override one key of it (repeatable)");
   command
       ->add_option("--jpeg-quality", options->jpeg_quality, "Of pictures that were not compressed already (default 90)")
       ->check(number_in(1, 100));
-  command->callback([options, config] {
+  command->callback([options, config, overrides] {
     set_up_logging("warn");
     if (!config->empty()) {
-      options->sliding_joints = sliding_joints(Configuration::load(find_data_file(*config)));
+      options->sliding_joints = sliding_joints(Configuration::load(find_data_file(*config), *overrides));
     }
     const McapExportSummary summary = export_mcap(*options);
     std::printf("%s: %.1f MB\n", options->out.c_str(), 1e-6 * static_cast<double>(summary.bytes));

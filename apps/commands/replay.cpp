@@ -30,7 +30,7 @@ void add_replay(CLI::App& app) {
   command->add_option("--truth", a->truth, "Ground truth (JSON): adds errors to the results");
   command->add_option("--overlays", a->overlays, "Overlay pictures spread over the log")
       ->capture_default_str()
-      ->check(CLI::Range(0, 100000));
+      ->check(number_in(0, 100000));
   command->add_flag("--masks", a->masks, "Write the observed masks too");
   command->add_flag("--learn-background-online", a->learn_online,
                     "Learn the background from the first pictures, as bodyschemad does, not from the whole log");

@@ -120,8 +120,9 @@ void GuardedReceiver::work() {
     }
     if (refused && monotonic_us() - said_us >= kQuietTime_us) {
       said_us = monotonic_us();
-      spdlog::warn("messages longer than {} MB refused; bus.max_width_px and max_height_px allow no more",
-                   longest_message_bytes_ / 1'000'000);
+      spdlog::warn(
+          "messages longer than {} MB refused: what bus.max_width_px and max_height_px ask for, 256 MiB at most",
+          longest_message_bytes_ / 1'000'000);
     }
   }
 }

@@ -10,16 +10,17 @@ constexpr int kStepEvidence = 3;
 }  // namespace
 
 JointAssembler::JointAssembler(const std::vector<std::string>& joint_names,
-                               const std::map<std::string, double>& resting_rad, Microseconds clock_step)
+                               const std::map<std::string, double>& resting_rad, Microseconds clock_step,
+                               const std::set<std::string>& idle)
     : read_(joint_names.size(), -1), clock_step_(clock_step) {
   now_.utime = -1;
   now_.q.setZero(static_cast<Eigen::Index>(joint_names.size()));
   now_.qdot.setZero(now_.q.size());
   for (std::size_t j = 0; j < joint_names.size(); ++j) {
-    index_.emplace(joint_names[j], static_cast<Eigen::Index>(j));
-  }
-  for (const auto& [name, value] : resting_rad) {
-    if (const auto at = index_.find(name); at != index_.end()) now_.q[at->second] = value;
+    const auto at = static_cast<Eigen::Index>(j);
+    if (const auto resting = resting_rad.find(joint_names[j]); resting != resting_rad.end())
+      now_.q[at] = resting->second;
+    if (!idle.contains(joint_names[j])) index_.emplace(joint_names[j], at);
   }
 }
 

@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/write_file.hpp"
 
 namespace bodyschema {
 
@@ -181,7 +182,7 @@ void LogReader::report_damage(std::uint64_t from, std::uint64_t to) {
 
 LogWriter::LogWriter(std::filesystem::path file) : file_(std::move(file)) {
   descriptor_ = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (descriptor_ < 0) throw FileError(file_.string() + ": log cannot be created: " + std::strerror(errno));
+  if (descriptor_ < 0) throw_write_failure(file_, errno);
 }
 
 LogWriter::~LogWriter() {

@@ -77,7 +77,7 @@ ObservationStream::ObservationStream(const std::vector<std::string>& joint_names
                                      const std::vector<CameraModel>& cameras, const BusOptions& options)
     : options_(options), channels_(options.channels()),
       synchroniser_(joint_names, fixed_rad, static_cast<int>(cameras.size()), options.synchroniser),
-      assembler_(joint_names, fixed_rad, options.synchroniser.clock_step) {
+      assembler_(joint_names, fixed_rad, options.synchroniser.clock_step, options.synchroniser.joints.idle_joints) {
   for (const CameraModel& camera : cameras) {
     const bool left = camera.name == "left";
     if ((!left && camera.name != "right") || cameras.size() > 2 || (!cameras_.empty() && left)) {

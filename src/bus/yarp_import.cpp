@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <set>
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/file_size.hpp"
 #include "bodyschema/core/nearest_name.hpp"
+#include "bodyschema/core/write_file.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "picture_file.hpp"
 #include "yarp_data_log.hpp"
@@ -199,29 +199,6 @@ std::string doubtful_unit(const YarpImportOptions& options, double largest) {
   return "";
 }
 
-/// Removes a half-written log unless told that it is whole.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(std::filesystem::path file) : file_(std::move(file)) {}
-  ~TemporaryFile() {
-    std::error_code ignored;
-    if (!kept_) std::filesystem::remove(file_, ignored);
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return file_; }
-  void rename_to(const std::filesystem::path& target) {
-    std::error_code error;
-    std::filesystem::rename(file_, target, error);
-    if (error) throw FileError(target.string() + ": log cannot be created: " + error.message());
-    kept_ = true;
-  }
-
- private:
-  std::filesystem::path file_;
-  bool kept_ = false;
-};
-
 }  // namespace
 
 YarpImportOptions YarpImportOptions::from(const Configuration& yarp_import) {
@@ -332,9 +309,9 @@ YarpImportSummary import_yarp(const std::filesystem::path& recording, const Yarp
   std::stable_sort(events.begin(), events.end(), [](const Event& a, const Event& b) { return a.utime < b.utime; });
   summary.duration_s = seconds(events.back().utime - events.front().utime);
 
-  TemporaryFile part(log.string() + ".part");
+  UnfinishedFile unfinished(log);
   {
-    LogWriter writer(part.path());
+    LogWriter writer(unfinished.part());
     std::uint64_t done = 0;
     for (const Event& event : events) {
       if (event.source < encoders.size()) {
@@ -357,7 +334,7 @@ YarpImportSummary import_yarp(const std::filesystem::path& recording, const Yarp
     camera.bad.check(camera.log.lines().size(), "pictures");
     leave_out(camera.bad, summary.bad_pictures);
   }
-  part.rename_to(log);
+  unfinished.finish();
   return summary;
 }
 

@@ -1,11 +1,11 @@
-#include "detectable.hpp"
+#include "bodyschema/diagnosis/detectable.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 
-namespace bodyschema::diagnosis {
+namespace bodyschema {
 namespace {
 
 constexpr std::size_t kArm = 7;
@@ -68,4 +68,4 @@ double detectable_size(const std::string& name, const EffectTarget& target, cons
   return i < kArm ? at->second[i] : 0.0;
 }
 
-}  // namespace bodyschema::diagnosis
+}  // namespace bodyschema

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/diagnosis/detectable.hpp"
 #include "bodyschema/effects/catalogue.hpp"
 #include "candidates.hpp"
-#include "detectable.hpp"
 #include "extension.hpp"
 #include "findings.hpp"
 #include "model_fit.hpp"
@@ -96,6 +96,7 @@ class Diagnoser {
     bool changed = false;
     for (const auto& cause : found.selection.causes) {
       auto ids = cause.same;
+      ids.insert(ids.end(), cause.replaced.begin(), cause.replaced.end());
       ids.push_back(cause.candidate);
       for (const auto c : ids) {
         const auto& candidate = found.set.candidates[c];
@@ -248,7 +249,8 @@ class Diagnoser {
     return result;
   }
 
-  /// A linear estimate that leads away from the outlines is taken back towards the baseline.
+  /// A linear estimate that leads away from the outlines is taken back towards the baseline, and all the way where
+  /// they are lost from sight: no fit comes back from there.
   void begin_where_better(ErrorModel& extended) {
     constexpr int kHalvings = 3;
     auto without = extended;
@@ -266,6 +268,7 @@ class Diagnoser {
       if (misfit(linearise(source_, extended), outline) <= least) return;
       go_half_way(without, extended);
     }
+    if (2 * seen(linearise(source_, extended)) < seen(before_.at)) extended = std::move(without);
   }
 
   [[nodiscard]] bool far_off(const Found& found) const {

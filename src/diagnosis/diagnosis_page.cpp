@@ -22,7 +22,7 @@ using Value = std::function<double(const ResidualSample&)>;
 std::vector<diagnosis::ResidualPoint> points_of(const DiagnosisReport& report, const Value& x, const Value& y) {
   std::vector<diagnosis::ResidualPoint> points;
   for (const auto& sample : report.samples) {
-    if (sample.rms_px_before <= 0.0 || sample.rms_px_after <= 0.0) continue;
+    if (sample.before.rms_px <= 0.0 || sample.after.rms_px <= 0.0) continue;
     points.push_back({x(sample), y(sample), sample.time_s, sample.camera});
   }
   return points;
@@ -74,17 +74,19 @@ const std::vector<Variable>& variables() {
   return list;
 }
 
-Value apparent(std::size_t joint, bool after) {
-  return [joint, after](const ResidualSample& s) {
-    return after ? s.apparent_deg_after[joint] : s.apparent_deg_before[joint];
-  };
+using Which = Remainder ResidualSample::*;
+
+Value apparent(std::size_t joint, Which which) {
+  return [joint, which](const ResidualSample& s) { return (s.*which).apparent_deg[joint]; };
 }
 
 class Page {
  public:
   Page(const DiagnosisReport& report, const std::string& title) : d_(report), page_("Diagnosis: " + title) {
-    // Before, what an error in the model leaves stays alike as well; that is what the charts are to show.
-    for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) memory_.push_back(memory_of(d_, apparent(j, true)));
+    // What an error in the model leaves stays alike as well; that is what the charts are to show.
+    for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
+      memory_.push_back(memory_of(d_, apparent(j, &ResidualSample::noise)));
+    }
   }
 
   Report write(const std::vector<std::pair<Image, std::string>>& pictures) {
@@ -104,6 +106,8 @@ class Page {
   }
 
  private:
+  static constexpr Which kBefore = &ResidualSample::before, kAfter = &ResidualSample::after;
+
   static std::string interval(const EstimatedParameter& p) {
     if (!std::isfinite(p.ci95[0]) || !std::isfinite(p.ci95[1])) return "not known";
     return fmt::format("{:.3g} to {:.3g}", p.ci95[0], p.ci95[1]);
@@ -252,7 +256,7 @@ class Page {
     std::size_t strongest = 0;
     double most = -1.0;
     for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
-      const double strength = curve(j, variable, false).structure();
+      const double strength = curve(j, variable, kBefore).structure();
       if (strength > most) {
         most = strength;
         strongest = j;
@@ -261,16 +265,16 @@ class Page {
     page_.chart(curves(d_.arm_joints[strongest] + (variable.name == "time" ? " over " : " against its ") +
                            variable.name + strongest_of(d_.arm_joints.size(), "joints"),
                        variable.name + ", " + variable.axis, "correction asked for, deg",
-                       before_and_after(curve(strongest, variable, false), curve(strongest, variable, true))));
+                       before_and_after(curve(strongest, variable, kBefore), curve(strongest, variable, kAfter))));
   }
 
   static std::string strongest_of(std::size_t count, const char* what) {
     return count > 1 ? fmt::format(" (strongest of {} {})", count, what) : "";
   }
 
-  [[nodiscard]] ResidualCurve curve(std::size_t joint, const Variable& variable, bool after) const {
+  [[nodiscard]] ResidualCurve curve(std::size_t joint, const Variable& variable, Which which) const {
     return curve_of(
-        d_, [&](const ResidualSample& s) { return variable.of(s, joint); }, apparent(joint, after), memory_[joint]);
+        d_, [&](const ResidualSample& s) { return variable.of(s, joint); }, apparent(joint, which), memory_[joint]);
   }
 
   static std::vector<ChartSeries> before_and_after(const ResidualCurve& before, const ResidualCurve& after) {
@@ -280,18 +284,18 @@ class Page {
   /// The same angles on the way up and on the way down: backlash opens a gap between them.
   void direction_of_motion() {
     constexpr double kMoving_deg_s = 2.0;
-    const auto one_way = [&](std::size_t j, double sign, bool after) {
+    const auto one_way = [&](std::size_t j, double sign, Which which) {
       return curve_of(
           d_, [j](const ResidualSample& s) { return s.angle_deg[j]; },
           [&, j](const ResidualSample& s) {
-            return sign * s.velocity_deg_s[j] > kMoving_deg_s ? apparent(j, after)(s) : std::nan("");
+            return sign * s.velocity_deg_s[j] > kMoving_deg_s ? apparent(j, which)(s) : std::nan("");
           },
           memory_[j], false);
     };
     std::size_t widest = 0;
     double most = -1.0;
     for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
-      const auto up = one_way(j, 1.0, false), down = one_way(j, -1.0, false);
+      const auto up = one_way(j, 1.0, kBefore), down = one_way(j, -1.0, kBefore);
       if (up.y.empty() || down.y.empty()) continue;
       const auto mean = [](const ResidualCurve& c) {
         return std::accumulate(c.y.begin(), c.y.end(), 0.0) / static_cast<double>(c.y.size());
@@ -311,23 +315,23 @@ class Page {
     page_.chart(
         curves(d_.arm_joints[widest] + ", rising against falling" + strongest_of(d_.arm_joints.size(), "joints"),
                "angle, deg", "correction asked for, deg",
-               {series_of("rising, before", one_way(widest, 1.0, false), kRed),
-                series_of("falling, before", one_way(widest, -1.0, false), kOchre),
-                series_of("rising, extended", one_way(widest, 1.0, true), kBlue),
-                series_of("falling, extended", one_way(widest, -1.0, true), kGreen)}));
+               {series_of("rising, before", one_way(widest, 1.0, kBefore), kRed),
+                series_of("falling, before", one_way(widest, -1.0, kBefore), kOchre),
+                series_of("rising, extended", one_way(widest, 1.0, kAfter), kBlue),
+                series_of("falling, extended", one_way(widest, -1.0, kAfter), kGreen)}));
   }
 
   void other_joints() {
     std::size_t follower = 0, leader = 0;
     double most = -1.0;
-    const auto pair = [&](std::size_t i, std::size_t j, bool after) {
+    const auto pair = [&](std::size_t i, std::size_t j, Which which) {
       return curve_of(
-          d_, [j](const ResidualSample& s) { return s.angle_deg[j]; }, apparent(i, after), memory_[i]);
+          d_, [j](const ResidualSample& s) { return s.angle_deg[j]; }, apparent(i, which), memory_[i]);
     };
     for (std::size_t i = 0; i < d_.arm_joints.size(); ++i) {
       for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
         if (i == j) continue;
-        const double strength = pair(i, j, false).structure();
+        const double strength = pair(i, j, kBefore).structure();
         if (strength > most) {
           most = strength;
           follower = i;
@@ -340,28 +344,27 @@ class Page {
     page_.chart(curves(
         d_.arm_joints[follower] + " against another joint: " + d_.arm_joints[leader] + strongest_of(pairs, "pairs"),
         d_.arm_joints[leader] + ", deg", "correction asked for, deg",
-        before_and_after(pair(follower, leader, false), pair(follower, leader, true))));
+        before_and_after(pair(follower, leader, kBefore), pair(follower, leader, kAfter))));
   }
 
   void over_pictures() {
-    const auto both = [&](const Value& x, const Value& before, const Value& after, bool centred = false) {
-      const auto memory = memory_of(d_, after);
-      return before_and_after(curve_of(d_, x, before, memory, centred), curve_of(d_, x, after, memory, centred));
+    const auto both = [&](const Value& x, double Remainder::*figure) {
+      const auto of = [figure](Which which) {
+        return [figure, which](const ResidualSample& s) { return s.*which.*figure; };
+      };
+      const auto memory = memory_of(d_, of(&ResidualSample::noise));
+      return before_and_after(curve_of(d_, x, of(kBefore), memory, false), curve_of(d_, x, of(kAfter), memory, false));
     };
-    const Value rms_before = [](const ResidualSample& s) { return s.rms_px_before; };
-    const Value rms_after = [](const ResidualSample& s) { return s.rms_px_after; };
-    const Value mean_before = [](const ResidualSample& s) { return s.mean_px_before; };
-    const Value mean_after = [](const ResidualSample& s) { return s.mean_px_after; };
-    page_.chart(curves("outline residual over time", "time, s", "rms, px", both(time_of, rms_before, rms_after)));
+    constexpr auto kRms = &Remainder::rms_px, kMean = &Remainder::mean_px;
+    page_.chart(curves("outline residual over time", "time, s", "rms, px", both(time_of, kRms)));
     if (std::none_of(d_.samples.begin(), d_.samples.end(), [](const auto& s) { return s.depth_m > 0.0; })) return;
     const Value radius = [](const ResidualSample& s) { return s.image_radius_px; };
     const Value depth = [](const ResidualSample& s) { return s.depth_m; };
     page_.chart(curves("outline against image radius", "hand from the picture's centre, px",
-                       "mean along the outward normal, px", both(radius, mean_before, mean_after)));
+                       "mean along the outward normal, px", both(radius, kMean)));
     page_.chart(curves("outline against depth", "hand from the eye, m", "mean along the outward normal, px",
-                       both(depth, mean_before, mean_after)));
-    page_.chart(
-        curves("residual against depth", "hand from the eye, m", "rms, px", both(depth, rms_before, rms_after)));
+                       both(depth, kMean)));
+    page_.chart(curves("residual against depth", "hand from the eye, m", "rms, px", both(depth, kRms)));
   }
 
   void all_structure() {
@@ -375,7 +378,7 @@ class Page {
       for (const auto& variable : variables()) {
         if (!known(variable)) continue;
         row.push_back(
-            fmt::format("{:.2f} > {:.2f}", curve(j, variable, false).size(), curve(j, variable, true).size()));
+            fmt::format("{:.2f} > {:.2f}", curve(j, variable, kBefore).size(), curve(j, variable, kAfter).size()));
       }
       rows.push_back(std::move(row));
     }

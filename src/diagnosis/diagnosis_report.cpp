@@ -3,10 +3,10 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/write_file.hpp"
 
 namespace bodyschema {
 namespace {
@@ -67,6 +67,7 @@ Json json_of(const DiagnosedCause& c) {
   j["class"] = Json::array();
   for (const auto& s : c.same) j["class"].push_back(json_of(s));
   j["z"] = number(c.z);
+  j["implausible"] = c.implausible;
   j["heldout_gain"] = number(c.heldout_gain);
   j["parameters"] = Json::array();
   for (const auto& p : c.parameters) j["parameters"].push_back(json_of(p));
@@ -123,23 +124,16 @@ std::string DiagnosisReport::to_json() const {
 }
 
 void DiagnosisReport::prepare(const std::filesystem::path& directory) {
+  make_folder(directory);
   std::error_code error;
-  std::filesystem::create_directories(directory, error);
-  if (error) throw FileError(directory.string() + ": cannot be made: " + error.message());
   const auto probe = directory / "report.json.part";
-  std::ofstream out(probe);
-  out.close();
-  if (!out) throw FileError(directory.string() + ": nothing can be written there");
+  write_file(probe, "");
   std::filesystem::remove(probe, error);
 }
 
 void DiagnosisReport::write(const std::filesystem::path& directory) const {
   prepare(directory);
-  const auto file = directory / "report.json";
-  std::ofstream out(file);
-  out << to_json();
-  out.close();
-  if (!out) throw FileError(file.string() + ": cannot be written");
+  write_file(directory / "report.json", to_json());
   if (extended_model) extended_model->save(directory / "extended_model.yaml");
 }
 

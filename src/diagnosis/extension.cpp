@@ -60,8 +60,11 @@ double find_slip_time(const Evidence& evidence, const BlockFit& fit, const Colum
   return best_time;
 }
 
-bool explains_away(const SelectedCause& cause, std::size_t nuisance) {
-  return cause.candidate != nuisance && contains(cause.same, nuisance);
+/// Whether a cause was named that explains a nuisance away, by itself or with others.
+bool swapped_out(const Selection& selection, std::size_t nuisance) {
+  return std::any_of(selection.causes.begin(), selection.causes.end(), [&](const SelectedCause& cause) {
+    return cause.candidate != nuisance && (contains(cause.same, nuisance) || contains(cause.replaced, nuisance));
+  });
 }
 
 /// Parameters that this log cannot tell from the offsets are not fitted.
@@ -80,9 +83,7 @@ void put_back_nuisances(const Selection& selection, const CandidateSet& set, Err
     const auto& candidate = set.candidates[c];
     if (!candidate.nuisance || contains(selection.not_testable, c)) continue;
     if (model.find(candidate.name, candidate.target) != nullptr) continue;
-    const bool swapped_out = std::any_of(selection.causes.begin(), selection.causes.end(),
-                                         [&](const SelectedCause& cause) { return explains_away(cause, c); });
-    if (!swapped_out) fit_what_shows(model.add(candidate.name, candidate.target), candidate);
+    if (!swapped_out(selection, c)) fit_what_shows(model.add(candidate.name, candidate.target), candidate);
   }
 }
 
@@ -122,9 +123,7 @@ Extension extend(ErrorModel model, const Selection& selection, const Evidence& e
   for (std::size_t c = 0; c < set.candidates.size(); ++c) {
     const auto& candidate = set.candidates[c];
     if (!candidate.nuisance) continue;
-    const bool swapped_out = std::any_of(selection.causes.begin(), selection.causes.end(),
-                                         [&](const SelectedCause& cause) { return explains_away(cause, c); });
-    if (!contains(selection.model, c) || swapped_out) {
+    if (!contains(selection.model, c) || swapped_out(selection, c)) {
       result.model.remove(candidate.name, candidate.target);
     } else {
       put(c);
@@ -176,7 +175,8 @@ bool drop_weakest(Selection& selection, const CandidateSet& set, const ModelFit&
   for (auto cause = selection.causes.begin(); cause != selection.causes.end(); ++cause) {
     const auto& candidate = set.candidates[cause->candidate];
     if (candidate.generic()) continue;
-    const double share = fitted_z(candidate, after, model) / rules.z_asked(candidate, cause->score.gain);
+    const double z = z_of_few(fitted_z(candidate, after, model), after.statistics->seen_blocks(), rules.usual_blocks);
+    const double share = z / rules.z_asked(candidate, cause->gain_judged);
     if (share >= weakest) continue;
     weakest = share;
     worst = cause;

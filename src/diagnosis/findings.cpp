@@ -12,6 +12,7 @@
 
 #include "exclusion.hpp"
 #include "interval.hpp"
+#include "nearer_model.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
@@ -147,6 +148,7 @@ class Findings {
         const auto& ref = found_.after.parameters[c];
         if (cause_of(found_.extended[ref.effect]) != cause.cause) continue;
         const auto& p = found_.extended[ref.effect].parameters()[ref.parameter];
+        cause.implausible = !plausible(found_.extended[ref.effect]);
         const auto ci = interval(static_cast<Eigen::Index>(c), found_.extended[ref.effect], p, std::abs(p.value));
         cause.parameters.push_back({p.name,
                                     p.unit,
@@ -265,6 +267,19 @@ class Findings {
     return rest;
   }
 
+  /// @param view  in which something was found
+  [[nodiscard]] Remainder remainder_of(const Rest& rest, const CompressedView& view) const {
+    Remainder remainder;
+    remainder.rms_px = std::sqrt(std::max(0.0, rest.loss / view.weight));
+    remainder.mean_px = rest.vector[layout_.size() - 1] / view.weight;
+    for (std::size_t j = 0; j < source_.roles().arm.size(); ++j) {
+      const auto at = static_cast<Eigen::Index>(j);
+      const double information = view.information(at, at);
+      remainder.apparent_deg.push_back(information > 0.0 ? degrees(rest.vector[at] / information) : 0.0);
+    }
+    return remainder;
+  }
+
   void describe_view(const ModelFit& fit, std::size_t v, ResidualSample& sample) const {
     const auto views = source_.views();
     sample.time_s = seconds(views[v].joints.utime - views.front().joints.utime);
@@ -296,8 +311,9 @@ class Findings {
         const auto& view = fit.at.views[v];
         auto& sample = report.samples[v];
         if (before) describe_view(fit, v, sample);
-        auto& apparent = before ? sample.apparent_deg_before : sample.apparent_deg_after;
-        apparent.assign(static_cast<std::size_t>(arm), 0.0);
+        auto& remainder = before ? sample.before : sample.after;
+        remainder.apparent_deg.assign(static_cast<std::size_t>(arm), 0.0);
+        if (!before) sample.noise = remainder;
         outline += view.outline;
         matched += view.matched;
         if (view.weight <= 0.0) continue;
@@ -308,13 +324,8 @@ class Findings {
         square += plan_.weight_of_view[v] * left.loss;
         weight += plan_.weight_of_view[v] * view.weight;
         // Charts show what the extended model leaves: a curve that nothing explains stays in sight.
-        const auto rest = fit.extra.empty() ? left : held_out(fit, v, false);
-        (before ? sample.rms_px_before : sample.rms_px_after) = std::sqrt(std::max(0.0, rest.loss / view.weight));
-        (before ? sample.mean_px_before : sample.mean_px_after) = rest.vector[layout_.size() - 1] / view.weight;
-        for (Eigen::Index j = 0; j < arm; ++j) {
-          const double information = view.information(j, j);
-          if (information > 0.0) apparent[static_cast<std::size_t>(j)] = degrees(rest.vector[j] / information);
-        }
+        remainder = remainder_of(fit.extra.empty() ? left : held_out(fit, v, false), view);
+        if (!before) sample.noise = remainder_of(left, view);
         A += view.information.topLeftCorner(arm, arm);
         b += left.vector.head(arm);
       }

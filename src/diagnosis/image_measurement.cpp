@@ -6,8 +6,6 @@
 #include <optional>
 #include <thread>
 
-#include "bodyschema/core/error.hpp"
-
 namespace bodyschema {
 namespace {
 

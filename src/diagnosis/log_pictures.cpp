@@ -118,10 +118,10 @@ std::vector<std::pair<Image, std::string>> LogPictures::draw(const Pipeline& pip
     double sum = 0.0;
     std::size_t n = 0;
     for (const auto& sample : report.samples) {
-      if (sample.rms_px_before <= 0.0 || sample.rms_px_after <= 0.0) continue;
+      if (sample.before.rms_px <= 0.0 || sample.after.rms_px <= 0.0) continue;
       for (const auto& seen : kept_[i].cameras) {
         if (!seen || seen->utime != sample.utime) continue;
-        sum += sample.rms_px_before - sample.rms_px_after;
+        sum += sample.before.rms_px - sample.after.rms_px;
         ++n;
       }
     }

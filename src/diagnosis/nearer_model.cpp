@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "bodyschema/core/seeded_random.hpp"
 #include "bodyschema/effects/catalogue.hpp"
-#include "trial_random.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
@@ -118,7 +118,7 @@ std::vector<ErrorModel> scattered_starts(MeasurementSource& source, const ErrorM
   constexpr double kSpread_rad = 10.0 * kPi / 180.0, kFar_px = 10.0;
   if (!source.set_search(kFar_px, kEvery)) return {};
   const double outline = outline_points(linearise(source, offsets));
-  TrialRandom random(1);
+  SeededRandom random(1);
   std::vector<Guess> guesses;
   for (int i = 0; i < kDrawn; ++i) {
     Guess guess{offsets, 0.0};
@@ -135,14 +135,18 @@ std::vector<ErrorModel> scattered_starts(MeasurementSource& source, const ErrorM
 }
 
 bool plausible(const ErrorModel& model) {
-  constexpr double kLargest = 20.0;  // typical sizes
   for (std::size_t e = 0; e < model.size(); ++e) {
-    if (model[e].name() == "joint_offset") continue;
-    for (const auto& p : model[e].parameters()) {
-      if (p.fitted && std::abs(p.value) > kLargest * p.typical) return false;
-    }
+    if (!plausible(model[e])) return false;
   }
   return true;
+}
+
+bool plausible(const Effect& effect) {
+  static constexpr double kLargest = 20.0;  // typical sizes
+  const auto& parameters = effect.parameters();
+  return effect.name() == "joint_offset" ||
+         std::none_of(parameters.begin(), parameters.end(),
+                      [](const EffectParameter& p) { return p.fitted && std::abs(p.value) > kLargest * p.typical; });
 }
 
 std::optional<ErrorModel> nearer_model(MeasurementSource& source, const CoordinateLayout& layout, ModelFitter& fitter,

@@ -15,6 +15,7 @@ std::vector<ErrorModel> scattered_starts(MeasurementSource& source, const ErrorM
 /// Whether a robot may be built so wrong: a cause of more than twenty times its typical size stands in for
 /// another, however well it fits.
 bool plausible(const ErrorModel& model);
+bool plausible(const Effect& effect);
 
 /// Where a linear search stays far from the outlines: causes tried for real, each with the offsets
 /// fitted anew, the one that brings the outlines nearest kept, and so on while it is worth it. What is

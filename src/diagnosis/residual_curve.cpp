@@ -84,14 +84,17 @@ double shared_by(const Signs& left, const Signs& right, double step_s) {
 double independent(std::vector<ResidualPoint> points, const ErrorMemory& memory) {
   std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
   std::array<double, 2> before{};
-  double pairs = 0.0, last_s = points.front().time_s;
+  // Within half a step of each other is the same time: the cameras' stamps need not be equal.
+  const double first_s = points.front().time_s;
+  double pairs = 0.0, last_step = 0.0;
   for (const auto& p : points) {
-    const double kept = std::pow(memory.kept, (p.time_s - last_s) / memory.step_s);
+    const double step = std::round((p.time_s - first_s) / memory.step_s);
+    const double kept = std::pow(memory.kept, step - last_step);
     const std::size_t own = p.camera == 0 ? 0 : 1;
     for (auto& sum : before) sum *= kept;
     pairs += before[own] + memory.shared * before[1 - own];
     before[own] += 1.0;
-    last_s = p.time_s;
+    last_step = step;
   }
   const double n = static_cast<double>(points.size());
   return n * n / (n + 2.0 * pairs);

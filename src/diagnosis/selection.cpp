@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -115,7 +116,8 @@ class Selector {
 
   /// Wald z of a candidate inside a fit, from the jackknife covariance; where that is smaller than
   /// the catalogue's median dispersion allows (luck, or too few blocks), the median holds.
-  [[nodiscard]] double wald_z(const BlockFit& f, const Ids& ids, std::size_t candidate) const {
+  /// @param group  as the fit was made with
+  [[nodiscard]] double wald_z(const BlockFit& f, const Ids& ids, std::size_t candidate, std::size_t group = 1) const {
     const auto at = position(ids, candidate);
     const auto n = static_cast<Eigen::Index>(candidates_[candidate].columns.size());
     const Eigen::VectorXd theta = f.estimate.segment(at, n);
@@ -124,7 +126,7 @@ class Selector {
     if (dispersion < floor_) V *= floor_ / dispersion;
     V += 1e-12 * V.trace() * Eigen::MatrixXd::Identity(n, n);
     // Few blocks know the covariance of many columns badly (Hotelling's correction; none for one).
-    const double blocks = static_cast<double>(statistics_.seen_blocks());
+    const double blocks = static_cast<double>(statistics_.seen_blocks(group));
     const double known = std::max(0.0, (blocks - static_cast<double>(n)) / (blocks - 1.0));
     return equivalent_z(known * theta.dot(V.ldlt().solve(theta)), n);
   }
@@ -151,18 +153,31 @@ class Selector {
     return trial;
   }
 
-  /// Paired t of the blocks' held-out losses. A slip near an end of the log changes few blocks; it
-  /// is judged on the side of it where it shows most.
+  /// Paired t of the held-out losses of blocks from..until-1 in which anything was seen; the others' zeros are no
+  /// measurements. Large: `a` is worse.
+  [[nodiscard]] double seen_t(const Eigen::VectorXd& a, const Eigen::VectorXd& b, Eigen::Index from,
+                              Eigen::Index until) const {
+    const auto blocks = statistics_.blocks();
+    std::vector<Eigen::Index> seen;
+    for (auto block = from; block < until; ++block) {
+      if (blocks[static_cast<std::size_t>(block)].weight > 0.0) seen.push_back(block);
+    }
+    return paired_t(a(seen), b(seen));
+  }
+  [[nodiscard]] double seen_t(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const {
+    return seen_t(a, b, 0, a.size());
+  }
+
+  /// How clearly the blocks' held-out losses are lower with a candidate. A slip near an end of the log changes few
+  /// blocks; it is judged on the side of it where it shows most.
   [[nodiscard]] double advantage(std::size_t candidate, const Eigen::VectorXd& without_it,
                                  const Eigen::VectorXd& with_it) const {
-    double t = paired_t(without_it, with_it);
+    const double t = seen_t(without_it, with_it);
     if (!candidates_[candidate].slip) return t;
     const auto& begin = candidates_[candidate].columns.front();
     const auto from = static_cast<Eigen::Index>(begin.from_block);
     const Eigen::Index until = from + (begin.from_cell > 0 ? 1 : 0), n = without_it.size();
-    if (until >= 2) t = std::max(t, paired_t(without_it.head(until), with_it.head(until)));
-    if (n - from >= 2) t = std::max(t, paired_t(without_it.tail(n - from), with_it.tail(n - from)));
-    return t;
+    return std::max({t, seen_t(without_it, with_it, 0, until), seen_t(without_it, with_it, from, n)});
   }
 
   [[nodiscard]] bool enters(std::size_t candidate, const CandidateScore& s) const {
@@ -198,7 +213,8 @@ class Selector {
     const auto extended = fit(extended_model, options_.far_group);
     if (!plain.usable) return false;
     if (!extended.usable) return candidates_[candidate].slip;  // near an end: one group holds it all
-    const auto z = z_of_few(wald_z(extended, extended_model, candidate), statistics_.seen_blocks(options_.far_group),
+    const auto z = z_of_few(wald_z(extended, extended_model, candidate, options_.far_group),
+                            statistics_.seen_blocks(options_.far_group),
                             (options_.usual_blocks + options_.far_group - 1) / options_.far_group);
     return z > options_.z_far &&
            (plain.heldout() - extended.heldout()) / baseline_ > gain_floor_ * measure_of(candidates_[candidate]);
@@ -272,7 +288,7 @@ class Selector {
       }
     }
     if (!named) return generic;
-    if (generic && paired_t(named_trial.loss, generic_trial.loss) > options_.t_generic) {
+    if (generic && seen_t(named_trial.loss, generic_trial.loss) > options_.t_generic) {
       return generic;
     }
     return named;
@@ -355,6 +371,10 @@ class Selector {
       if (!least) return;
       remove(*least);
       dropped_.push_back(*least);
+      if (const auto by_it = replaced_.extract(*least)) {
+        model_.insert(model_.begin(), by_it.mapped().begin(), by_it.mapped().end());
+        refit();
+      }
     }
   }
 
@@ -398,7 +418,7 @@ class Selector {
   void stand_out(Selection& result) {
     find_rest(result);
     std::vector<SelectedCause> list;
-    for (const auto c : reported()) list.push_back({c, test(c).score, {}, false});
+    for (const auto c : reported()) list.push_back({.candidate = c, .score = test(c).score});
     std::stable_sort(list.begin(), list.end(),
                      [](const auto& a, const auto& b) { return a.score.gain > b.score.gain; });
     const double left = share_left(), rest = std::max(0.0, result.rest_gain);
@@ -454,7 +474,7 @@ class Selector {
         auto reduced_model = extended_model;
         for (const auto c : killed) std::erase(reduced_model, c);
         const auto reduced = fit(reduced_model);
-        if (!reduced.usable || paired_t(reduced.heldout_loss, current_.heldout_loss) > options_.t_same) {
+        if (!reduced.usable || seen_t(reduced.heldout_loss, current_.heldout_loss) > options_.t_same) {
           continue;
         }
         if (!best || killed.size() > best_killed.size() ||
@@ -465,7 +485,13 @@ class Selector {
         }
       }
       if (!best) return;
-      for (const auto c : best_killed) remove(c);
+      for (const auto c : best_killed) {
+        auto& replaced = replaced_[*best];
+        if (candidates_[c].nuisance) replaced.push_back(c);
+        const auto by_it = replaced_.extract(c);
+        if (by_it) replaced.insert(replaced.end(), by_it.mapped().begin(), by_it.mapped().end());
+        remove(c);
+      }
       add(*best);
     }
   }
@@ -473,7 +499,9 @@ class Selector {
   /// The class of a cause: every candidate that explains it away and, in its place, is not clearly
   /// worse on held-out blocks. The one that does best is listed first.
   [[nodiscard]] SelectedCause describe(std::size_t cause) const {
-    SelectedCause result{cause, test(cause).score, {}};
+    SelectedCause result{.candidate = cause, .score = test(cause).score};
+    result.gain_judged = result.score.gain;
+    if (const auto by_it = replaced_.find(cause); by_it != replaced_.end()) result.replaced = by_it->second;
     if (candidates_[cause].generic()) return result;
     result.wanders = candidates_[cause].temporal() && wanders(candidates_[cause].target);
     const NestedFits rest(statistics_, columns_of(without(model_, cause)));
@@ -488,7 +516,7 @@ class Selector {
       if (both.usable && both.independent > options_.alike && wald_z(both, both_model, cause) > options_.z_same)
         continue;
       if (instead.heldout() - current_.heldout() > options_.least_worse * baseline_ &&
-          paired_t(instead.heldout_loss, current_.heldout_loss) > options_.t_same) {
+          seen_t(instead.heldout_loss, current_.heldout_loss) > options_.t_same) {
         continue;
       }
       same.emplace_back(instead.heldout(), a);
@@ -502,6 +530,7 @@ class Selector {
     if (!same.empty() && same.front().first < current_.heldout()) {
       std::swap(result.candidate, result.same.front());
       result.score = score_instead(result.candidate, cause, rest);
+      result.gain_judged = result.score.gain;
     }
     return result;
   }
@@ -555,7 +584,7 @@ class Selector {
     precision.tail(static_cast<Eigen::Index>(columns.size() - own)).setConstant(floor_ / (kSmall * kSmall));
     const auto loss = statistics_.heldout_with_prior(columns, precision);
     result.rest_gain = (current_.heldout() - loss.sum()) / baseline_;
-    result.rest_t = paired_t(current_.heldout_loss, loss);
+    result.rest_t = seen_t(current_.heldout_loss, loss);
   }
 
   const BlockStatistics& statistics_;
@@ -564,11 +593,12 @@ class Selector {
   const SelectionOptions& options_;
   double gain_floor_;  ///< least gain of a cause
   double generic_gain_floor_;
-  Ids model_;                         ///< candidates in the fit: nuisances, then causes
-  Ids causes_;                        ///< those that were added
-  Ids dropped_;                       ///< and those that were dropped again: not tried twice
-  std::optional<Ids> standing_;       ///< those that stand out, where there is a crowd
-  std::optional<NestedFits> nested_;  ///< about model_
+  Ids model_;                            ///< candidates in the fit: nuisances, then causes
+  Ids causes_;                           ///< those that were added
+  Ids dropped_;                          ///< and those that were dropped again: not tried twice
+  std::map<std::size_t, Ids> replaced_;  ///< by a cause: nuisances that it made superfluous together
+  std::optional<Ids> standing_;          ///< those that stand out, where there is a crowd
+  std::optional<NestedFits> nested_;     ///< about model_
   BlockFit current_;
   double baseline_ = 1.0;
   double floor_ = 0.0;  ///< least dispersion of a candidate

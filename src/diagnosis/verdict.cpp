@@ -62,6 +62,14 @@ void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options) {
     if (!list.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + list + ".";
     return;
   }
+  if (std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.implausible; })) {
+    report.verdict = "unexplained";
+    report.sentence =
+        "No cause of the catalogue explains this log: what fits is larger than on any robot, and stands in "
+        "for something else: " +
+        list + ".";
+    return;
+  }
   if (!causes.empty()) {
     const bool unexplained = std::any_of(causes.begin(), causes.end(), is_unexplained);
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });

@@ -10,6 +10,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/file_size.hpp"
 #include "bodyschema/core/nearest_name.hpp"
+#include "bodyschema/core/write_file.hpp"
 
 namespace bodyschema {
 namespace {
@@ -164,10 +165,7 @@ std::string ErrorModel::to_yaml() const {
 }
 
 void ErrorModel::save(const std::filesystem::path& file) const {
-  std::ofstream out(file);
-  out << to_yaml();
-  out.close();
-  if (!out) throw FileError(file.string() + ": cannot be written");
+  write_file(file, to_yaml());
 }
 
 Effect* ErrorModel::find(const std::string& name, const EffectTarget& target) {

@@ -9,7 +9,6 @@
 #include <numeric>
 #include <optional>
 
-#include "bodyschema/core/error.hpp"
 #include "bodyschema/estimator/body_pose_model.hpp"
 #include "bodyschema/estimator/offset_fusion.hpp"
 #include "bodyschema/estimator/stalled_encoders.hpp"

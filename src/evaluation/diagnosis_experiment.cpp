@@ -9,8 +9,9 @@
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
+#include "bodyschema/core/write_file.hpp"
 #include "bodyschema/diagnosis/log_diagnosis.hpp"
-#include "bodyschema/diagnosis/trials.hpp"
+#include "bodyschema/diagnosis_trials/trials.hpp"
 #include "bodyschema/simulator/recording.hpp"
 #include "experiments.hpp"
 
@@ -211,8 +212,7 @@ void run_diagnosis(ExperimentContext& context) {
   robot.rig = StereoRig::from(context.simulated.section("cameras"));
   robot.model = robot.setup.load();
   const auto file = context.options.out / "trials.jsonl";
-  std::ofstream trials(file);
-  if (!trials) throw FileError(file.string() + ": cannot be written");
+  std::ofstream trials = open_to_write(file);
 
   const auto silhouettes = run_rows(context, "silhouette-level logs", robot, trial_counts(context.options.trials),
                                     silhouette_logs(robot), trials);
@@ -223,6 +223,7 @@ void run_diagnosis(ExperimentContext& context) {
   }
   const auto pictures = run_rows(context, "logs through pictures", robot, counts, picture_logs(context, robot), trials);
   add_table(context, "through full pictures, 60 s at 10 Hz", pictures, context.summary["images"], 0.05);
+  if (!trials.flush()) throw DeviceError(file.string() + ": cut short, is the disk full?");
 }
 
 }  // namespace bodyschema

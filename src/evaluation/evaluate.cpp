@@ -3,10 +3,10 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <fstream>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
+#include "bodyschema/core/write_file.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/simulator/simulator_settings.hpp"
 #include "experiments.hpp"
@@ -35,7 +35,8 @@ const std::vector<std::pair<std::string, std::string>>& experiment_names() {
       {"likelihood", "likelihood over one offset, two arm postures (Fig. 2); always one trial"},
       {"ablation", "best with one part taken away at a time" + at_most(kMostAblationTrials)},
       {"reach", "hand to target with the nominal and with the corrected model"},
-      {"recording", "the public recording, exact and nominal robot (needs BODYSCHEMA_DATA)"},
+      {"recording",
+       "the public recording, exact and nominal robot; always one log, paper with ten seeds (needs BODYSCHEMA_DATA)"},
       {"diagnosis", "rates of the diagnosis on logs with hidden faults; --trials sets the single-cause logs"},
       {"all", "everything but paper and diagnosis"}};
   return names;
@@ -58,10 +59,9 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
         "estimator.mode: 'paper' changes nothing here: every experiment runs the modes it compares");
   }
 
-  std::error_code error;
-  std::filesystem::create_directories(options.out, error);
-  std::ofstream file(options.out / "summary.json");
-  if (!file) throw FileError(options.out.string() + ": cannot write summary.json there");
+  make_folder(options.out);
+  const auto file = options.out / "summary.json";
+  write_file(file, "");  // or why not, before the work and not after
 
   Json summary;
   std::string table;
@@ -84,13 +84,11 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   if (options.experiment == "diagnosis") run_diagnosis(context);
   summary["trials_asked_for"] = options.trials;
   summary["seed"] = options.seed;
-  file << summary.dump(2) << '\n';
-  if (!file.flush()) throw FileError((options.out / "summary.json").string() + ": cannot be written");
+  write_file(file, summary.dump(2) + '\n');
   report.figures_first(
       table, options.experiment == "diagnosis"
                  ? fmt::format("Trials: {}, seed {}.", options.trials, options.seed)
-                 : fmt::format("Seeds from {} on, as many trials as the tables say. Simulated robot; means over trials "
-                               "of the mean over the last ten frames.",
+                 : fmt::format("Seeds from {} on, as many trials as the tables say. A simulated robot in all of them.",
                                options.seed));
   report.write(options.out / "report.html");
   return table;

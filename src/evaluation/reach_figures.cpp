@@ -12,12 +12,14 @@ constexpr std::size_t kLastFrames = 10;
 
 /// Frames until below 1 mm and 1 degree for good; nothing when that never happens.
 std::optional<double> frames_to_converge(const std::vector<FrameRecord>& frames, std::size_t camera) {
-  std::size_t last_bad = 0;
+  double until = 0.0;
+  bool good = false;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (frames[i].position_mm[camera] >= 1.0 || frames[i].rotation_deg[camera] >= 1.0) last_bad = i + 1;
+    if (frames[i].position_mm[camera] < 0.0) continue;  // no picture says neither
+    good = frames[i].position_mm[camera] < 1.0 && frames[i].rotation_deg[camera] < 1.0;
+    if (!good) until = static_cast<double>(i + 1);
   }
-  if (last_bad == frames.size()) return std::nullopt;
-  return static_cast<double>(last_bad);
+  return good ? std::optional(until) : std::nullopt;
 }
 
 std::string frames_text(const ReachResult& r) {
@@ -80,8 +82,9 @@ void add_row(ExperimentContext& context, const std::string& name, const ReachRes
 }
 
 void add_heading(ExperimentContext& context, const std::string& title, int trials) {
-  context.table += fmt::format("\n{} ({} trials)\n{:<38} {:>14} {:>14} {:>6} {:>6} {:>7}\n", title, trials, "",
-                               "position mm", "rotation deg", "worst", "worst", "frames");
+  context.table += fmt::format(
+      "\n{} ({} trials; means over them of each one's last ten frames)\n{:<38} {:>14} {:>14} {:>6} {:>6} {:>7}\n",
+      title, trials, "", "position mm", "rotation deg", "worst", "worst", "frames");
 }
 
 void chart_errors(ExperimentContext& context, const std::string& title, const std::vector<TrialRecord>& trials,

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/write_file.hpp"
 #include "bodyschema/report/report.hpp"
 
 namespace bodyschema {
@@ -309,9 +310,7 @@ std::string write_fleet_report(const std::vector<FleetRobot>& robots, const fs::
   report.table({"robot", "first log", "last log", "what is wrong with it"}, rows);
   for (const auto& robot : robots) add_robot(report, robot);
   report.write(out / "report.html");
-  std::ofstream file(out / "fleet.json");
-  file << json.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
-  if (!file.flush()) throw FileError((out / "fleet.json").string() + ": cannot be written");
+  write_file(out / "fleet.json", json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
   return lines;
 }
 

@@ -251,7 +251,7 @@ class Exporter {
 
 /// What is written must not be what is read, by whatever name: the log would be lost.
 void refuse_to_overwrite(const McapExportOptions& options) {
-  for (const std::filesystem::path& written : {options.out, McapWriter::unfinished(options.out)}) {
+  for (const std::filesystem::path& written : {options.out, UnfinishedFile::part_of(options.out)}) {
     std::error_code none;  // what does not exist is no log
     if (!std::filesystem::equivalent(options.log, written, none)) continue;
     throw FileError(options.out.string() + ": would overwrite the log " + options.log.string() +

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <system_error>
 #include <type_traits>
 
 #include "bodyschema/core/error.hpp"
@@ -60,22 +59,10 @@ class McapWriter::Fields {
   std::string bytes_;
 };
 
-std::filesystem::path McapWriter::unfinished(const std::filesystem::path& file) {
-  return file.string() + ".part";
-}
-
-McapWriter::McapWriter(std::filesystem::path file) : file_(std::move(file)), part_(unfinished(file_)) {
-  stream_.open(part_, std::ios::binary | std::ios::trunc);
-  if (!stream_) throw FileError(file_.string() + ": cannot be created");
+McapWriter::McapWriter(std::filesystem::path file) : file_(std::move(file)), unfinished_(file_) {
+  stream_ = open_to_write(unfinished_.part(), std::ios::binary | std::ios::trunc);
   put(kMagic);
   put_record(kHeader, Fields().text("").text("bodyschema"));
-}
-
-McapWriter::~McapWriter() {
-  if (closed_) return;
-  stream_.close();
-  std::error_code ignored;
-  std::filesystem::remove(part_, ignored);
 }
 
 McapWriter::SchemaId McapWriter::add_schema(std::string_view name, std::string_view json_schema) {
@@ -191,10 +178,8 @@ void McapWriter::close() {
   put_record(kFooter, Fields().number(summary).number(summary_offsets).number(std::uint32_t{0}));
   put(kMagic);
   stream_.close();
-  std::error_code error;
-  if (stream_) std::filesystem::rename(part_, file_, error);
-  if (!stream_ || error) throw DeviceError(file_.string() + ": cut short, is the disk full?");
-  closed_ = true;
+  if (!stream_) throw DeviceError(file_.string() + ": cut short, is the disk full?");
+  unfinished_.finish();
 }
 
 void McapWriter::put(std::string_view bytes) {

@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "bodyschema/core/write_file.hpp"
+
 namespace bodyschema {
 
 /// Writes an MCAP file (https://mcap.dev/spec): messages in uncompressed chunks of about 4 MB, each
@@ -18,11 +20,8 @@ class McapWriter {
   using SchemaId = std::uint16_t;
   using ChannelId = std::uint16_t;
 
-  /// Where what becomes `file` is written until close(): ".part" added.
-  static std::filesystem::path unfinished(const std::filesystem::path& file);
-  /// Throws FileError.
+  /// The file has its name from close() on. Throws FileError.
   explicit McapWriter(std::filesystem::path file);
-  ~McapWriter();  ///< removes what was not closed
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
@@ -51,7 +50,8 @@ class McapWriter {
   void put_record(std::uint8_t opcode, const std::string& content);
   void write_chunk();
 
-  std::filesystem::path file_, part_;
+  std::filesystem::path file_;
+  UnfinishedFile unfinished_;
   std::ofstream stream_;
   std::uint64_t position_ = 0;
   std::vector<std::string> schemas_, channels_;  ///< contents of their records, by id
@@ -61,7 +61,6 @@ class McapWriter {
   std::vector<ChunkIndex> chunks_;
   std::vector<std::uint64_t> counts_;
   std::uint64_t begin_ = 0, end_ = 0, messages_ = 0;
-  bool closed_ = false;
 };
 
 }  // namespace bodyschema

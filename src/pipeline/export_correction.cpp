@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/write_file.hpp"
 #include "bodyschema/estimator/estimate.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "bodyschema/robot/urdf_origin.hpp"
@@ -182,23 +183,6 @@ std::string applied_text(const std::vector<AppliedEffect>& applied) {
   return text.empty() ? "The extended model holds joint offsets alone; those of the replay are used.\n" : text;
 }
 
-/// All of the text or, on an error, what stood there before. What is no plain file is written to as it is.
-void write_text(const std::filesystem::path& file, const std::string& text) {
-  std::error_code error;
-  const bool plain = !std::filesystem::exists(file, error) || std::filesystem::is_regular_file(file, error);
-  const std::filesystem::path part = plain ? file.string() + ".part" : file.string();
-  std::ofstream stream(part);
-  stream << text;
-  stream.close();
-  bool written = stream.good();
-  if (plain && written) {
-    std::filesystem::rename(part, file, error);
-    written = !error;
-  }
-  if (plain && !written) std::filesystem::remove(part, error);
-  if (!written) throw FileError(file.string() + ": cannot be written; is the disk full?");
-}
-
 }  // namespace
 
 Correction read_correction(const std::filesystem::path& summary, bool anyway) {
@@ -282,7 +266,7 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
   }
   tinyxml2::XMLPrinter text;
   document.Print(&text);
-  write_text(out, text.CStr());
+  replace_file(out, text.CStr());
 }
 
 std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup, const StereoRig& rig,
@@ -299,8 +283,7 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
   const auto json = nlohmann::ordered_json::parse(stream);
   check_same_extended_model(summary, json, setup, model);
   check_same_robot(summary, json, setup, model_hash_of(setup, *robot, model), anyway, correction.warnings);
-  std::error_code error;
-  std::filesystem::create_directories(out, error);
+  make_folder(out);
   write_corrected_urdf(setup.model.urdf, correction, out / "corrected.urdf");
   std::string yaml = "# encoder = true + offset: subtract from every encoder reading. Degrees.\n";
   std::string delta =
@@ -333,8 +316,8 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
     yaml += "# Estimated beside the offsets; not to be applied.\nnuisance:\n";
     for (const auto& [name, value] : correction.nuisances) yaml += fmt::format("  {}: {:.6g}\n", name, value);
   }
-  write_text(out / "offsets.yaml", yaml);
-  write_text(out / "calibration_delta.txt", delta);
+  replace_file(out / "offsets.yaml", yaml);
+  replace_file(out / "calibration_delta.txt", delta);
   std::string files =
       warnings + fmt::format("corrected URDF        {}\noffsets by joint      {}\niCub calibrationDelta {}\n",
                              (out / "corrected.urdf").string(), (out / "offsets.yaml").string(),
@@ -343,11 +326,11 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
   const bool cameras =
       std::any_of(applied.begin(), applied.end(), [](const auto& a) { return a.applied == "cameras.yaml"; });
   if (cameras) {
-    write_text(out / "cameras.yaml", cameras_yaml(model->corrected(rig)));
+    replace_file(out / "cameras.yaml", cameras_yaml(model->corrected(rig)));
     files += fmt::format("camera intrinsics     {}\n", (out / "cameras.yaml").string());
   }
   const std::string report = applied_text(applied);
-  write_text(out / "what_was_applied.txt", report);
+  replace_file(out / "what_was_applied.txt", report);
   files += fmt::format("extended model        {}\n\n{}", (out / "what_was_applied.txt").string(), report);
   return files;
 }

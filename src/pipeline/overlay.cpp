@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/write_file.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 
 namespace bodyschema {
@@ -91,14 +92,10 @@ void write_png(const std::filesystem::path& file, const Image& image) {
   cv::Mat bgr;
   cv::Mat rgb = to_matrix(image);
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-  bool written = false;
-  try {
-    if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
-    written = cv::imwrite(file.string(), bgr);
-  } catch (const std::exception&) {
-    written = false;
-  }
-  if (!written) throw FileError(file.string() + ": cannot be written");
+  std::vector<std::uint8_t> png;
+  if (!cv::imencode(".png", bgr, png)) throw FileError(file.string() + ": this picture cannot be made a PNG");
+  if (file.has_parent_path()) make_folder(file.parent_path());
+  write_file(file, {reinterpret_cast<const char*>(png.data()), png.size()});
 }
 
 }  // namespace bodyschema

@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 #include "bodyschema/bus/yarp_import.hpp"
-#include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/effects/online_error_model.hpp"
 #include "model_hash.hpp"

@@ -11,6 +11,7 @@
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
+#include "bodyschema/core/write_file.hpp"
 #include "bodyschema/pipeline/hand_errors.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
@@ -82,10 +83,8 @@ class Replay {
   Replay(const Configuration& configuration, const ReplayOptions& options)
       : options_(options), pipeline_(configuration) {
     configuration.reject_unknown_keys();
-    std::error_code error;
-    std::filesystem::create_directories(options.out, error);
-    estimates_.open(options.out / "estimates.jsonl");
-    if (!estimates_) throw FileError(options.out.string() + ": cannot write estimates.jsonl there");
+    make_folder(options.out);
+    estimates_ = open_to_write(options.out / "estimates.jsonl");
     if (!options.truth) return;
     std::vector<std::string> cameras;
     for (const auto& camera : pipeline_.rig().cameras) cameras.push_back(camera.name);
@@ -281,9 +280,7 @@ class Replay {
     table += "weakest direction: " + last_.weakest.text + '\n';
     if (truth_) table += truth_table(summary);
     table += closing_lines(summary);
-    std::ofstream file(options_.out / "summary.json");
-    file << summary.dump(2) << '\n';
-    if (!file.flush()) throw FileError((options_.out / "summary.json").string() + ": cannot be written");
+    write_file(options_.out / "summary.json", summary.dump(2) + '\n');
     return table;
   }
 

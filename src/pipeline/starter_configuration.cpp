@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <set>
 #include <spdlog/fmt/fmt.h>
@@ -11,6 +10,7 @@
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
+#include "bodyschema/core/write_file.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/robot/robot_model.hpp"
 
@@ -282,9 +282,7 @@ std::string simulator_yaml(const StarterOptions& options) {
 void write_new(const fs::path& file, const std::string& text) {
   std::error_code ignored;
   if (fs::exists(file, ignored)) throw FileError(file.string() + ": is there already and is not replaced");
-  std::ofstream stream(file);
-  stream << text;
-  if (!stream.flush()) throw FileError(file.string() + ": cannot be written");
+  replace_file(file, text);  // on a full disk nothing half done stands in the way of the next try
 }
 
 }  // namespace
@@ -301,8 +299,7 @@ std::string write_starter_configuration(const StarterOptions& options) {
 
   const double focal_px =
       options.focal_px > 0.0 ? options.focal_px : 0.5 * options.width / std::tan(0.5 * kGuessedFieldOfView_rad);
-  std::error_code error;
-  fs::create_directories(options.out, error);
+  make_folder(options.out);
   write_new(options.out / "robot.yaml", robot_yaml(options, parts, tree.mesh_roots(), focal_px));
   write_new(options.out / "estimator.yaml", estimator_yaml(options));
   write_new(options.out / "simulator.yaml", simulator_yaml(options));

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "bodyschema/core/base64.hpp"
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/write_file.hpp"
 #include "chart_js.hpp"
 
 namespace bodyschema {
@@ -277,11 +277,8 @@ std::string Report::html() const {
 }
 
 void Report::write(const std::filesystem::path& file) const {
-  std::error_code error;
-  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
-  std::ofstream stream(file);
-  stream << html();
-  if (!stream.flush()) throw FileError(file.string() + ": cannot be written");
+  if (file.has_parent_path()) make_folder(file.parent_path());
+  write_file(file, html());
 }
 
 }  // namespace bodyschema

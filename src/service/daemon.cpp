@@ -23,6 +23,7 @@
 
 #include "bodyschema/core/clock.hpp"
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/write_file.hpp"
 #include "bodyschema/pipeline/estimate_line.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/service/health.hpp"
@@ -107,8 +108,8 @@ void try_to_create(const std::filesystem::path& file) {
     return;
   }
   const int reason = errno;
-  for (const int passes : {ENOSPC, EDQUOT, EROFS, EIO, EMFILE, ENFILE, ENOMEM}) {
-    if (reason == passes) throw DeviceError(file.string() + ": cannot be created: " + std::strerror(reason));
+  if (write_failure_passes(reason)) {
+    throw DeviceError(file.string() + ": cannot be created: " + std::strerror(reason));
   }
 }
 
@@ -250,6 +251,7 @@ class Daemon {
       fresh->pipeline->take_background_from(*session_->pipeline);
     }
     session_ = std::move(fresh);
+    if (recorder_) recorder_->set_room(room_to_wait(session_->pipeline->rig()));
     session_->receiver.start();
     Pipeline& loaded = *session_->pipeline;
     engine_ = loaded.estimator().engine_description();

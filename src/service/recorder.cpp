@@ -36,6 +36,11 @@ void Recorder::record(const std::string& channel, Microseconds time_us, Bytes me
   filled_.notify_one();
 }
 
+void Recorder::set_room(std::size_t max_waiting_bytes) {
+  const std::lock_guard lock(mutex_);
+  max_waiting_bytes_ = max_waiting_bytes;
+}
+
 Recorder::State Recorder::state() const {
   const std::lock_guard lock(mutex_);
   return state_;

@@ -139,6 +139,11 @@ FaultSite::FaultSite(std::shared_ptr<const RobotModel> robot, const RobotSetup& 
   kinematics.compute(setup.default_joints(*model), poses);
 
   for (const auto& name : setup.estimated_joints) arm.push_back(model->joint_index(name));
+  // An eye may also tilt by itself: its pan is the joint that turns its gaze the furthest sideways.
+  const auto sideways = [&](Eigen::Index joint, std::size_t camera) {
+    const Eigen::Matrix3d R_WC = poses[first_camera + camera].linear();
+    return std::abs(kinematics.joint_axis(joint).direction_W.cross(R_WC.col(2)).dot(R_WC.col(0)));
+  };
   for (const auto& name : setup.head_joints) {
     const auto joint = model->joint_index(name);
     bool all = true;
@@ -151,7 +156,9 @@ FaultSite::FaultSite(std::shared_ptr<const RobotModel> robot, const RobotSetup& 
     if (all) {
       head.push_back(joint);
     } else if (any) {
-      (kinematics.moves(joint, first_camera) ? left_pan : right_pan) = joint;
+      const std::size_t camera = kinematics.moves(joint, first_camera) ? 0 : 1;
+      auto& pan = camera == 0 ? left_pan : right_pan;
+      if (!pan || sideways(joint, camera) > sideways(*pan, camera)) pan = joint;
     }
   }
   // What curls a finger turns about the axis of its last joint, or nearly so; the thumb's opposition and

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/write_file.hpp"
 
 namespace bodyschema::simulator {
 namespace {
@@ -118,8 +119,8 @@ bool FramePublisher::publish(const SimulatedFrame& frame, MessageSink& sink, con
 
 TruthWriter::TruthWriter(std::filesystem::path file, const Simulator& simulator, const RobotSetup& setup,
                          Microseconds utime_shift)
-    : file_(std::move(file)), stream_(file_), joint_names_(simulator.joint_names()), utime_shift_(utime_shift) {
-  if (!stream_) throw FileError(file_.string() + ": cannot be written");
+    : file_(std::move(file)), stream_(open_to_write(file_)), joint_names_(simulator.joint_names()),
+      utime_shift_(utime_shift) {
   const SimulationPlan& plan = simulator.plan();
   const TrueRobot& robot = simulator.robot();
   Json offsets = Json::object();

@@ -11,6 +11,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/file_size.hpp"
+#include "bodyschema/core/write_file.hpp"
 
 namespace bodyschema {
 namespace {
@@ -19,15 +20,16 @@ constexpr std::uintmax_t kMaxBytes = 64u << 20;
 constexpr int kMaxSide_px = 16384;
 
 void write(const std::filesystem::path& file, const cv::Mat& picture) {
-  std::error_code ignored;
-  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), ignored);
-  bool written = false;
+  std::vector<std::uint8_t> bytes;
+  bool encoded = false;
   try {
-    written = cv::imwrite(file.string(), picture);
+    encoded = cv::imencode(file.extension().string(), picture, bytes);
   } catch (const cv::Exception&) {
     // An unknown extension; reported below with the file's name.
   }
-  if (!written) throw FileError(file.string() + ": cannot write this picture");
+  if (!encoded) throw FileError(file.string() + ": cannot write such a picture, expected .png");
+  if (file.has_parent_path()) make_folder(file.parent_path());
+  write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace

@@ -73,5 +73,17 @@ TEST(JointAssembler, AStampFarAheadOfASilentSenderHidesTheOthersForTwoMessagesOn
   }
 }
 
+/// The other arm's board publishes as often as ours, ten seconds ahead for good.
+TEST(JointAssembler, TheClockOfAnIdleJointThatStaysAheadHoldsUpNobody) {
+  JointAssembler assembler({"arm", "leg"}, {{"leg", 0.5}}, kClockStep, {"leg"});
+  for (Microseconds t = 10; t <= 60; t += 10) {
+    EXPECT_EQ(assembler.take(message(10'000'000 + t, {"leg"}, {9.0F})), nullptr);
+    const JointSample* sample = assembler.take(message(t, {"arm"}, {4.0F}));
+    ASSERT_NE(sample, nullptr);
+    EXPECT_EQ(sample->utime, t);
+    EXPECT_EQ(sample->q, Eigen::Vector2d(4.0, 0.5));
+  }
+}
+
 }  // namespace
 }  // namespace bodyschema

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "diagnosis/regression_blocks.hpp"
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 
 namespace bodyschema {
 namespace {

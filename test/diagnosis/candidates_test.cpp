@@ -7,7 +7,7 @@
 
 #include "block_plan.hpp"
 #include "diagnosis/edited_log.hpp"
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 #include "regression.hpp"
 
 namespace bodyschema::diagnosis {

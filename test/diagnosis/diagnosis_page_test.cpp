@@ -8,11 +8,12 @@
 #include <random>
 #include <sstream>
 
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 
 namespace bodyschema {
 namespace {
 
+using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -48,13 +49,14 @@ DiagnosisReport report() {
   for (int i = 0; i < 300; ++i) {
     ResidualSample s;
     s.time_s = 0.2 * i;
-    s.rms_px_before = 0.9;
-    s.rms_px_after = 0.3;
+    s.before.rms_px = 0.9;
+    s.after.rms_px = 0.3;
     s.angle_deg = {10.0, 60.0 + 30.0 * std::sin(0.1 * i)};
     s.velocity_deg_s = {0.0, 15.0 * std::cos(0.1 * i)};
     s.torque_nm = {0.0, 0.0};
-    s.apparent_deg_before = {normal(random), 0.04 * (s.angle_deg[1] - 60.0) + normal(random)};
-    s.apparent_deg_after = {normal(random), normal(random)};
+    s.before.apparent_deg = {normal(random), 0.04 * (s.angle_deg[1] - 60.0) + normal(random)};
+    s.after.apparent_deg = {normal(random), normal(random)};
+    s.noise = s.after;
     r.samples.push_back(std::move(s));
   }
   return r;
@@ -87,6 +89,26 @@ TEST(DiagnosisPage, ShowsTheJointThatFollowsItsVariable) {
   const auto page = page_of(report());
   EXPECT_THAT(page, HasSubstr("r_elbow against its angle (strongest of 2 joints)"));
   EXPECT_THAT(page, Not(HasSubstr("against its gravity torque")));  // nobody knows the torques
+}
+
+/// What no effect explains stays in the charts; taken for noise that stays alike it made its own bands so wide that
+/// nothing stood out of them, and another joint was shown.
+TEST(DiagnosisPage, ACurveThatNothingExplainsStandsOut) {
+  auto r = report();
+  std::mt19937_64 random(test::seed());
+  std::normal_distribution<double> normal(0.0, 0.1);
+  for (auto& s : r.samples) {
+    s.noise.apparent_deg = {normal(random), normal(random)};
+    s.before.apparent_deg = s.noise.apparent_deg;
+    s.before.apparent_deg[1] += std::sin(0.2 * s.time_s);
+    s.after = s.before;
+  }
+  const auto page = page_of(r);
+  EXPECT_THAT(page, HasSubstr("r_elbow over time (strongest of 2 joints)"));
+  // Root mean square of the sine, before and after, where the table has the other joint's noise.
+  const auto row = page.find(">r_elbow<", page.find("deg, before &gt; after"));
+  ASSERT_NE(row, std::string::npos);
+  EXPECT_THAT(page.substr(row, page.find("</tr>", row) - row), ContainsRegex("0\\.[67][0-9] &gt; 0\\.[67]"));
 }
 
 TEST(DiagnosisPage, OfNothingFoundSaysNothingOfCauses) {

@@ -14,6 +14,7 @@ struct Fitted {
   Selection selection;
   ModelFit after;
   SelectionOptions rules;
+  std::size_t blocks = rules.usual_blocks;
 
   std::size_t add_candidate(const std::string& name, const EffectTarget& target, bool nuisance = false) {
     Candidate candidate;
@@ -28,7 +29,10 @@ struct Fitted {
 
   /// A cause that the model holds, at so many standard errors.
   void add_cause(std::size_t candidate, double z, double gain, std::vector<std::size_t> same = {}) {
-    selection.causes.push_back({candidate, {z, gain, 0.0, true}, std::move(same), false});
+    SelectedCause cause{.candidate = candidate, .score = {z, gain, 0.0, true}};
+    cause.gain_judged = gain;
+    cause.same = std::move(same);
+    selection.causes.push_back(std::move(cause));
     auto& effect = model.add(set.candidates[candidate].name, set.candidates[candidate].target);
     effect.parameters()[0].value = z * effect.parameters()[0].typical;
     refit();
@@ -41,6 +45,7 @@ struct Fitted {
     const auto n = static_cast<Eigen::Index>(after.parameters.size());
     after.fit.covariance = Eigen::MatrixXd::Identity(n, n);
     after.fit.usable = true;
+    after.statistics.emplace(std::vector<BlockStatistics::Block>(blocks, {{}, {}, 1.0, 1.0, {}}));
   }
 
   bool drop() { return drop_weakest(selection, set, after, rules, model); }
@@ -78,6 +83,25 @@ TEST(DropWeakest, AsksLessOfACauseInTimeThatTakesAwayMuch) {
   EXPECT_TRUE(stays("encoder_gain", 4.6, 0.3));
 }
 
+/// Standard errors of ten blocks are known worse, before the fit and after it.
+TEST(DropWeakest, AsksMoreWhereBlocksAreFew) {
+  for (const auto& [blocks, z, stays] :
+       {std::tuple{30, 4.6, true}, std::tuple{10, 4.6, false}, std::tuple{10, 7.0, true}}) {
+    Fitted fitted;
+    fitted.blocks = static_cast<std::size_t>(blocks);
+    fitted.add_cause(fitted.add_candidate("latency", {}), z, 0.1);
+    EXPECT_EQ(!fitted.drop(), stays) << blocks << " blocks, z " << z;
+  }
+}
+
+/// As the selection asked: later a nuisance that is a cause too makes every share smaller.
+TEST(DropWeakest, AsksByTheShareThatTheCauseEnteredWith) {
+  Fitted fitted;
+  fitted.add_cause(fitted.add_candidate("drift", {"elbow", ""}), 3.6, 0.3);
+  fitted.selection.causes[0].score.gain = 0.2;
+  EXPECT_FALSE(fitted.drop());
+}
+
 TEST(DropWeakest, DropsACauseThatIsNotInTheModel) {
   Fitted fitted;
   const auto slip = fitted.add_candidate("slip", {"elbow", ""});
@@ -107,6 +131,19 @@ TEST(DropWeakest, PutsBackTheNuisanceThatTheCauseStoodFor) {
   EXPECT_EQ(back->parameters()[0].value, 0.0);
   EXPECT_EQ(fitted.model.find("focal_length", {}), nullptr);  // the distortion still stands for it
   EXPECT_EQ(fitted.model.find("mesh_scale", {}), nullptr);
+}
+
+TEST(DropWeakest, LeavesOutNuisancesThatAnotherCauseReplaced) {
+  Fitted fitted;
+  const auto vergence = fitted.add_candidate("vergence", {}, true);
+  const auto focal = fitted.add_candidate("focal_length", {}, true);
+  fitted.add_cause(fitted.add_candidate("baseline", {}), 9.0, 0.1);
+  fitted.selection.causes[0].replaced = {vergence, focal};
+  fitted.add_cause(fitted.add_candidate("drift", {"elbow", ""}), 1.0, 0.1);
+  ASSERT_TRUE(fitted.drop());
+  EXPECT_EQ(fitted.model.find("drift", {"elbow", ""}), nullptr);
+  EXPECT_EQ(fitted.model.find("vergence", {}), nullptr);
+  EXPECT_EQ(fitted.model.find("focal_length", {}), nullptr);
 }
 
 }  // namespace

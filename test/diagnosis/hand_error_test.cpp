@@ -2,7 +2,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "diagnosis/edited_log.hpp"
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 
 /// The motion of the hand that residuals ask for, where the two eyes of an instant are not what one expects.
 namespace bodyschema {

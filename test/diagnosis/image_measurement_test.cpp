@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "bodyschema/effects/corrected_kinematics.hpp"
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 
 namespace bodyschema {
 namespace {

@@ -10,7 +10,7 @@
 #include "bodyschema/core/error.hpp"
 #include "diagnosis/binomial.hpp"
 #include "diagnosis/edited_log.hpp"
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 
 /// Logs on which a lazy diagnosis goes wrong, at the level of silhouettes.
 namespace bodyschema {

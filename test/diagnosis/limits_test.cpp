@@ -7,7 +7,7 @@
 
 #include "bodyschema/effects/catalogue.hpp"
 #include "diagnosis/binomial.hpp"
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 
 /// What a log excludes, at the level of silhouettes.
 namespace bodyschema {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "bodyschema/effects/catalogue.hpp"
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 
 namespace bodyschema {
 namespace {

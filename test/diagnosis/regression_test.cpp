@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "diagnosis/regression_blocks.hpp"
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 
 namespace bodyschema {
 namespace {
@@ -325,6 +325,58 @@ TEST(Selection, ASlipLastsBesideOneNearTheEnd) {
   }
 }
 
+/// One cause that does what two nuisances did together is named in their place, and remembers them.
+TEST(Selection, ACauseRemembersTheNuisancesThatItReplaced) {
+  int named = 0;
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    std::mt19937_64 random(test::seed() + i);
+    std::normal_distribution<double> normal;
+    Eigen::MatrixXd X(kLong, 4);
+    Eigen::VectorXd y(kLong);
+    for (Eigen::Index r = 0; r < kLong; ++r) {
+      const double a = normal(random), b = normal(random);
+      X.row(r) << 1.0, a, b, a + b + 0.02 * normal(random);  // too little of its own to show beside both
+      y[r] = X(r, 3) + normal(random);
+    }
+    std::vector<Candidate> candidates = {candidate("one", 1), candidate("two", 2), candidate("cause", 3)};
+    candidates[0].nuisance = candidates[1].nuisance = true;
+    SelectionOptions options;
+    options.crowd_rest_t = 1e9;  // a single candidate is no crowd
+    const auto selection = select_causes(test::statistics_of(X, y, 30), {{0}}, candidates, options);
+    // Whether it does as well as both is asked at two standard errors: not always.
+    if (found(selection) != std::vector<std::size_t>{2}) continue;
+    ++named;
+    EXPECT_EQ(selection.causes[0].replaced, (std::vector<std::size_t>{0, 1})) << "seed " << test::seed() + i;
+    EXPECT_EQ(selection.model, (std::vector<std::size_t>{2})) << "seed " << test::seed() + i;
+  }
+  EXPECT_GE(named, 5) << "seed " << test::seed();
+}
+
+/// Nothing is known of how a curve of three columns spreads over three groups of blocks.
+TEST(Selection, ACurveInTimeDoesNotLastByGroupsThatAreAsFewAsItsColumns) {
+  constexpr Eigen::Index kBlocks = 9;
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    std::mt19937_64 random(test::seed() + i);
+    std::normal_distribution<double> normal;
+    Eigen::MatrixXd X(kLong, 4);
+    Eigen::VectorXd y(kLong);
+    for (Eigen::Index r = 0; r < kLong; ++r) {
+      X.row(r) << 1.0, normal(random), normal(random), normal(random);
+      y[r] = 0.2 * X.row(r).tail(3).sum() + normal(random);
+    }
+    auto curve = candidate("unexplained", 1);
+    curve.columns = {{1}, {2}, {3}};
+    curve.variable = "angle";
+    SelectionOptions options;
+    options.crowd_rest_t = 1e9;  // a single candidate is no crowd
+    const auto statistics = test::statistics_of(X, y, kBlocks);
+    const auto causes = [&] { return select_causes(statistics, {{0}}, {curve}, options).causes.size(); };
+    EXPECT_EQ(causes(), 1u) << "seed " << test::seed() + i;
+    curve.variable = "time";
+    EXPECT_EQ(causes(), 0u) << "seed " << test::seed() + i;
+  }
+}
+
 /// Ten blocks know their spread no better if twenty in which the hand was hidden lie between them.
 TEST(Selection, BlocksInWhichNothingWasSeenProveNothing) {
   constexpr Eigen::Index kBlocks = 10, kPerBlock = 20;
@@ -349,6 +401,7 @@ TEST(Selection, BlocksInWhichNothingWasSeenProveNothing) {
     const auto none = select_causes(*statistics, {{0}}, candidates, options);
     EXPECT_TRUE(none.causes.empty());
     EXPECT_NEAR(none.first_scores[0].z, 5.0, 0.05);
+    EXPECT_NEAR(none.first_scores[0].t, select_causes(few, {{0}}, candidates, options).first_scores[0].t, 1e-9);
   }
   options.usual_blocks = kBlocks;
   EXPECT_EQ(select_causes(few, {{0}}, candidates, options).causes.size(), 1u);

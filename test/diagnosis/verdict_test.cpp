@@ -84,6 +84,17 @@ TEST(Verdict, TrustsNoNameWhereTheFitStillMissesTheOutlines) {
   EXPECT_THAT(report.sentence, HasSubstr("encoder_gain of r_elbow"));
 }
 
+/// A kink of 1.5 deg in an elbow was named an eccentricity of 16 deg.
+TEST(Verdict, TrustsNoNameOfASizeThatNoRobotHas) {
+  auto cause = gain_of_elbow();
+  cause.implausible = true;
+  auto report = report_of(0.3, {cause});
+  word_verdict(report, picture_options());
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, HasSubstr("larger than on any robot"));
+  EXPECT_THAT(report.sentence, HasSubstr("encoder_gain of r_elbow gain 4 %"));
+}
+
 TEST(Verdict, TrustsNoNameWhereMuchOfTheOutlineIsMissing) {
   for (const bool with_cause : {true, false}) {
     auto report = report_of(0.3, {});

@@ -1,10 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
 
 #include "bodyschema/effects/effect.hpp"
+#include "robot/tilting_eyes.hpp"
 #include "test_data.hpp"
 
 namespace bodyschema {
@@ -66,33 +65,8 @@ TEST(JointRoles, ComeFromTheRootOutwardsHoweverTheyAreListed) {
   EXPECT_EQ(name_of(r, r.roles.arm.front()), "r_shoulder_pitch");
 }
 
-/// Eyes that pan and tilt each by themselves: the left one hangs its tilt on its pan, the right one the other way.
 TEST(JointRoles, OfAnEyeThatTiltsByItselfThePanTurnsAboutTheVertical) {
-  const auto joint = [](const char* name, const char* parent, const char* child, const char* axis) {
-    return std::string("<joint name='") + name + "' type='revolute'><parent link='" + parent + "'/><child link='" +
-           child + "'/><axis xyz='" + axis + "'/><limit lower='-1' upper='1' effort='1' velocity='1'/></joint>";
-  };
-  const auto camera = [](const char* name, const char* parent) {
-    return std::string("<joint name='at_") + name + "' type='fixed'><parent link='" + parent + "'/><child link='" +
-           name + "'/><origin rpy='-1.5708 0 -1.5708'/></joint>";
-  };
-  std::string urdf = "<robot name='eyes'>";
-  for (const char* link : {"root", "head", "l_outer", "l_inner", "r_outer", "r_inner", "left", "right", "hand"}) {
-    urdf += std::string("<link name='") + link + "'/>";
-  }
-  urdf += joint("neck", "root", "head", "0 0 1") + joint("l_pan", "head", "l_outer", "0 0 1") +
-          joint("l_tilt", "l_outer", "l_inner", "0 1 0") + joint("r_tilt", "head", "r_outer", "0 1 0") +
-          joint("r_pan", "r_outer", "r_inner", "0 0.1 -1") + joint("arm", "root", "hand", "0 1 0") +
-          camera("left", "l_inner") + camera("right", "r_inner") + "</robot>";
-  RobotSetup setup;
-  setup.model.urdf = std::filesystem::path(testing::TempDir()) / "eyes_that_tilt.urdf";
-  std::ofstream(setup.model.urdf) << urdf;
-  setup.hand_link = "hand";
-  setup.estimated_joints = {"arm"};
-  StereoRig rig;
-  rig.cameras.resize(2);
-  rig.cameras[0].link = "left";
-  rig.cameras[1].link = "right";
+  auto [setup, rig] = test::tilting_eyes();
   for (const auto& listed :
        {Names{"neck", "l_pan", "l_tilt", "r_tilt", "r_pan"}, Names{"r_pan", "r_tilt", "l_tilt", "l_pan", "neck"}}) {
     setup.head_joints = listed;

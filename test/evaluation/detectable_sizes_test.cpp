@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "bodyschema/core/configuration.hpp"
-#include "bodyschema/diagnosis/trials.hpp"
+#include "bodyschema/diagnosis_trials/trials.hpp"
 #include "bodyschema/simulator/simulator.hpp"
 
 namespace bodyschema {

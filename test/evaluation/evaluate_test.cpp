@@ -71,7 +71,9 @@ TEST(Evaluate, ExperimentsThatRunAnotherNumberOfTrialsSaySo) {
                                                                       {"leave", "at most 14 trials"},
                                                                       {"camera", "at most 14 trials"},
                                                                       {"ablation", "at most 10 trials"},
-                                                                      {"offsets", "always 6 trials"}}) {
+                                                                      {"offsets", "always 6 trials"},
+                                                                      {"likelihood", "always one trial"},
+                                                                      {"recording", "always one log"}}) {
     EXPECT_THAT(meanings.at(name), HasSubstr(words)) << name;
   }
 }

@@ -51,7 +51,9 @@ def mistyped_keys_are_refused(program, scratch):
     wrong = []
     for words, keys in ((["export", "x", "--out", scratch / "not_made"], ("buss", "robot.hand_lnk")),
                         (["import-yarp", "x", "--out", scratch / "not_made"], ("yarp_imports", "buss", "bus.prefx")),
-                        (["log", "info", log], ("buss", "cameras.left.fxx"))):
+                        (["log", "info", log], ("buss", "cameras.left.fxx")),
+                        (["log", "info", log, "--json"], ("buss", "robot.hand_lnk")),
+                        (["log", "to-mcap", log, "--out", scratch / "not_made"], ("buss", "robot.hand_lnk"))):
         for key in keys:
             setting = key if "." in key else f"{key}.x"
             ran = subprocess.run([program, *words, "--config", "config/icub_right/estimator.yaml", "--set",

@@ -305,6 +305,21 @@ TEST(HiddenEffect, IsFoundBehindFreshSeeds) {
   EXPECT_GE(parameters.held, least) << "of " << parameters.known << "; repeat with BODYSCHEMA_SEED=" << seed();
 }
 
+/// Beside a free curve of the same joint the linear estimate of an eccentricity was hundreds of degrees. Nothing was
+/// seen from there, and "0.000 px are left" was what the report said.
+TEST(HiddenEffect, AnEstimateThatRunsOffIsTakenBack) {
+  const Scratch scratch;
+  const auto answer =
+      ask(scratch, "kink", {"--babble", "60", "--seed", "21", "--hidden-outside", "--hidden-fault", "21"});
+  ASSERT_EQ(answer.error, "");
+  const auto& heldout = answer.report["heldout"];
+  EXPECT_LT(heldout["after"]["rms_px"].get<double>(), heldout["before"]["rms_px"].get<double>());
+  EXPECT_GT(heldout["after"]["rms_px"].get<double>(), 0.2) << "less than masks can tell";
+  EXPECT_NEAR(heldout["after"]["outline_where_seen"].get<double>(),
+              heldout["before"]["outline_where_seen"].get<double>(), 0.09);
+  EXPECT_EQ(text_of(answer.report, "verdict"), "unexplained") << sentence_of(answer);
+}
+
 bool not_testable(const Json& report, const std::string& name, const std::string& joint) {
   return std::any_of(report["not_testable"].begin(), report["not_testable"].end(),
                      [&](const Json& n) { return text_of(n, "name") == name && text_of(n, "joint") == joint; });

@@ -433,6 +433,42 @@ TEST_F(Service, FilesThatAFullDiskDoesNotTakeAreNoWrongInput) {
   }
 }
 
+// Nor where the disk has no room for a name.
+TEST_F(Service, AFullDiskIsNoWrongInputOfAnyCommand) {
+  const std::string programs = std::string(BODYSCHEMA_BINARY_DIR) + "/bin/";
+  const std::string short_log = std::string(BODYSCHEMA_SOURCE_DIR) + "/test/pipeline/logs/version_0_1_0.lcmlog";
+  const std::string simulator = std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/simulator.yaml";
+  const std::string disk = (scratch_ / "disk").string(), log = (scratch_ / "no.lcmlog").string();
+  std::filesystem::create_directories(disk);
+  const std::vector<std::vector<std::string>> commands = {
+      {"bodyschema", "replay", short_log, "--config", reach_configuration(), "--out", disk},
+      {"bodyschema", "replay", short_log, "--config", reach_configuration(), "--out", disk + "/folder"},
+      {"bodyschema", "diagnose", short_log, "--config", reach_configuration(), "--out", disk},
+      {"bodyschema", "evaluate", "likelihood", "--out", disk},
+      {"bodyschema", "log", "to-mcap", short_log, "--out", disk + "/log.mcap"},
+      {"bodyschema-sim", "--config", simulator, "--frames", "2", "--log", disk + "/log"},
+      {"bodyschema-sim", "--config", simulator, "--frames", "2", "--log", log, "--truth", disk + "/truth.json"}};
+  for (const auto& command : commands) {
+    std::vector<std::string> words = {
+        "unshare",
+        "-rm",
+        "sh",
+        "-c",
+        "mount -t tmpfs -o size=64k,nr_inodes=1 full \"$1\" || exit 77; shift; exec \"$@\"",
+        "sh",
+        disk,
+        programs + command.front()};
+    words.insert(words.end(), command.begin() + 1, command.end());
+    Process process(words, scratch_.folder());
+    const auto status = process.wait(kStart);
+    if (status == 77 || status == 127 || (status && process.err().find("unshare") != std::string::npos)) {
+      GTEST_SKIP() << "no file system can be mounted here: " << process.err();
+    }
+    EXPECT_EQ(status, 1) << command[1] << ": " << process.err();
+    EXPECT_THAT(process.err(), HasSubstr("cannot be written: No space left on device")) << command[1];
+  }
+}
+
 TEST_F(Service, StatusFollowsWhatHappens) {
   Listener listener(url_);
   Process service(daemon(), scratch_.folder());
@@ -621,6 +657,13 @@ TEST_F(Service, NumbersThatAreNoneAreRefusedByOptionAndValue) {
 TEST_F(Service, ExitStatusMeansTheSameInEveryProgram) {
   const std::string simulator = std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/simulator.yaml";
   const std::string log = (scratch_ / "no.lcmlog").string(), out = (scratch_ / "out").string();
+  const std::string short_log = std::string(BODYSCHEMA_SOURCE_DIR) + "/test/pipeline/logs/version_0_1_0.lcmlog";
+  // A disk that is full once all the work is done.
+  const std::filesystem::path full = scratch_ / "full";
+  std::filesystem::create_directories(full);
+  for (const char* name : {"summary.json", "truth.json", "log.mcap"}) {
+    std::filesystem::create_symlink("/dev/full", full / name);
+  }
   struct Case {
     int status;
     std::vector<std::string> command;
@@ -638,6 +681,15 @@ TEST_F(Service, ExitStatusMeansTheSameInEveryProgram) {
        {"bodyschema-sim", "--config", simulator, "--log", log, "--set", "simulator.motion.distance_min_m=1.9", "--set",
         "simulator.motion.distance_max_m=2"},
        "no reach found"},
+      {1,
+       {"bodyschema", "replay", short_log, "--config", reach_configuration(), "--set", "vision.learning_frames=5",
+        "--out", full.string()},
+       "summary.json: cannot be written: No space left on device"},
+      {1,
+       {"bodyschema-sim", "--config", simulator, "--frames", "2", "--log", log, "--truth",
+        (full / "truth.json").string()},
+       "truth.json: cannot be written"},
+      {1, {"bodyschema", "log", "to-mcap", short_log, "--out", (full / "log.mcap").string()}, "log.mcap: cut short"},
   };
   for (const auto& [status, command, words] : cases) {
     Process process(command, scratch_.folder());

@@ -17,5 +17,28 @@ TEST(McapWriter, RefusesMoreChannelsThanThereAreNumbers) {
               testing::ThrowsMessage<FileError>(testing::HasSubstr("65535")));
 }
 
+TEST(McapWriter, FollowsALinkAndDoesNotReplaceADevice) {
+  const auto link = testing_logs::scratch_file("link.mcap"), file = testing_logs::scratch_file("file.mcap");
+  std::filesystem::remove(link);
+  std::filesystem::create_symlink(file, link);
+  {
+    McapWriter writer(link);
+    writer.close();
+  }
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_GT(std::filesystem::file_size(file), 16u);
+  std::filesystem::remove(link);
+  std::filesystem::create_symlink("/dev/full", link);
+  const auto write_to_full_disk = [&] {
+    McapWriter writer(link);
+    const auto channel = writer.add_channel("/t", writer.add_schema("s", "{}"));
+    writer.write(channel, 1, 1, std::string(100'000, ' '));
+    writer.close();
+  };
+  EXPECT_THROW(write_to_full_disk(), DeviceError);
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_FALSE(std::filesystem::exists(link.string() + ".part"));
+}
+
 }  // namespace
 }  // namespace bodyschema

@@ -178,7 +178,7 @@ TEST_F(ExportCorrection, WhatADeviceDoesNotTakeIsAnError) {
     try {
       export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
       ADD_FAILURE() << "no error: " << file;
-    } catch (const FileError& e) {
+    } catch (const DeviceError& e) {
       EXPECT_THAT(e.what(), ::testing::HasSubstr(full.string()));
     }
     fs::remove_all(folder_ / "out");
@@ -199,12 +199,12 @@ TEST_F(ExportCorrection, AFullDiskIsAnErrorAndLeavesWhatWasThereWhole) {
   std::string message;
   try {
     export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
-  } catch (const FileError& e) {
+  } catch (const DeviceError& e) {
     message = e.what();
   }
   setrlimit(RLIMIT_FSIZE, &limit);
   std::signal(SIGXFSZ, usual);
-  EXPECT_EQ(message, (folder_ / "out/corrected.urdf").string() + ": cannot be written; is the disk full?");
+  EXPECT_EQ(message, (folder_ / "out/corrected.urdf").string() + ": cannot be written: File too large");
   EXPECT_EQ(content("out/corrected.urdf"), before);
   EXPECT_FALSE(fs::exists(folder_ / "out/corrected.urdf.part"));
 }

@@ -93,6 +93,24 @@ TEST(Recorder, WhatWaitsIsBounded) {
   disk.resume(recorder, given);
 }
 
+/// After a reload with larger pictures.
+TEST(Recorder, TakesMoreOnceItIsGivenRoom) {
+  const StalledDisk disk("room");
+  ASSERT_TRUE(disk.ok());
+  Recorder recorder(disk.file, 1000);
+  const std::vector<std::uint8_t> large(100'000, 7);  // fits neither the bound nor the pipe
+  std::uint64_t given = 0;
+  const auto taken = [&] { return given - recorder.state().lost; };
+  for (; given < 10'000 && taken() < 2; ++given) {
+    recorder.record("A", 1, large);
+    usleep(1000);
+  }
+  recorder.set_room(1'000'000);
+  for (int i = 0; i < 5; ++i, ++given) recorder.record("A", 2, large);
+  EXPECT_EQ(taken(), 7u) << "one is being written, six wait";
+  disk.resume(recorder, given);
+}
+
 TEST(Recorder, TakesAMessageOfAnySizeWhereNothingWaits) {
   const auto file = scratch_file("large.lcmlog");
   {

@@ -12,6 +12,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "bodyschema/robot/gravity_torques.hpp"
+#include "robot/tilting_eyes.hpp"
 #include "simulator/icub_right.hpp"
 
 namespace bodyschema::simulator {
@@ -426,6 +427,21 @@ TEST(Cameras, FaultsHaveTheStatedSigns) {
       EXPECT_LT((longer[i].truth[c].fingertips_px[1] - middle - 1.02 * tip).norm(), 1e-6);
       EXPECT_NEAR(shifted[i].truth[c].fingertips_px[1].y() - middle.y() - tip.y(), c == 0 ? 1.5 : -1.5, 1e-6);
     }
+  }
+}
+
+TEST(FaultSite, ThePanOfAnEyeThatTiltsByItselfTurnsItSideways) {
+  auto [setup, rig] = test::tilting_eyes();
+  using Names = std::vector<std::string>;
+  for (const auto& listed :
+       {Names{"neck", "l_pan", "l_tilt", "r_tilt", "r_pan"}, Names{"r_pan", "r_tilt", "l_tilt", "l_pan", "neck"}}) {
+    setup.head_joints = listed;
+    const auto model = std::shared_ptr<const RobotModel>(setup.load());
+    const FaultSite site(model, setup, rig);
+    ASSERT_TRUE(site.left_pan && site.right_pan);
+    EXPECT_EQ(model->joints()[static_cast<std::size_t>(*site.left_pan)].name, "l_pan");
+    EXPECT_EQ(model->joints()[static_cast<std::size_t>(*site.right_pan)].name, "r_pan");
+    EXPECT_EQ(site.head, std::vector<Eigen::Index>{model->joint_index("neck")});
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,8 +18,10 @@ class JointAssembler {
   /// @param joint_names  RobotModel order
   /// @param resting_rad  values of joints before their first reading; others at zero
   /// @param clock_step   three messages in a row further before the newest sample are stamps that begin anew
+  /// @param idle         joints of no interest: they rest whatever comes of them, so that the stamps of their
+  ///                     sender, a leg's board with a clock of its own, hold up nobody
   JointAssembler(const std::vector<std::string>& joint_names, const std::map<std::string, double>& resting_rad,
-                 Microseconds clock_step);
+                 Microseconds clock_step, const std::set<std::string>& idle = {});
 
   /// The joints as known with this message; null when it carries none of ours or is older than the last of
   /// its own joints. Stamps rise: one that others have overtaken, as where head and arm come apart, counts at

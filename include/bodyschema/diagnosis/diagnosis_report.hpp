@@ -41,6 +41,9 @@ struct DiagnosedCause {
   std::vector<CauseName> same;
   std::string advice;  ///< the motion that would tell them apart; empty for a class of one
   double z = 0.0;
+  /// Larger than any robot is wrong by (more than twenty times the effect's typical size): it fits, and stands in for
+  /// something else.
+  bool implausible = false;
   /// Share that it takes away of the held-out loss of the model `before`: without any cause that the
   /// selection found.
   double heldout_gain = 0.0;
@@ -79,17 +82,23 @@ struct CandidateBar {
   double z_after = 0.0, gain_after = 0.0;    ///< against the extended model
 };
 
-/// What is left at one exposure, for the charts of structure: the correction of each arm joint
-/// alone that the residuals ask for, before and after the extension.
+/// What a model leaves of one picture, held out.
+struct Remainder {
+  double rms_px = 0.0;               ///< along the outline's normals; 0 where nothing was found
+  double mean_px = 0.0;              ///< mean along the outward normal
+  std::vector<double> apparent_deg;  ///< correction of each arm joint alone that it asks for
+};
+
+/// One exposure, for the charts of structure.
 struct ResidualSample {
   Microseconds utime = 0;
   double time_s = 0.0;
   std::size_t camera = 0;
-  double rms_px_before = 0.0, rms_px_after = 0.0;
-  double mean_px_before = 0.0, mean_px_after = 0.0;             ///< mean along the outward normal
-  std::vector<double> angle_deg, velocity_deg_s, torque_nm;     ///< per arm joint
-  std::vector<double> apparent_deg_before, apparent_deg_after;  ///< per arm joint
-  double image_radius_px = 0.0;                                 ///< of the hand's frame from the principal point
+  Remainder before, after;
+  /// `after` without the free curves of an unexplained cause, which no model holds: what errs without being followed.
+  Remainder noise;
+  std::vector<double> angle_deg, velocity_deg_s, torque_nm;  ///< per arm joint
+  double image_radius_px = 0.0;                              ///< of the hand's frame from the principal point
   double depth_m = 0.0;
 };
 
@@ -127,9 +136,10 @@ struct DiagnosisReport {
 
   /// The keys of report.json.
   [[nodiscard]] std::string to_json() const;
-  /// Makes the folder for a report before the long work; throws FileError where nothing can be written.
+  /// Makes the folder for a report before the long work. Throws as write_file (core/write_file.hpp) where nothing can
+  /// be written.
   static void prepare(const std::filesystem::path& directory);
-  /// Writes report.json and extended_model.yaml; throws FileError.
+  /// Writes report.json and extended_model.yaml. Throws likewise.
   void write(const std::filesystem::path& directory) const;
 };
 

@@ -96,9 +96,11 @@ struct CandidateScore {
 
 struct SelectedCause {
   std::size_t candidate = 0;
-  CandidateScore score;
-  std::vector<std::size_t> same;  ///< other candidates that this log cannot tell apart from it
-  bool wanders = false;           ///< a slip or drift whose joint also moves otherwise over time
+  CandidateScore score{};
+  std::vector<std::size_t> same{};      ///< other candidates that this log cannot tell apart from it
+  std::vector<std::size_t> replaced{};  ///< nuisances that it made superfluous, several at once
+  bool wanders = false;                 ///< a slip or drift whose joint also moves otherwise over time
+  double gain_judged = 0.0;             ///< `score.gain` as a share of the baseline's loss, as thresholds ask for it
 };
 
 struct Selection {

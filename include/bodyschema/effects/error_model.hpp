@@ -30,7 +30,7 @@ class ErrorModel {
   static ErrorModel load(const std::filesystem::path& file, const JointRoles& roles);
   static ErrorModel parse(const std::string& yaml, const JointRoles& roles,
                           const std::string& origin = "extended model");
-  /// Throws FileError when the file cannot be written.
+  /// Throws as write_file (core/write_file.hpp).
   void save(const std::filesystem::path& file) const;
   [[nodiscard]] std::string to_yaml() const;
 

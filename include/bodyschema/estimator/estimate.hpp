@@ -54,7 +54,8 @@ struct Estimate {
   bool cameras_swapped = false;     ///< the left picture shows what the right eye sees and the other way
                                     ///< round; nothing is learned from them, state kDiverged. Mode best
   std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected. In one that is absent: for
-                                    ///< the encoders of another, the camera where it was known to be when last seen
+                                    ///< the encoders of another, the camera where it was known to be when last
+                                    ///< seen; never seen since the start or a reload, where its configuration has it
   std::vector<Pose> X_CP_nominal;   ///< the same with encoders and model as they are
   StageTimes times;
 };

@@ -54,7 +54,7 @@ struct FleetRobot {
 std::vector<FleetRobot> gather_fleet(const std::filesystem::path& results);
 
 /// Writes one page for people (report.html) and the same for programs (fleet.json) into `out`.
-/// Returns a line per robot. Throws FileError.
+/// Returns a line per robot. Throws as write_file (core/write_file.hpp).
 std::string write_fleet_report(const std::vector<FleetRobot>& robots, const std::filesystem::path& out);
 
 }  // namespace bodyschema

@@ -61,7 +61,7 @@ std::vector<AppliedEffect> add_extended_model(const ErrorModel& model, const std
 /// grow by it, so that FK_corrected(encoder) = FK_nominal(encoder - offset). Placements and shifts
 /// of an extended model move origins and axes. Everything else stays as it was. Relative mesh paths
 /// keep resolving only beside the original.
-/// Throws FileError naming URDF and joint, or `out` when it cannot be written; that stays as it was then.
+/// Throws FileError naming URDF and joint, and as replace_file (core/write_file.hpp) where `out` cannot be written.
 void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& correction,
                           const std::filesystem::path& out);
 
@@ -71,9 +71,9 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
 /// (where it changes intrinsics) and `what_was_applied.txt`: which of its effects these files hold, and which only work
 /// where the model itself is loaded. Each file is written whole or, where that fails, stays as it was.
 /// @param anyway  as of read_correction, and also when the summary's `model_hash` is another robot's, with a warning
-/// Throws as read_correction does, FileError for a file that cannot be written, and ConfigurationError when the summary
-/// was made with another URDF, other meshes or another extended model than `setup` has. Returns warnings and files,
-/// for people.
+/// Throws as read_correction does, as replace_file for a file that cannot be written, and ConfigurationError when the
+/// summary was made with another URDF, other meshes or another extended model than `setup` has. Returns warnings and
+/// files, for people.
 std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup, const StereoRig& rig,
                               const std::filesystem::path& out, bool anyway = false);
 

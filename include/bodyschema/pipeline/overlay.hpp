@@ -37,7 +37,7 @@ struct OverlayNames {
 /// Left and right side by side, enlarged, with a legend (none for an empty caption). RGB.
 Image draw_overlay(const std::vector<OverlayView>& views, const std::string& caption, int enlargement = 2,
                    const OverlayNames& names = {});
-/// Throws FileError when the picture cannot be written.
+/// Makes the folder too. Throws as write_file (core/write_file.hpp).
 void write_png(const std::filesystem::path& file, const Image& image);
 
 }  // namespace bodyschema

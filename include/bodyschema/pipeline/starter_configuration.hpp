@@ -21,7 +21,7 @@ struct StarterOptions {
 /// joints between root and hand that do not move the cameras too are the arm, the links they carry are
 /// what the cameras see, joints between root and a camera are the head. Says what was found and
 /// what is left to fill in, for people. Replaces no file. Throws FileError naming the URDF and what
-/// is wrong, ConfigurationError naming a link that is not there and the nearest one.
+/// is wrong, ConfigurationError naming a link that is not there and the nearest one, and as replace_file.
 std::string write_starter_configuration(const StarterOptions& options);
 
 }  // namespace bodyschema

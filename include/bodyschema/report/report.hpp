@@ -60,7 +60,7 @@ class Report {
   void chart(const Chart& chart);
   /// Throws DataError for an empty picture.
   void picture(const Image& image, const std::string& caption);
-  /// Throws FileError when the file cannot be written.
+  /// Makes the folder too. Throws as write_file (core/write_file.hpp).
   void write(const std::filesystem::path& file) const;
   [[nodiscard]] std::string html() const;
 

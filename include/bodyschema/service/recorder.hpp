@@ -28,6 +28,8 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   void record(const std::string& channel, Microseconds time_us, Bytes message);
+  /// Pictures may have another size after a reload. What waits already is kept.
+  void set_room(std::size_t max_waiting_bytes);
 
   struct State {
     std::uint64_t written = 0;
@@ -45,8 +47,8 @@ class Recorder {
   void work();
 
   LogWriter writer_;
-  const std::size_t max_waiting_bytes_;
   mutable std::mutex mutex_;
+  std::size_t max_waiting_bytes_;
   std::condition_variable filled_;
   std::deque<Message> waiting_;
   std::size_t waiting_bytes_ = 0;

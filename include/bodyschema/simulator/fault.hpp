@@ -39,7 +39,7 @@ struct FaultSite {
   std::vector<Eigen::Index> arm;                    ///< shoulder to wrist, as in RobotSetup::estimated_joints
   std::vector<Eigen::Index> head;                   ///< RobotSetup::head_joints that move both cameras
   std::vector<Eigen::Index> fingers;                ///< joints that curl a finger
-  std::optional<Eigen::Index> left_pan, right_pan;  ///< joints that move one camera only
+  std::optional<Eigen::Index> left_pan, right_pan;  ///< joints that turn one camera alone, sideways
   std::string hand_link;
   Eigen::Vector3d gravity_W{0, 0, -9.81};
   std::size_t cameras = 2;

@@ -53,12 +53,12 @@ class FramePublisher {
 /// exposure. One thread.
 class TruthWriter {
  public:
-  /// Throws FileError when the file cannot be written.
+  /// Throws as open_to_write (core/write_file.hpp).
   TruthWriter(std::filesystem::path file, const Simulator& simulator, const RobotSetup& setup,
               Microseconds utime_shift = 0);
   ~TruthWriter();  ///< closes without complaint; call close() to hear of errors
   void add(const SimulatedFrame& frame);
-  /// Throws FileError when the disk is full.
+  /// Throws DeviceError when the disk is full.
   void close();
 
  private:

@@ -4,18 +4,18 @@
 #include <utility>
 #include <vector>
 
-#include "bodyschema/diagnosis/synthetic_log.hpp"
+#include "bodyschema/diagnosis_trials/synthetic_log.hpp"
 #include "bodyschema/observation/corrections.hpp"
 #include "synthetic_path.hpp"
 
-namespace bodyschema::diagnosis {
+namespace bodyschema::trials {
 
 /// What faults do to motors, encoders and cameras of a synthetic log: physics, not the catalogue.
 class FaultyRobot {
  public:
   /// All references outlive this.
   FaultyRobot(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options, const SyntheticPath& path,
-              TrialRandom& random);
+              SeededRandom& random);
 
   /// True joint angles at a time.
   [[nodiscard]] Eigen::VectorXd true_joints(double t_s);
@@ -36,7 +36,7 @@ class FaultyRobot {
   const JointRoles& roles_;
   const TrialOptions& options_;
   const SyntheticPath& path_;
-  TrialRandom& random_;
+  SeededRandom& random_;
   InstantBuilder instants_;
   GravityTorques torques_;
   Instant scratch_;
@@ -46,4 +46,4 @@ class FaultyRobot {
   std::vector<std::pair<double, double>> kink_;  ///< centre and width, per fault
 };
 
-}  // namespace bodyschema::diagnosis
+}  // namespace bodyschema::trials

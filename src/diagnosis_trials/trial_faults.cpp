@@ -2,10 +2,10 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "bodyschema/diagnosis/trials.hpp"
+#include "bodyschema/core/seeded_random.hpp"
+#include "bodyschema/diagnosis/detectable.hpp"
+#include "bodyschema/diagnosis_trials/trials.hpp"
 #include "bodyschema/effects/catalogue.hpp"
-#include "detectable.hpp"
-#include "trial_random.hpp"
 
 namespace bodyschema {
 namespace {
@@ -47,7 +47,7 @@ class Draw {
   }
 
  private:
-  diagnosis::TrialRandom random_;
+  SeededRandom random_;
 };
 
 /// Many causes of one kind each, none of them large enough to be found.
@@ -104,7 +104,7 @@ std::vector<TrialFault> trial_faults(const TrialRobot& robot, bool outside_catal
   const auto roles = JointRoles::of(robot.model, robot.setup, robot.rig);
   std::vector<TrialFault> list;
   const auto add = [&](const std::string& name, const EffectTarget& target) {
-    const double size = diagnosis::detectable_size(name, target, roles);
+    const double size = detectable_size(name, target, roles);
     if (size > 0.0) list.push_back({{name, target.joint, target.source}, 0.0, 0.0, size});
   };
   if (outside_catalogue) {

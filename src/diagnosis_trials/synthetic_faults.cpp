@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace bodyschema::diagnosis {
+namespace bodyschema::trials {
 namespace {
 
 constexpr double kDeg = kPi / 180.0;
@@ -13,7 +13,7 @@ constexpr double kMostOffset = 7.0 * kDeg;
 }  // namespace
 
 FaultyRobot::FaultyRobot(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options,
-                         const SyntheticPath& path, TrialRandom& random)
+                         const SyntheticPath& path, SeededRandom& random)
     : robot_(robot), roles_(roles), options_(options), path_(path), random_(random),
       instants_(robot.model, robot.setup.hand_link, robot.setup.gravity_W), torques_(robot.model) {
   offset_.setZero(robot.model->joint_count());
@@ -178,4 +178,4 @@ void FaultyRobot::build(const TrialFault& fault, std::size_t camera, Corrections
   }
 }
 
-}  // namespace bodyschema::diagnosis
+}  // namespace bodyschema::trials

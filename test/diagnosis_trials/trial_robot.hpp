@@ -6,7 +6,7 @@
 #include <string>
 
 #include "bodyschema/core/configuration.hpp"
-#include "bodyschema/diagnosis/trials.hpp"
+#include "bodyschema/diagnosis_trials/trials.hpp"
 
 namespace bodyschema::test {
 

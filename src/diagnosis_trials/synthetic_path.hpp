@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
-#include "bodyschema/diagnosis/synthetic_log.hpp"
-#include "trial_random.hpp"
+#include "bodyschema/core/seeded_random.hpp"
+#include "bodyschema/diagnosis_trials/synthetic_log.hpp"
 
-namespace bodyschema::diagnosis {
+namespace bodyschema::trials {
 
 /// Minimum-jerk moves between postures, with rests.
 class SyntheticPath {
@@ -21,10 +21,6 @@ class SyntheticPath {
   [[nodiscard]] Eigen::VectorXd position(double t_s) const {
     const auto [piece, s] = find(t_s);
     return piece->from + (piece->to - piece->from) * (s * s * s * (10.0 + s * (-15.0 + 6.0 * s)));
-  }
-  [[nodiscard]] Eigen::VectorXd velocity(double t_s) const {
-    const auto [piece, s] = find(t_s);
-    return (piece->to - piece->from) * (30.0 * s * s * (1.0 - s) * (1.0 - s) / piece->duration_s);
   }
   [[nodiscard]] Eigen::VectorXd acceleration(double t_s) const {
     const auto [piece, s] = find(t_s);
@@ -54,10 +50,10 @@ class SyntheticPath {
 /// Random postures with the hand before both eyes, there and back at several speeds, a rest, the
 /// first postures again in the middle and at the end.
 SyntheticPath plan_path(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options,
-                        TrialRandom& random);
+                        SeededRandom& random);
 
 /// The links that synthetic logs show: the rendered ones and the hand's frame.
 std::vector<std::string> shown_links(const TrialRobot& robot);
 std::vector<std::string> camera_links(const TrialRobot& robot);
 
-}  // namespace bodyschema::diagnosis
+}  // namespace bodyschema::trials

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "bodyschema/diagnosis/diagnoser.hpp"
-#include "bodyschema/diagnosis/synthetic_log.hpp"
+#include "bodyschema/diagnosis_trials/synthetic_log.hpp"
 
 namespace bodyschema {
 

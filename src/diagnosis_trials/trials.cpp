@@ -1,4 +1,4 @@
-#include "bodyschema/diagnosis/trials.hpp"
+#include "bodyschema/diagnosis_trials/trials.hpp"
 
 #include <algorithm>
 #include <atomic>

@@ -1,4 +1,4 @@
-#include "bodyschema/diagnosis/trials.hpp"
+#include "bodyschema/diagnosis_trials/trials.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <iostream>
 
 #include "diagnosis/binomial.hpp"
-#include "diagnosis/trial_robot.hpp"
+#include "diagnosis_trials/trial_robot.hpp"
 
 namespace bodyschema {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "bodyschema/diagnosis/trials.hpp"
+#include "bodyschema/diagnosis_trials/trials.hpp"
 
 namespace bodyschema {
 namespace {

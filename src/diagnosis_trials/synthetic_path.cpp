@@ -5,14 +5,14 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/effects/corrected_kinematics.hpp"
 
-namespace bodyschema::diagnosis {
+namespace bodyschema::trials {
 namespace {
 
 constexpr double kDeg = kPi / 180.0;
 
 class PathPlanner {
  public:
-  PathPlanner(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options, TrialRandom& random)
+  PathPlanner(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options, SeededRandom& random)
       : robot_(robot), roles_(roles), options_(options), random_(random),
         kinematics_(robot.model, shown_links(robot), camera_links(robot)),
         X_CB_(shown_links(robot).size(), Pose::Identity()) {
@@ -147,7 +147,7 @@ class PathPlanner {
   const TrialRobot& robot_;
   const JointRoles& roles_;
   const TrialOptions& options_;
-  TrialRandom& random_;
+  SeededRandom& random_;
   CorrectedKinematics kinematics_;
   std::vector<Pose> X_CB_;
   std::size_t hand_ = 0;
@@ -170,8 +170,8 @@ std::vector<std::string> camera_links(const TrialRobot& robot) {
 }
 
 SyntheticPath plan_path(const TrialRobot& robot, const JointRoles& roles, const TrialOptions& options,
-                        TrialRandom& random) {
+                        SeededRandom& random) {
   return PathPlanner(robot, roles, options, random).plan();
 }
 
-}  // namespace bodyschema::diagnosis
+}  // namespace bodyschema::trials

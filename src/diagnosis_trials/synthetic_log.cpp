@@ -1,17 +1,17 @@
-#include "bodyschema/diagnosis/synthetic_log.hpp"
+#include "bodyschema/diagnosis_trials/synthetic_log.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "bodyschema/core/seeded_random.hpp"
 #include "bodyschema/effects/corrected_kinematics.hpp"
 #include "synthetic_faults.hpp"
 #include "synthetic_path.hpp"
-#include "trial_random.hpp"
 
 namespace bodyschema {
 namespace {
 
-using namespace diagnosis;
+using namespace trials;
 
 constexpr double kStreamRate_hz = 100.0;
 constexpr double kStart_s = 100.0;  // of the synthetic clock
@@ -228,7 +228,7 @@ class SyntheticLog final : public SyntheticMeasurement {
 
   TrialRobot robot_;
   TrialOptions options_;
-  TrialRandom random_;
+  SeededRandom random_;
   JointRoles roles_;
   InstantBuilder instants_;
   CorrectedKinematics kinematics_;
