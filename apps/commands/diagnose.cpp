@@ -47,8 +47,8 @@ void add_diagnose(CLI::App& app) {
     std::printf("held out: %.3f -> %.3f px, hand %.2f -> %.2f mm, %.2f -> %.2f deg\n", report.before.rms_px,
                 report.after.rms_px, report.before.hand_mm, report.after.hand_mm, report.before.hand_deg,
                 report.after.hand_deg);
-    std::printf("not testable with this log: %zu causes; report.html, report.json and extended_model.yaml in %s\n",
-                report.not_testable.size(), a->out.c_str());
+    std::printf("not testable with this log: %zu %s; report.html, report.json and extended_model.yaml in %s\n",
+                report.not_testable.size(), report.not_testable.size() == 1 ? "cause" : "causes", a->out.c_str());
   });
 }
 

@@ -37,8 +37,8 @@ ErrorMemory memory_of(const DiagnosisReport& report, const Value& y) {
 }
 
 ResidualCurve curve_of(const DiagnosisReport& report, const Value& x, const Value& y, const ErrorMemory& memory,
-                       bool centred = true) {
-  return diagnosis::residual_curve(points_of(report, x, y), memory, centred);
+                       bool centred = true, std::size_t most_bins = diagnosis::kCurveBins) {
+  return diagnosis::residual_curve(points_of(report, x, y), memory, centred, most_bins);
 }
 
 /// The report's colours.
@@ -70,6 +70,8 @@ const std::vector<Variable>& variables() {
       {"angle", "deg", [](const auto& s, std::size_t j) { return s.angle_deg[j]; }},
       {"velocity", "deg/s", [](const auto& s, std::size_t j) { return s.velocity_deg_s[j]; }},
       {"speed", "deg/s", [](const auto& s, std::size_t j) { return std::abs(s.velocity_deg_s[j]); }},
+      {"acceleration", "deg/s²",
+       [](const auto& s, std::size_t j) { return j < s.acceleration_deg_s2.size() ? s.acceleration_deg_s2[j] : 0.0; }},
       {"time", "s", [](const auto& s, std::size_t) { return time_of(s); }}};
   return list;
 }
@@ -232,10 +234,13 @@ class Page {
         "Every picture asks for a small correction of each joint alone. Without an error in the model these are "
         "noise about zero; a line that follows something names an error. Lines are medians over equally many "
         "pictures, bands their 95 % intervals (pictures that err alike count as fewer); red with offsets and usual "
-        "nuisances, blue with the extended model, both predicted for blocks that the fit had not seen. Of several "
-        "joints the one is shown that follows its variable most clearly: where nothing is wrong, the one that "
-        "chance moved most.");
+        "nuisances, blue with the extended model, both predicted for blocks that the fit had not seen. What the "
+        "answer calls unexplained comes first. Of several joints the one is shown that follows its variable most "
+        "clearly: where nothing is wrong, the one that chance moved most.");
     page_.begin_grid();
+    for (const auto& cause : d_.causes) {
+      if (!cause.variable.empty()) chart_of_unexplained(cause);
+    }
     for (const auto& variable : variables()) chart_of(variable);
     direction_of_motion();
     other_joints();
@@ -245,10 +250,26 @@ class Page {
   }
 
   [[nodiscard]] bool known(const Variable& variable) const {
-    if (variable.name != "gravity torque") return true;
-    return std::any_of(d_.samples.begin(), d_.samples.end(), [](const ResidualSample& s) {
-      return std::any_of(s.torque_nm.begin(), s.torque_nm.end(), [](double t) { return t != 0.0; });
+    return std::any_of(d_.samples.begin(), d_.samples.end(), [&](const ResidualSample& s) {
+      for (std::size_t j = 0; j < d_.arm_joints.size(); ++j) {
+        if (variable.of(s, j) != 0.0) return true;
+      }
+      return false;
     });
+  }
+
+  /// What the sentence names, be another joint's curve stronger or not. A curve in time may have two dozen periods
+  /// in a log, whatever its length: as many points as show each of them.
+  void chart_of_unexplained(const DiagnosedCause& cause) {
+    constexpr std::size_t kBinsOverTime = 24 * 5;
+    const auto& all = variables();
+    const auto variable = std::find_if(all.begin(), all.end(), [&](const Variable& v) {
+      return v.name == cause.variable || (v.name == "gravity torque" && cause.variable == "torque");
+    });
+    const auto joint = std::find(d_.arm_joints.begin(), d_.arm_joints.end(), cause.cause.joint);
+    if (variable == all.end() || joint == d_.arm_joints.end()) return;
+    const std::size_t bins = variable->name == "time" ? kBinsOverTime : diagnosis::kCurveBins;
+    chart_of(*variable, static_cast<std::size_t>(joint - d_.arm_joints.begin()), " (named above)", bins);
   }
 
   void chart_of(const Variable& variable) {
@@ -262,19 +283,25 @@ class Page {
         strongest = j;
       }
     }
-    page_.chart(curves(d_.arm_joints[strongest] + (variable.name == "time" ? " over " : " against its ") +
-                           variable.name + strongest_of(d_.arm_joints.size(), "joints"),
-                       variable.name + ", " + variable.axis, "correction asked for, deg",
-                       before_and_after(curve(strongest, variable, kBefore), curve(strongest, variable, kAfter))));
+    chart_of(variable, strongest, strongest_of(d_.arm_joints.size(), "joints"), diagnosis::kCurveBins);
+  }
+
+  void chart_of(const Variable& variable, std::size_t joint, const std::string& why, std::size_t bins) {
+    page_.chart(
+        curves(d_.arm_joints[joint] + (variable.name == "time" ? " over " : " against its ") + variable.name + why,
+               variable.name + ", " + variable.axis, "correction asked for, deg",
+               before_and_after(curve(joint, variable, kBefore, bins), curve(joint, variable, kAfter, bins))));
   }
 
   static std::string strongest_of(std::size_t count, const char* what) {
     return count > 1 ? fmt::format(" (strongest of {} {})", count, what) : "";
   }
 
-  [[nodiscard]] ResidualCurve curve(std::size_t joint, const Variable& variable, Which which) const {
+  [[nodiscard]] ResidualCurve curve(std::size_t joint, const Variable& variable, Which which,
+                                    std::size_t bins = diagnosis::kCurveBins) const {
     return curve_of(
-        d_, [&](const ResidualSample& s) { return variable.of(s, joint); }, apparent(joint, which), memory_[joint]);
+        d_, [&](const ResidualSample& s) { return variable.of(s, joint); }, apparent(joint, which), memory_[joint],
+        true, bins);
   }
 
   static std::vector<ChartSeries> before_and_after(const ResidualCurve& before, const ResidualCurve& after) {

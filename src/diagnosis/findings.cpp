@@ -287,6 +287,7 @@ class Findings {
     for (const auto joint : source_.roles().arm) {
       sample.angle_deg.push_back(degrees(fit.at.instants[v].q[joint]));
       sample.velocity_deg_s.push_back(degrees(fit.at.instants[v].qdot[joint]));
+      sample.acceleration_deg_s2.push_back(degrees(fit.at.instants[v].qddot[joint]));
       sample.torque_nm.push_back(fit.at.instants[v].gravity_torque.size() > 0 ? fit.at.instants[v].gravity_torque[joint]
                                                                               : 0.0);
     }

@@ -9,7 +9,6 @@
 namespace bodyschema::diagnosis {
 namespace {
 
-constexpr std::size_t kBins = 14;
 constexpr std::size_t kFewestPerBin = 4;
 constexpr double kLeastDof = 0.1;
 
@@ -142,13 +141,14 @@ double ResidualCurve::size() const {
   return y.empty() ? 0.0 : std::sqrt(std::max(0.0, sum / static_cast<double>(y.size())));
 }
 
-ResidualCurve residual_curve(std::vector<ResidualPoint> points, const ErrorMemory& memory, bool centred) {
+ResidualCurve residual_curve(std::vector<ResidualPoint> points, const ErrorMemory& memory, bool centred,
+                             std::size_t most_bins) {
   leave_out_unknown(points);
   ResidualCurve curve;
   if (points.size() < 2 * kFewestPerBin) return curve;
   std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) { return a.x < b.x; });
   const double centre = centred ? quantile(sorted_y(points.begin(), points.end()), 0.5) : 0.0;
-  const std::size_t bins = std::clamp<std::size_t>(points.size() / 12, 2, kBins);
+  const std::size_t bins = std::clamp<std::size_t>(points.size() / 12, 2, std::max<std::size_t>(2, most_bins));
   for (std::size_t b = 0; b < bins; ++b) {
     const auto from = points.begin() + static_cast<std::ptrdiff_t>(b * points.size() / bins);
     const auto to = points.begin() + static_cast<std::ptrdiff_t>((b + 1) * points.size() / bins);

@@ -30,8 +30,12 @@ struct ResidualCurve {
   /// Size of what follows x: the root mean square of the medians without their own noise.
   [[nodiscard]] double size() const;
 };
+/// Enough for a line whose shape nobody has named.
+constexpr std::size_t kCurveBins = 14;
 /// Points that are not finite are left out; empty where there are too few.
-/// @param centred  about the median of all: a constant belongs to the offsets
-ResidualCurve residual_curve(std::vector<ResidualPoint> points, const ErrorMemory& memory, bool centred = true);
+/// @param centred    about the median of all: a constant belongs to the offsets
+/// @param most_bins  fewer where a bin would have less than a dozen points
+ResidualCurve residual_curve(std::vector<ResidualPoint> points, const ErrorMemory& memory, bool centred = true,
+                             std::size_t most_bins = kCurveBins);
 
 }  // namespace bodyschema::diagnosis

@@ -251,6 +251,49 @@ TEST_F(LogFiles, OfAKilledWriterHoldEveryPublishedEvent) {
   EXPECT_GE(readable().size(), static_cast<std::size_t>(last + 1));
 }
 
+// The kernel cuts the write that is under way short, page by page: no writer can prevent it, and pictures are long.
+TEST_F(LogFiles, OfAWriterKilledAmidAPictureAreWholeUpToIt) {
+  constexpr std::size_t kPicture_bytes = 3 * 640 * 480;
+  const Content picture(kPicture_bytes, 0x5A);
+  int cut_short = 0;
+  for (int kill_number = 0; kill_number < 20; ++kill_number) {
+    int pipe_ends[2];
+    ASSERT_EQ(pipe(pipe_ends), 0);
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      LogWriter writer(file_);
+      for (int i = 0; i < 200; ++i) {
+        writer.publish("CAMERAS", 1000 + i, picture);
+        [[maybe_unused]] const auto n = write(pipe_ends[1], &i, sizeof i);
+      }
+      _exit(0);
+    }
+    int last = -1;
+    while (last < 3 + kill_number % 5) ASSERT_EQ(read(pipe_ends[0], &last, sizeof last), ssize_t{sizeof last});
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+    close(pipe_ends[1]);
+    for (int i = 0; read(pipe_ends[0], &i, sizeof i) == ssize_t{sizeof i};) last = i;
+    close(pipe_ends[0]);
+
+    LogReader reader(file_);
+    LogEvent event;
+    std::uint64_t end_of_last = 0;
+    int read_back = 0;
+    for (; reader.next(event); ++read_back) {
+      EXPECT_EQ(event.number, read_back);
+      EXPECT_EQ(event.data, picture);
+      end_of_last = reader.position();
+    }
+    EXPECT_GE(read_back, last + 1) << "every message that was published";
+    EXPECT_EQ(reader.skipped_bytes(), reader.size() - end_of_last) << "nothing but the end may be cut short";
+    EXPECT_LT(reader.skipped_bytes(), kPicture_bytes + 100);
+    cut_short += reader.skipped_bytes() > 0;
+  }
+  RecordProperty("cut_short", cut_short);
+}
+
 TEST_F(LogFiles, OnAFullDiskEndWithAWholeEvent) {
   // A limit on the file's size stands for the disk: the write is cut short the same way.
   const pid_t child = fork();

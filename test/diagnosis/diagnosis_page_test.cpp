@@ -3,10 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <random>
 #include <sstream>
+#include <string_view>
 
 #include "diagnosis_trials/trial_robot.hpp"
 
@@ -71,6 +74,23 @@ std::string page_of(const DiagnosisReport& r) {
   return text.str();
 }
 
+/// The values of a line of the chart whose title begins so.
+std::vector<double> line_of(const std::string& page, const std::string& title, const std::string& name) {
+  constexpr std::string_view kBegin = "new Chart(document.getElementById('";
+  for (auto at = page.find(kBegin); at != std::string::npos; at = page.find(kBegin, at + 1)) {
+    const auto begin = page.find('{', at), end = page.find(");\n", begin);
+    const auto chart = nlohmann::json::parse(page.substr(begin, end - begin));
+    if (!chart["options"]["plugins"]["title"]["text"].get<std::string>().starts_with(title)) continue;
+    std::vector<double> values;
+    for (const auto& series : chart["data"]["datasets"]) {
+      if (series["label"] != name) continue;
+      for (const auto& point : series["data"]) values.push_back(point["y"]);
+    }
+    return values;
+  }
+  return {};
+}
+
 TEST(DiagnosisPage, BeginsWithTheVerdictAndShowsEveryPart) {
   const auto page = page_of(report());
   const auto verdict = page.find("The log asks for: encoder_gain of r_elbow.");
@@ -109,6 +129,47 @@ TEST(DiagnosisPage, ACurveThatNothingExplainsStandsOut) {
   const auto row = page.find(">r_elbow<", page.find("deg, before &gt; after"));
   ASSERT_NE(row, std::string::npos);
   EXPECT_THAT(page.substr(row, page.find("</tr>", row) - row), ContainsRegex("0\\.[67][0-9] &gt; 0\\.[67]"));
+}
+
+/// A wobble that goes round within one of the few points of a line was averaged away, and a slower, stronger joint
+/// was shown where the sentence names another.
+TEST(DiagnosisPage, ShowsWhatTheSentenceCallsUnexplained) {
+  auto r = report();
+  r.causes.front().cause = {"unexplained", "r_elbow", ""};
+  r.causes.front().variable = "time";
+  std::mt19937_64 random(test::seed());
+  std::normal_distribution<double> normal(0.0, 0.05);
+  const auto samples = r.samples;
+  r.samples.clear();
+  for (int i = 0; i < 1200; ++i) {
+    auto s = samples.front();
+    s.time_s = 0.05 * i;
+    s.noise.apparent_deg = {normal(random), normal(random)};
+    s.before.apparent_deg = s.noise.apparent_deg;
+    s.before.apparent_deg[0] += 0.5 * std::sin(0.05 * s.time_s);
+    s.before.apparent_deg[1] += std::sin(2.0 * kPi / 4.2 * s.time_s);
+    s.after = s.before;
+    r.samples.push_back(std::move(s));
+  }
+  const auto page = page_of(r);
+  EXPECT_THAT(page, HasSubstr("r_shoulder_roll over time (strongest of 2 joints)"));
+  EXPECT_LT(page.find("r_elbow over time (named above)"), page.find("r_elbow against its angle"));
+  const auto values = line_of(page, "r_elbow over time (named above)", "extended");
+  ASSERT_FALSE(values.empty());
+  EXPECT_GT(*std::max_element(values.begin(), values.end()), 0.8);
+  EXPECT_LT(*std::min_element(values.begin(), values.end()), -0.8);
+  const auto averaged = line_of(page, "r_shoulder_roll over time", "extended");
+  EXPECT_EQ(averaged.size(), 14u) << "the other lines stay as smooth as they were";
+}
+
+TEST(DiagnosisPage, ShowsAnAccelerationThatTheSentenceNames) {
+  auto r = report();
+  r.causes.front().cause = {"unexplained", "r_elbow", ""};
+  r.causes.front().variable = "acceleration";
+  for (std::size_t i = 0; i < r.samples.size(); ++i) {
+    r.samples[i].acceleration_deg_s2 = {0.0, std::sin(0.3 * static_cast<double>(i))};
+  }
+  EXPECT_THAT(page_of(r), HasSubstr("r_elbow against its acceleration (named above)"));
 }
 
 TEST(DiagnosisPage, OfNothingFoundSaysNothingOfCauses) {

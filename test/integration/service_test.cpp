@@ -356,13 +356,18 @@ TEST_F(Service, ItsThreadsShareTwoArenas) {
 }
 #endif
 
-/// Messages by channel of a log without damage.
+/// Messages by channel of a log without damage. The message that was being written as its writer was killed may be
+/// cut short: the kernel ends a long write page by page.
 std::map<std::string, int> recorded(const std::filesystem::path& file) {
   LogReader log(file);
   LogEvent event;
   std::map<std::string, int> seen;
-  while (log.next(event)) ++seen[event.channel];
-  EXPECT_EQ(log.damaged_places(), 0u) << file;
+  std::uint64_t end_of_last = 0;
+  while (log.next(event)) {
+    ++seen[event.channel];
+    end_of_last = log.position();
+  }
+  EXPECT_EQ(log.skipped_bytes(), log.size() - end_of_last) << file;
   return seen;
 }
 

@@ -64,8 +64,9 @@ class LogReader {
 };
 
 /// Writes a log in LCM's event format. Every event reaches the kernel in one call before publish()
-/// returns, so that a log whose writer is killed is readable up to its last message; a write that
-/// fails half-way (disk full) is taken back to the last whole event. One thread.
+/// returns, so that a log whose writer is killed is readable up to the last message that publish()
+/// returned from (the kernel may leave a part of the one after it, which LogReader skips); a write
+/// that fails half-way (disk full) is taken back to the last whole event. One thread.
 class LogWriter : public MessageSink {
  public:
   /// Replaces an existing file. Throws FileError when it cannot be created.

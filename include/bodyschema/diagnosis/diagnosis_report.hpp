@@ -97,8 +97,8 @@ struct ResidualSample {
   Remainder before, after;
   /// `after` without the free curves of an unexplained cause, which no model holds: what errs without being followed.
   Remainder noise;
-  std::vector<double> angle_deg, velocity_deg_s, torque_nm;  ///< per arm joint
-  double image_radius_px = 0.0;                              ///< of the hand's frame from the principal point
+  std::vector<double> angle_deg, velocity_deg_s, acceleration_deg_s2, torque_nm;  ///< per arm joint
+  double image_radius_px = 0.0;  ///< of the hand's frame from the principal point
   double depth_m = 0.0;
 };
 
