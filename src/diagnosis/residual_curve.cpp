@@ -11,6 +11,9 @@ namespace {
 
 constexpr std::size_t kFewestPerBin = 4;
 constexpr double kLeastDof = 0.1;
+constexpr double kFewestIndependent = 4.0;
+constexpr double kMedian = 1.253;      ///< standard error of a median of normal values over that of their mean
+constexpr double kMiddleHalf = 1.349;  ///< width of the middle half of a normal distribution, in standard deviations
 
 double quantile(const std::vector<double>& sorted, double share) {
   const double at = share * static_cast<double>(sorted.size() - 1);
@@ -106,7 +109,8 @@ ErrorMemory error_memory(const std::vector<ResidualPoint>& all) {
   auto points = all;
   leave_out_unknown(points);
   if (points.size() < kFewest) return {};
-  const double middle = quantile(sorted_y(points.begin(), points.end()), 0.5);
+  const auto sorted = sorted_y(points.begin(), points.end());
+  const double middle = quantile(sorted, 0.5);
   SignsOfCameras cameras;
   for (const auto& p : points) {
     auto& camera = cameras[p.camera == 0 ? 0 : 1];
@@ -126,6 +130,7 @@ ErrorMemory error_memory(const std::vector<ResidualPoint>& all) {
   // A memory that fades evenly has kept / (1 - kept).
   memory.kept = sum / (1.0 + sum);
   memory.shared = shared_by(cameras[0], cameras[1], memory.step_s);
+  memory.spread = (quantile(sorted, 0.75) - quantile(sorted, 0.25)) / kMiddleHalf;
   return memory;
 }
 
@@ -158,9 +163,12 @@ ResidualCurve residual_curve(std::vector<ResidualPoint> points, const ErrorMemor
     const auto values = sorted_y(from, to);
     const double median = quantile(values, 0.5) - centre;
     // Standard error of a median from the middle half of the values; values that err alike lie closer as well.
-    const double spread = 0.93 * (quantile(values, 0.75) - quantile(values, 0.25));
-    const double dof = std::max(kLeastDof, independent({from, to}, memory) - 1.0);
-    const double sd = spread / std::sqrt(dof), half = student95(dof) * sd;
+    const double own = (quantile(values, 0.75) - quantile(values, 0.25)) / kMiddleHalf;
+    const double worth = independent({from, to}, memory);
+    const bool pooled = worth < kFewestIndependent && memory.spread > 0.0;
+    const double dof = std::max(kLeastDof, worth - 1.0);
+    const double sd = kMedian * (pooled ? memory.spread / std::sqrt(worth) : own / std::sqrt(dof));
+    const double half = (pooled ? student95(static_cast<double>(points.size())) : student95(dof)) * sd;
     curve.x.push_back(x);
     curve.y.push_back(median);
     curve.low.push_back(median - half);

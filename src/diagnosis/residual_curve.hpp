@@ -17,11 +17,14 @@ struct ErrorMemory {
   double step_s = 1.0;  ///< from one picture of a camera to the next
   double kept = 0.0;    ///< correlation (of the signs: medians know no more) from one of them to the next
   double shared = 0.0;  ///< of the two cameras at one time
+  double spread = 0.0;  ///< standard deviation of what is left, from its middle half; 0: not known
 };
 /// Of y about its median over the whole log, whatever x is. Points in order of time; too few: none.
 ErrorMemory error_memory(const std::vector<ResidualPoint>& points);
 
-/// Medians of y over bins of x that hold equally many points, with their 95 % intervals.
+/// Medians of y over bins of x that hold equally many points, with their 95 % intervals. Where a bin's points are worth
+/// fewer than four that err independently, as in bins shorter than the memory, their own spread says little: that of
+/// all stands in.
 struct ResidualCurve {
   std::vector<double> x, y, low, high;
   std::vector<double> sd;  ///< standard errors of y

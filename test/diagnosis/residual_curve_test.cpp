@@ -76,6 +76,25 @@ TEST(ResidualCurve, BandsOfIndependentPicturesAreAsNarrowAsTheyMayBe) {
   EXPECT_LT(wider, 1.2);
 }
 
+/// The spread within a bin that is shorter than the memory says nothing of what all its points err in alike: bands were
+/// some ten times the noise wide.
+TEST(ResidualCurve, BandsOfBinsShorterThanTheMemoryAreThoseOfTheNoise) {
+  constexpr std::size_t kFine = 100;
+  int held = 0, all = 0;
+  double half = 0.0;
+  for (std::uint64_t i = 0; i < 40; ++i) {
+    const auto points = against(time, noise(test::seed() + i, 0.5, i % 2 == 0));
+    const auto curve = residual_curve(points, error_memory(points), true, kFine);
+    ASSERT_EQ(curve.y.size(), kFine);
+    for (std::size_t b = 0; b < kFine; ++b, ++all) {
+      held += curve.low[b] <= 0.0 && curve.high[b] >= 0.0;
+      half += 0.5 * (curve.high[b] - curve.low[b]);
+    }
+  }
+  EXPECT_GE(static_cast<double>(held) / all, 0.9);
+  EXPECT_LT(half / all, 2.6) << "the noise has a standard deviation of one";
+}
+
 TEST(ErrorMemory, IsThatOfTheSigns) {
   // Of Gaussian noise the signs' correlation is 2 / pi asin of its own.
   double kept = 0.0, expected = 0.0;
