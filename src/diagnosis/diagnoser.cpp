@@ -36,6 +36,7 @@ class Diagnoser {
       nearer.emplace(std::move(found.after.at), found.extended);
       found = search(nearer->first, nearer->second);
     }
+    look_for_far_slip(found, nearer);
     // Blocks were as long as the noise in rests of the arm seemed to ask for. A slip or a drift that
     // falls into a rest looks like slow noise until it is known; then shorter blocks show more.
     const auto shorter = plan_blocks(source_, found.after.at.views, options_.block_s);
@@ -112,6 +113,39 @@ class Diagnoser {
       changed = true;
     }
     if (changed) before_ = fitter_.fit(baseline_, {}, {.iterations = options_.refit_iterations, .from_afar = false});
+  }
+
+  /// Where much of the outline stays out of sight: the search once more from a slip that brings it near. Half of it out
+  /// of sight looks like parts of another shape, too.
+  void look_for_far_slip(Found& found, std::optional<std::pair<Linearisation, ErrorModel>>& nearer) {
+    constexpr double kUsuallyFound = 0.85, kUnlike = 6.0;
+    if (!searches()) return;
+    const auto turn = turning(source_, found.after.at);
+    if (found.after.at.rms_px() <= options_.noise_rms_px && outline_found(found.after.at) >= kUsuallyFound &&
+        !(turn && turn->unlike >= kUnlike) && !other_shape_) {
+      return;
+    }
+    const double finest_px = fitter_.finest();
+    fitter_.set_finest(ModelFitter::kFinest_px);
+    if (auto start = slipped_start(source_, fitter_, offsets_)) {
+      // Nuisances beside it from the beginning: their estimates are of use only with the offsets that belong to them.
+      for (std::size_t e = 0; e < baseline_.size(); ++e) {
+        const auto& effect = std::as_const(baseline_)[e];
+        if (effect.name() != "joint_offset") start->add(effect.name(), effect.target());
+      }
+      auto at = fitter_.fit(*start, {}, {.iterations = options_.refit_iterations, .from_afar = false}).at;
+      auto again = search(at, *start);
+      const double outline = outline_points(before_.at);
+      if (plausible(again.extended) && misfit(again.after.at, outline) < kBetter * misfit(found.after.at, outline)) {
+        found = std::move(again);
+        nearer.emplace(std::move(at), std::move(*start));
+        if (other_shape_) before_ = fitter_.about(baseline_, {});
+        other_shape_ = false;
+        return;
+      }
+    }
+    fitter_.set_finest(finest_px);
+    fitter_.look_closely();
   }
 
   /// Much is wrong at once: causes that were tried for real, if they are plausible and leave less.
@@ -226,8 +260,12 @@ class Diagnoser {
     auto extension =
         extend(baseline_with(nuisances, model), found.selection, {source_, layout_, plan, at, bare, set, statistics});
     found.extended = std::move(extension.model);
-    begin_where_better(found.extended);
+    begin_where_better(model, found.extended);
     found.after = fitter_.fit(found.extended, extension.generic, {options_.refit_iterations, between(0.65, 0.9)});
+    fitter_.look_closely();
+    if (rules.search && retime_slips(source_, found.extended)) {
+      found.after = fitter_.fit(found.extended, extension.generic, {options_.refit_iterations, {}});
+    }
     // What looked like a cause only because others were taken for linear is none.
     while (rules.search && drop_weakest(found.selection, set, found.after, rules, found.extended)) {
       found.after = fitter_.fit(found.extended, extension.generic, {options_.refit_iterations, {}});
@@ -249,13 +287,13 @@ class Diagnoser {
     return result;
   }
 
-  /// A linear estimate that leads away from the outlines is taken back towards the baseline, and all the way where
-  /// they are lost from sight: no fit comes back from there.
-  void begin_where_better(ErrorModel& extended) {
+  /// A linear estimate that leads away from the outlines is taken back towards the model about which it is linear, and
+  /// all the way where they are lost from sight: no fit comes back from there.
+  void begin_where_better(const ErrorModel& about, ErrorModel& extended) {
     constexpr int kHalvings = 3;
-    auto without = extended;
+    auto without = extended, model = about;
     for (std::size_t e = 0; e < without.size(); ++e) {
-      auto* known = baseline_.find(without[e].name(), without[e].target());
+      auto* known = model.find(without[e].name(), without[e].target());
       for (std::size_t p = 0; p < without[e].parameters().size(); ++p) {
         auto& parameter = without[e].parameters()[p];
         if (!parameter.fitted) continue;
@@ -331,6 +369,15 @@ class Diagnoser {
   static std::size_t seen(const Linearisation& at) {
     return static_cast<std::size_t>(
         std::count_if(at.views.begin(), at.views.end(), [](const auto& view) { return view.weight > 0.0; }));
+  }
+
+  static double outline_found(const Linearisation& at) {
+    double outline = 0.0, matched = 0.0;
+    for (const auto& view : at.views) {
+      outline += view.outline;
+      matched += view.matched;
+    }
+    return outline > 0.0 ? matched / outline : 1.0;
   }
 
   static void check_seen(const Linearisation& at) {

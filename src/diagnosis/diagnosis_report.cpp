@@ -120,6 +120,10 @@ std::string DiagnosisReport::to_json() const {
               {"block_s", number(block_s)},
               {"noise_correlation_s", number(noise_correlation_s)}};
   j["warnings"] = warnings;
+  j["out_of_sight"] = out_of_sight ? Json{{"from_s", number(out_of_sight->from_s)},
+                                          {"to_s", number(out_of_sight->to_s)},
+                                          {"share", number(out_of_sight->share)}}
+                                   : Json(nullptr);
   return j.dump(2) + "\n";
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 #include <span>
+#include <spdlog/fmt/fmt.h>
 #include <utility>
 #include <vector>
 
@@ -89,6 +90,7 @@ class Findings {
     report.joint_corrections_after = joint_corrections(found_.after.at);
     report.baseline_model = baseline_;
     report.extended_model = found_.extended;
+    add_part_out_of_sight(report);
     add_warnings(report);
     return report;
   }
@@ -201,6 +203,20 @@ class Findings {
       const auto ci = interval(static_cast<Eigen::Index>(c), effect, p, 0.0);
       report.offsets_ci95_deg[effect.target().joint] = {degrees(ci[0]), degrees(ci[1])};
     }
+  }
+
+  void add_part_out_of_sight(DiagnosisReport& report) const {
+    constexpr double kUnlike = 8.0, kShare = 0.05;
+    const auto turn = turning(source_, found_.after.at);
+    if (!turn || turn->unlike < kUnlike || turn->worse_share < kShare) return;
+    const double at_s = turn->time_s - seconds(report.begin_utime);
+    report.out_of_sight = turn->later_is_worse ? PartOutOfSight{at_s, report.duration_s, turn->worse_share}
+                                               : PartOutOfSight{0.0, at_s, turn->worse_share};
+    const auto& part = *report.out_of_sight;
+    report.warnings.push_back(
+        fmt::format("from {:.1f} to {:.1f} s ({:.0f} % of the pictures) the outlines are out of the model's sight: the "
+                    "hand was hidden, or something moved further than can be followed; nothing is known of that part",
+                    part.from_s, part.to_s, 100.0 * part.share));
   }
 
   void add_warnings(DiagnosisReport& report) const {

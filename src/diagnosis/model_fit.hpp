@@ -63,6 +63,8 @@ class ModelFitter {
 
   /// The narrowest search, px.
   void set_finest(double search_px) { finest_px_ = search_px; }
+  [[nodiscard]] double finest() const { return finest_px_; }
+  static constexpr double kFinest_px = 4.0;  ///< unless set otherwise
   /// All pictures with the search at its narrowest.
   void look_closely() { source_.set_search(finest_px_); }
   /// Blocks by the noise that a fit leaves.
@@ -76,7 +78,7 @@ class ModelFitter {
   MeasurementSource& source_;
   const CoordinateLayout& layout_;
   double block_s_;
-  double finest_px_ = 4.0;
+  double finest_px_ = kFinest_px;
   std::optional<BlockPlan> plan_;
 };
 

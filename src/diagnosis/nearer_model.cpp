@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <utility>
 
 #include "bodyschema/core/seeded_random.hpp"
@@ -22,6 +24,47 @@ struct Guess {
   ErrorModel model;
   double misfit;
 };
+
+/// When a slip is best switched on: before it the views as they are without, from it on as they are with it all the
+/// time.
+/// @param slip  its position in the model
+double switching_time_s(MeasurementSource& source, ErrorModel model, std::size_t slip) {
+  const auto parameters = model[slip].parameters();
+  parameters[1].value = 0.0;
+  const auto with = linearise(source, model);
+  parameters[0].value = 0.0;
+  const auto without = linearise(source, model);
+  double running = 0.0, least = 0.0;
+  double best = seconds(source.views().front().joints.utime);
+  for (std::size_t v = 0; v < without.views.size(); ++v) {
+    running += without.views[v].misfit - with.views[v].misfit;
+    if (running >= least) continue;
+    least = running;
+    best = seconds(source.views()[v].joints.utime) + 1e-4;
+  }
+  return best;
+}
+
+/// The last effect's first parameter, a slip's step, at the best of several: the outlines may lie further off than any
+/// search looks.
+void begin_at_best_step(MeasurementSource& source, ErrorModel& model) {
+  constexpr double kLargest_rad = 18.0 * kPi / 180.0, kFar_px = 10.0;
+  constexpr int kSteps = 6;  // to either side
+  constexpr std::size_t kEvery = 16;
+  if (!source.set_search(kFar_px, kEvery)) return;
+  const std::size_t slip = model.size() - 1;
+  const double outline = outline_points(linearise(source, model));
+  double best_step = 0.0, least = std::numeric_limits<double>::infinity();
+  for (int i = -kSteps; i <= kSteps; ++i) {
+    const double step = kLargest_rad * i / kSteps;
+    model[slip].parameters()[0].value = step;
+    const double cost = misfit(linearise(source, model), outline);
+    if (cost >= least) continue;
+    least = cost;
+    best_step = step;
+  }
+  model[slip].parameters()[0].value = best_step;
+}
 
 class NearerModel {
  public:
@@ -132,6 +175,77 @@ std::vector<ErrorModel> scattered_starts(MeasurementSource& source, const ErrorM
   std::vector<ErrorModel> starts;
   for (std::size_t i = 0; i < kKept; ++i) starts.push_back(std::move(guesses[i].model));
   return starts;
+}
+
+std::optional<Turning> turning(const MeasurementSource& source, const Linearisation& at) {
+  constexpr double kLeast_px2 = 1e-3;
+  std::vector<double> time_s, cost;
+  for (std::size_t v = 0; v < at.views.size(); ++v) {
+    const auto& view = at.views[v];
+    if (view.outline <= 0.0) continue;
+    time_s.push_back(seconds(source.views()[v].joints.utime));
+    cost.push_back(view.misfit / view.outline);
+  }
+  const auto all = static_cast<double>(cost.size());
+  const double mean = std::accumulate(cost.begin(), cost.end(), 0.0) / std::max(1.0, all);
+  double most = 0.0, before = 0.0;
+  std::optional<Turning> best;
+  for (std::size_t v = 1; v < cost.size(); ++v) {
+    before += cost[v - 1] - mean;
+    const auto n = static_cast<double>(v);
+    const double apart = before * before * (1.0 / n + 1.0 / (all - n));
+    if (apart <= most || time_s[v] <= time_s[v - 1]) continue;
+    most = apart;
+    const double first = std::max(kLeast_px2, mean + before / n);
+    const double second = std::max(kLeast_px2, mean - before / (all - n));
+    const bool later = second > first;
+    best = Turning{0.5 * (time_s[v - 1] + time_s[v]), later ? second / first : first / second, later,
+                   later ? 1.0 - n / all : n / all};
+  }
+  return best;
+}
+
+std::optional<ErrorModel> slipped_start(MeasurementSource& source, ModelFitter& fitter, const ErrorModel& offsets) {
+  constexpr double kWidest_px = 40.0;
+  auto alone = offsets;
+  double least_px = kBetter * fitter.approach(alone, {}, kWidest_px);
+  fitter.look_closely();
+  const auto turn = turning(source, linearise(source, alone));
+  if (!turn) return std::nullopt;
+  std::optional<ErrorModel> best;
+  for (const auto& target : effect_targets("slip", source.roles())) {
+    auto model = alone;
+    model.add("slip", target).parameters()[1].value = turn->time_s;
+    begin_at_best_step(source, model);
+    const double left_px = fitter.approach(model, {}, kWidest_px);
+    if (left_px >= least_px || !plausible(model)) continue;
+    least_px = left_px;
+    best = std::move(model);
+  }
+  fitter.look_closely();
+  if (best) {
+    const std::size_t slip = best->size() - 1;
+    (*best)[slip].parameters()[1].value = switching_time_s(source, *best, slip);
+  }
+  return best;
+}
+
+bool retime_slips(MeasurementSource& source, ErrorModel& model) {
+  constexpr double kCell_s = 0.6, kWorth = 0.98;  // of the misfit
+  bool moved = false;
+  for (std::size_t e = 0; e < model.size(); ++e) {
+    if (model[e].name() != "slip") continue;
+    auto other = model;
+    const double time_s = switching_time_s(source, model, e);
+    other[e].parameters()[1].value = time_s;
+    if (std::abs(time_s - model[e].parameters()[1].value) <= kCell_s) continue;
+    const auto at = linearise(source, model);
+    const double outline = outline_points(at);
+    if (misfit(linearise(source, other), outline) > kWorth * misfit(at, outline)) continue;
+    model = std::move(other);
+    moved = true;
+  }
+  return moved;
 }
 
 bool plausible(const ErrorModel& model) {

@@ -32,6 +32,8 @@ TEST(LostPictures, AreSaidWithTheReasonsMostFrequentFirst) {
   EXPECT_EQ(lost_pictures({}, 0.05), "");
 }
 
+constexpr double kBackground_s = 10.0;  ///< 40 pictures at 4 Hz before the arm moves
+
 /// A log of 25 s whose head looks about in a room, with `missing_share` of its encoder readings missing, or with
 /// left and right exchanged.
 void record(const fs::path& file, bool clutter, double missing_share, bool swapped = false,
@@ -107,6 +109,25 @@ TEST(LogDiagnosis, FollowsASlipWhereMasksNeedAPrediction) {
   ASSERT_FALSE(report.causes.front().parameters.empty());
   EXPECT_NEAR(report.causes.front().parameters.front().estimate, 4.0, 0.2) << report.sentence;
   EXPECT_GT(report.after.outline_found, 0.8);
+  fs::remove(log);
+}
+
+/// Offsets fitted one part of the log, the outlines of the other lay beyond the search, and the answer was that no
+/// cause explains the log.
+TEST(LogDiagnosis, NamesASlipThatCarriesTheOutlinesOutOfSight) {
+  const fs::path log = fs::temp_directory_path() / ("log_diagnosis_far_slip_" + std::to_string(getpid()) + ".lcmlog");
+  record(log, false, 0.0, false, "slip:joint=r_elbow,value=-12,at=15");
+  const auto report = diagnosis(log);
+  ASSERT_FALSE(report.causes.empty()) << report.sentence;
+  EXPECT_EQ(report.causes.front().cause.text(), "slip of r_elbow") << report.sentence;
+  ASSERT_FALSE(report.causes.front().parameters.empty());
+  const auto& slip = report.causes.front().parameters.front();
+  EXPECT_NEAR(slip.estimate, -12.0, 0.5) << report.sentence;
+  ASSERT_TRUE(slip.from.has_value());
+  EXPECT_NEAR(seconds(*slip.from - report.begin_utime), kBackground_s + 15.0, 0.5);
+  EXPECT_LT(report.after.rms_px, 0.5);
+  EXPECT_GT(report.after.outline_where_seen, 0.9);
+  EXPECT_FALSE(report.out_of_sight.has_value());
   fs::remove(log);
 }
 

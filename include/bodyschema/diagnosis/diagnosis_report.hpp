@@ -102,6 +102,13 @@ struct ResidualSample {
   double depth_m = 0.0;
 };
 
+/// A part of the log, up to its end or from its beginning, whose outlines lie many times further off than the rest's,
+/// so that nothing is known of it.
+struct PartOutOfSight {
+  double from_s = 0.0, to_s = 0.0;  ///< from the first picture
+  double share = 0.0;               ///< of the pictures in which an outline is predicted
+};
+
 /// The answer to "what does the model of this robot get wrong?".
 struct DiagnosisReport {
   std::string verdict;   ///< "none", "named", "class" or "unexplained"
@@ -115,6 +122,7 @@ struct DiagnosisReport {
   std::map<std::string, double> offsets_deg_before, offsets_deg_after;
   std::map<std::string, std::array<double, 2>> offsets_ci95_deg;
   std::vector<std::string> warnings;
+  std::optional<PartOutOfSight> out_of_sight;
 
   // For charts.
   std::vector<std::string> arm_joints;
