@@ -214,8 +214,9 @@ class Findings {
                                                : PartOutOfSight{0.0, at_s, turn->worse_share};
     const auto& part = *report.out_of_sight;
     report.warnings.push_back(
-        fmt::format("from {:.1f} to {:.1f} s ({:.0f} % of the pictures) the outlines are out of the model's sight: the "
-                    "hand was hidden, or something moved further than can be followed; nothing is known of that part",
+        fmt::format("from {:.1f} to {:.1f} s ({:.0f} % of the pictures) the outlines are out of the model's sight: "
+                    "something moved further than can be followed, or what is seen there is not the hand; nothing is "
+                    "known of that part",
                     part.from_s, part.to_s, 100.0 * part.share));
   }
 

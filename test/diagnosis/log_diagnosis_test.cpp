@@ -131,6 +131,22 @@ TEST(LogDiagnosis, NamesASlipThatCarriesTheOutlinesOutOfSight) {
   fs::remove(log);
 }
 
+/// A model that explains the rest to its noise may be wrong where nothing is seen: of a slip that nobody followed the
+/// answer was that nothing is wrong.
+TEST(LogDiagnosis, APartOutOfSightIsSaid) {
+  const fs::path log = fs::temp_directory_path() / ("log_diagnosis_part_" + std::to_string(getpid()) + ".lcmlog");
+  record(log, false, 0.0, false, "slip:joint=r_elbow,value=40,at=18");
+  const auto report = diagnosis(log);
+  EXPECT_TRUE(report.causes.empty()) << report.sentence;
+  EXPECT_EQ(report.verdict, "unexplained") << report.sentence;
+  ASSERT_TRUE(report.out_of_sight.has_value());
+  EXPECT_NEAR(report.out_of_sight->from_s, kBackground_s + 18.0, 0.5);
+  EXPECT_NEAR(report.out_of_sight->to_s, report.duration_s, 0.5);
+  EXPECT_THAT(report.warnings, Contains(HasSubstr("out of the model's sight")));
+  EXPECT_THAT(report.to_json(), HasSubstr("\"out_of_sight\": {"));
+  fs::remove(log);
+}
+
 TEST(LogDiagnosis, RefusesSwappedPictures) {
   const fs::path log = fs::temp_directory_path() / ("log_diagnosis_swapped_" + std::to_string(getpid()) + ".lcmlog");
   record(log, false, 0.0, true);

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "bodyschema/effects/catalogue.hpp"
 #include "diagnosis_trials/trial_robot.hpp"
 
@@ -59,6 +62,58 @@ TEST(NearerModel, NoRobotIsBuiltSoWrongThatItsElbowTiltsByThirtyDegrees) {
   };
   EXPECT_TRUE(tilted(5.0));
   EXPECT_FALSE(tilted(-30.0));
+}
+
+/// A log in which the elbow slips by 6 deg, a model that knows it, and when it happened.
+struct Slipped {
+  std::unique_ptr<SyntheticMeasurement> log;
+  ErrorModel model{JointRoles{}};
+  double time_s = 0.0;
+};
+Slipped slipped() {
+  TrialOptions options;
+  options.duration_s = 30.0;
+  options.faults = {{{"slip", "r_elbow", ""}, 6.0, 0.7}};
+  Slipped s{make_synthetic_log(test::robot(), options, test::log_seed())};
+  const auto& corrections = s.log->true_corrections();
+  const auto& roles = s.log->roles();
+  const auto elbow = std::find(roles.arm.begin(), roles.arm.end(), roles.index("r_elbow")) - roles.arm.begin();
+  for (Eigen::Index v = 1; v < corrections.rows(); ++v) {
+    if (std::abs(corrections(v, elbow) - corrections(v - 1, elbow)) < radians(3.0)) continue;
+    s.time_s = seconds(s.log->views()[static_cast<std::size_t>(v)].joints.utime) - 1e-3;
+  }
+  s.model = ErrorModel(roles);
+  for (const auto& target : effect_targets("joint_offset", roles)) s.model.add("joint_offset", target);
+  auto& slip = s.model.add("slip", {"r_elbow", ""});
+  slip.parameters()[1].value = s.time_s;
+  const CoordinateLayout layout(roles);
+  ModelFitter(*s.log, layout, 2.0).fit(s.model, {}, {8, {}});
+  return s;
+}
+
+TEST(NearerModel, ASlipThatTheModelLacksIsATurning) {
+  auto s = slipped();
+  const auto found = turning(*s.log, linearise(*s.log, s.model));
+  ASSERT_TRUE(found.has_value());
+  EXPECT_LT(found->unlike, 3.0) << "with the slip in the model";
+  s.model.find("slip", {"r_elbow", ""})->parameters()[0].value = 0.0;
+  const auto lacking = turning(*s.log, linearise(*s.log, s.model));
+  ASSERT_TRUE(lacking.has_value());
+  EXPECT_GT(lacking->unlike, 8.0);
+  EXPECT_NEAR(lacking->time_s, s.time_s, 0.5);
+  EXPECT_TRUE(lacking->later_is_worse);
+  EXPECT_GT(lacking->worse_share, 0.05);
+  EXPECT_LT(lacking->worse_share, 0.5);
+}
+
+TEST(NearerModel, ASlipMovesToWhenTheOutlinesAskForIt) {
+  auto s = slipped();
+  EXPECT_FALSE(retime_slips(*s.log, s.model)) << "where it is right already";
+  for (const double off_s : {-5.0, 3.0}) {
+    s.model.find("slip", {"r_elbow", ""})->parameters()[1].value = s.time_s + off_s;
+    EXPECT_TRUE(retime_slips(*s.log, s.model));
+    EXPECT_NEAR(s.model.find("slip", {"r_elbow", ""})->parameters()[1].value, s.time_s, 0.3);
+  }
 }
 
 TEST(NearerModel, FindsNothingWhereOffsetsExplainIt) {

@@ -135,6 +135,18 @@ TEST(Verdict, SaysNoiseOnlyWhereNoiseIsAllThatIsLeft) {
   EXPECT_THAT(named.sentence, HasSubstr("something else is wrong too"));
 }
 
+TEST(Verdict, OfAPartOutOfSightNothingIsKnown) {
+  auto report = report_of(0.3, {});
+  report.out_of_sight = PartOutOfSight{50.5, 60.0, 0.16};
+  word_verdict(report, picture_options());
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, HasSubstr("from 50.5 to 60.0 s the outlines are out of sight"));
+  // What was found elsewhere stands; the warning says the rest.
+  report.causes = {gain_of_elbow()};
+  word_verdict(report, picture_options());
+  EXPECT_EQ(report.verdict, "named");
+}
+
 TEST(Verdict, NamesNoCauseOfWhichTheSizeIsNotKnown) {
   auto cause = gain_of_elbow();
   const double inf = std::numeric_limits<double>::infinity();
