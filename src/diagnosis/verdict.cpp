@@ -96,9 +96,8 @@ void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options) {
   } else if (const auto& part = report.out_of_sight) {
     report.verdict = "unexplained";
     report.sentence = fmt::format(
-        "The model explains a part of the log only: from {:.1f} to {:.1f} s the outlines are out of sight. The hand "
-        "was "
-        "hidden there, or something moved further than can be followed.",
+        "The model explains a part of the log only: from {:.1f} to {:.1f} s the outlines are out of sight. Something "
+        "moved further than can be followed, or what is seen there is not the hand.",
         part->from_s, part->to_s);
   } else {
     report.sentence = "The model explains the log to its noise: nothing but joint offsets was found.";

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <functional>
 #include <lcm/lcm-cpp.hpp>
 #include <limits>
 #include <random>
@@ -58,6 +59,33 @@ class LogFiles : public ::testing::Test {
     }
     EXPECT_EQ(reader.position(), reader.size());
     return numbers;
+  }
+  /// Another process writes one message after the other and is killed once it has said so of message `wait_for`.
+  /// Returns the last one of which it said so; negative where it could not be started.
+  int last_before_kill(int wait_for, const std::function<void(LogWriter&, int)>& publish) const {
+    int pipe_ends[2];
+    if (pipe(pipe_ends) != 0) return -1;
+    const pid_t child = fork();
+    if (child < 0) return -1;
+    if (child == 0) {
+      close(pipe_ends[0]);
+      LogWriter writer(file_);
+      for (int i = 0; i < 200; ++i) {  // no more than a disk has room for, however late the kill comes
+        publish(writer, i);
+        if (write(pipe_ends[1], &i, sizeof i) != ssize_t{sizeof i}) _exit(1);
+      }
+      while (true) pause();
+    }
+    close(pipe_ends[1]);
+    int last = -1;
+    const auto said = [&](int& i) { return read(pipe_ends[0], &i, sizeof i) == ssize_t{sizeof i}; };
+    while (last < wait_for && said(last)) {
+    }
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+    for (int i = 0; said(i);) last = i;
+    close(pipe_ends[0]);
+    return last;
   }
   static std::string error_of(const std::filesystem::path& file) {
     try {
@@ -230,24 +258,9 @@ TEST_F(LogFiles, ThatAreNotLogsAreRefused) {
 }
 
 TEST_F(LogFiles, OfAKilledWriterHoldEveryPublishedEvent) {
-  int pipe_ends[2];
-  ASSERT_EQ(pipe(pipe_ends), 0);
-  const pid_t child = fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    LogWriter writer(file_);
-    for (int i = 0;; ++i) {
-      writer.publish(i % 2 == 0 ? "EVEN" : "ODD_CHANNEL", 1000 + i, content(i));
-      [[maybe_unused]] const auto n = write(pipe_ends[1], &i, sizeof i);
-    }
-  }
-  int last = -1;
-  while (last < 50) ASSERT_EQ(read(pipe_ends[0], &last, sizeof last), static_cast<ssize_t>(sizeof last));
-  kill(child, SIGKILL);
-  waitpid(child, nullptr, 0);
-  close(pipe_ends[1]);
-  for (int i = 0; read(pipe_ends[0], &i, sizeof i) == static_cast<ssize_t>(sizeof i);) last = i;
-  close(pipe_ends[0]);
+  const int last = last_before_kill(
+      50, [](LogWriter& writer, int i) { writer.publish(i % 2 == 0 ? "EVEN" : "ODD_CHANNEL", 1000 + i, content(i)); });
+  ASSERT_GE(last, 50);
   EXPECT_GE(readable().size(), static_cast<std::size_t>(last + 1));
 }
 
@@ -257,25 +270,9 @@ TEST_F(LogFiles, OfAWriterKilledAmidAPictureAreWholeUpToIt) {
   const Content picture(kPicture_bytes, 0x5A);
   int cut_short = 0;
   for (int kill_number = 0; kill_number < 20; ++kill_number) {
-    int pipe_ends[2];
-    ASSERT_EQ(pipe(pipe_ends), 0);
-    const pid_t child = fork();
-    ASSERT_GE(child, 0);
-    if (child == 0) {
-      LogWriter writer(file_);
-      for (int i = 0; i < 200; ++i) {
-        writer.publish("CAMERAS", 1000 + i, picture);
-        [[maybe_unused]] const auto n = write(pipe_ends[1], &i, sizeof i);
-      }
-      _exit(0);
-    }
-    int last = -1;
-    while (last < 3 + kill_number % 5) ASSERT_EQ(read(pipe_ends[0], &last, sizeof last), ssize_t{sizeof last});
-    kill(child, SIGKILL);
-    waitpid(child, nullptr, 0);
-    close(pipe_ends[1]);
-    for (int i = 0; read(pipe_ends[0], &i, sizeof i) == ssize_t{sizeof i};) last = i;
-    close(pipe_ends[0]);
+    const int last = last_before_kill(3 + kill_number % 5,
+                                      [&](LogWriter& writer, int i) { writer.publish("CAMERAS", 1000 + i, picture); });
+    ASSERT_GE(last, 3 + kill_number % 5);
 
     LogReader reader(file_);
     LogEvent event;
