@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
       "bodyschema COMMAND --help explains each. Exit status: 0 done, 2 wrong command line,\n"
       "configuration or file, 3 data that cannot be used (a log too short), 1 any other failure.");
   app.set_version_flag("--version", BODYSCHEMA_VERSION);
-  bodyschema::apps::add_import_yarp(app);
+  bodyschema::apps::add_import(app);
   bodyschema::apps::add_replay(app);
   bodyschema::apps::add_export(app);
   bodyschema::apps::add_evaluate(app);

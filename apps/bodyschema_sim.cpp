@@ -18,8 +18,10 @@
 #include "bodyschema/core/installation.hpp"
 #include "bodyschema/core/logging.hpp"
 #include "bodyschema/core/progress_bar.hpp"
+#include "bodyschema/simulator/contact_sheet.hpp"
 #include "bodyschema/simulator/random.hpp"
 #include "bodyschema/simulator/recording.hpp"
+#include "bodyschema/simulator/scenes.hpp"
 #include "bodyschema/simulator/simulator.hpp"
 #include "common_options.hpp"
 
@@ -36,6 +38,10 @@ struct Arguments {
   std::string log_level = "info";
   bool print_config = false;
   bool list_faults = false;
+  bool list_scenes = false;
+  std::vector<std::string> scenes;
+  std::optional<int> postures;
+  std::string contact_sheet;
   std::uint64_t seed = 1;
   bool reach = false;
   double babble_s = 0.0;
@@ -65,6 +71,14 @@ void print_faults() {
     for (const auto& key : kind.keys) keys += key + ", ";
     std::printf("  %-17s %svalue [%s]%s\n    %s\n", kind.name.c_str(), keys.c_str(), kind.unit.c_str(),
                 kind.in_catalogue ? "" : "   (outside the catalogue of diagnosis)", kind.meaning.c_str());
+  }
+}
+
+void print_scenes() {
+  std::printf("Scenes for --scene NAME, and the settings that make them:\n\n");
+  for (const auto& scene : sim::scenes()) {
+    std::printf("  %-15s %s\n", scene.name.c_str(), scene.meaning.c_str());
+    for (const auto& assignment : scene.overrides) std::printf("    --set %s\n", assignment.c_str());
   }
 }
 
@@ -126,10 +140,20 @@ class RealTime {
 
 void run(const Arguments& a) {
   set_up_logging(a.log_level);
-  std::vector<std::string> overrides = a.overrides;
+  if (!a.contact_sheet.empty() && !a.contact_sheet.ends_with(".png")) {
+    throw ConfigurationError("--contact-sheet " + a.contact_sheet + ": expected a file that ends in .png");
+  }
+  // Scenes first: single keys may be set on top of them.
+  std::vector<std::string> overrides;
+  for (const auto& name : a.scenes) {
+    const auto& more = sim::scene(name).overrides;
+    overrides.insert(overrides.end(), more.begin(), more.end());
+  }
+  overrides.insert(overrides.end(), a.overrides.begin(), a.overrides.end());
   if (a.background_frames) {
     overrides.push_back("simulator.motion.background_frames=" + std::to_string(*a.background_frames));
   }
+  if (a.postures) overrides.push_back("simulator.motion.postures=" + std::to_string(*a.postures));
   if (a.head_moves) overrides.push_back("simulator.motion.head=moving");
   if (a.clutter) overrides.push_back("simulator.room.background=clutter");
   const Configuration configuration = Configuration::load(find_data_file(a.config), overrides);
@@ -144,7 +168,7 @@ void run(const Arguments& a) {
     return;
   }
   configuration.reject_unknown_keys();
-  const auto model = setup.load();
+  const auto model = load_robot(setup, rig);
   for (const auto& warning : model->warnings()) std::fprintf(stderr, "bodyschema-sim: %s\n", warning.c_str());
 
   sim::SimulationPlan plan;
@@ -180,6 +204,10 @@ void run(const Arguments& a) {
   publishing.channels = bus.channels();
   if (a.pictures == "gray") publishing.format = sim::PictureFormat::kGray;
   if (a.pictures == "jpeg") publishing.format = sim::PictureFormat::kJpeg;
+  if (a.pictures == "masks") {
+    publishing.format = sim::PictureFormat::kMasks;
+    plan.output = sim::Output::kSilhouettes;
+  }
 
   sim::Simulator simulator(model, setup, rig, settings, plan);
   std::unique_ptr<MessageSink> sink;
@@ -204,6 +232,10 @@ void run(const Arguments& a) {
 
   std::optional<ProgressBar> bar(std::in_place, live ? "playing" : "simulating",
                                  static_cast<std::uint64_t>(simulator.frame_count()));
+  std::optional<sim::ContactSheet> sheet;
+  if (!a.contact_sheet.empty()) {
+    sheet.emplace(simulator.first_motion_frame(), simulator.frame_count() - simulator.first_motion_frame());
+  }
   int frames = 0;
   while (!g_stop) {
     const auto frame = simulator.next();
@@ -211,11 +243,13 @@ void run(const Arguments& a) {
     const bool sent = publisher.publish(*frame, *sink, [&](Microseconds due) { return !clock || (*clock)(due); });
     if (!sent) break;
     if (truth) truth->add(*frame);
+    if (sheet) sheet->add(*frame);
     bar->advance();
     ++frames;
   }
   bar.reset();
   if (truth) truth->close();
+  if (sheet) sheet->write(a.contact_sheet);
   if (clock && clock->worst_s() > 0.5) {
     std::fprintf(stderr, "bodyschema-sim: up to %.1f s behind; a smaller --rate suits this machine\n",
                  clock->worst_s());
@@ -266,7 +300,14 @@ int main(int argc, char** argv) {
       ->group("Motion");
   app.add_flag("--head-moves", a.head_moves, "The head moves too")->group("Motion");
   app.add_option("--freeze", a.frozen, "Arm joint that never moves (repeatable)")->group("Motion");
+  app.add_option("--postures", a.postures, "--babble holds at least this many distinct postures for a second")
+      ->check(number_in(0, 1000))
+      ->group("Motion");
   app.add_flag("--clutter", a.clutter, "Cluttered background")->group("Motion");
+  app.add_option("--scene", a.scenes,
+                 "Everyday conditions by name, e.g. kitchen for all of them (repeatable); see --list-scenes")
+      ->group("Scene");
+  app.add_flag("--list-scenes", a.list_scenes, "Print all scenes and stop")->group("Scene");
 
   app.add_option("--offsets", a.offsets,
                  "encoder - true in deg, by robot.estimated_joints: paper (5,4,3,-2,3,-7,3, default), random, none, "
@@ -293,12 +334,16 @@ int main(int argc, char** argv) {
       ->check(number_in(0.001, 100.0))
       ->group("Output")
       ->excludes(log);
-  app.add_option("--pictures", a.pictures, "rgb (default), gray or jpeg")
-      ->check(CLI::IsMember({"rgb", "gray", "jpeg"}))
+  app.add_option("--pictures", a.pictures,
+                 "rgb (default), gray, jpeg, or masks: white where the robot is, without room and light")
+      ->check(CLI::IsMember({"rgb", "gray", "jpeg", "masks"}))
+      ->group("Output");
+  app.add_option("--contact-sheet", a.contact_sheet, "Write pictures of the motion side by side to this PNG")
       ->group("Output");
   return run_and_report("bodyschema-sim", app, [&] {
     app.parse(argc, argv);
     if (a.list_faults) return print_faults();
+    if (a.list_scenes) return print_scenes();
     if (config->count() == 0) throw CLI::RequiredError("--config");
     for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { g_stop = true; });
     run(a);

@@ -14,7 +14,8 @@ Microseconds milliseconds(const Configuration& section, const std::string& key, 
 }  // namespace
 
 Channels Channels::with_prefix(const std::string& prefix) {
-  return {prefix + "_JOINT_STATE", prefix + "_CAMERAS", prefix + "_JOINT_OFFSETS", prefix + "_OFFSETS_STATUS"};
+  return {prefix + "_JOINT_STATE", prefix + "_CAMERAS", prefix + "_JOINT_OFFSETS", prefix + "_OFFSETS_STATUS",
+          prefix + "_MASKS"};
 }
 
 std::size_t BusOptions::longest_message_bytes(std::size_t cameras) const {
@@ -39,6 +40,7 @@ BusOptions BusOptions::from(const Configuration& bus) {
   sync.pairing_window = milliseconds(bus, "pairing_window_ms", sync.pairing_window, 1e4);
   sync.camera_wait = milliseconds(bus, "camera_wait_ms", sync.camera_wait, 1e5);
   sync.encoder_wait = milliseconds(bus, "encoder_wait_ms", sync.encoder_wait, 1e5);
+  sync.mask_wait = milliseconds(bus, "mask_wait_ms", sync.mask_wait, 1e5);
   sync.max_image_gap = milliseconds(bus, "max_image_gap_ms", sync.max_image_gap, 1e6);
   sync.allow_mono = bus.boolean_or("allow_mono", sync.allow_mono);
   sync.clock_step = milliseconds(bus, "clock_step_ms", sync.clock_step, 1e7);

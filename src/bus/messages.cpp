@@ -54,7 +54,7 @@ std::string size_text(int width, int height) {
 std::string_view name_of(MessageFault fault) {
   static constexpr std::array<std::string_view, kMessageFaultCount> kNames{
       "none",      "wrong_type", "truncated",  "trailing_bytes",     "bad_count",      "too_large", "bad_text",
-      "bad_stamp", "not_finite", "wrong_size", "unsupported_format", "broken_picture", "other_kind"};
+      "bad_stamp", "not_finite", "wrong_size", "unsupported_format", "broken_picture", "other_kind", "bad_mask"};
   return kNames[static_cast<std::size_t>(fault)];
 }
 
@@ -109,6 +109,8 @@ DecodeResult decode(Bytes message, joint_offsets_t& out, const DecodeLimits& giv
   in.doubles(out.mean_rad, n);
   out.covariance_rad2.resize(static_cast<std::size_t>(in.ok() ? n : 0));
   for (auto& row : out.covariance_rad2) in.doubles(row, n);
+  out.told.resize(static_cast<std::size_t>(in.ok() ? n : 0));
+  for (auto& told : out.told) told = in.integer<std::int8_t>();
   out.num_particles = in.integer<std::int32_t>();
   out.effective_sample_size = in.float64();
   out.best_likelihood = in.float64();
@@ -117,11 +119,26 @@ DecodeResult decode(Bytes message, joint_offsets_t& out, const DecodeLimits& giv
   out.hand_pose_in_camera.resize(static_cast<std::size_t>(in.ok() ? cameras : 0));
   for (auto& pose : out.hand_pose_in_camera) read_pose(in, pose);
   const int parameters = out.num_parameters =
-      in.count<std::int32_t>("num_parameters", kMaxParameters, 2 * kMinText + 2 * 8);
+      in.count<std::int32_t>("num_parameters", kMaxParameters, 2 * kMinText + 3 * 8);
   in.texts("parameter_name", out.parameter_name, parameters);
   in.texts("parameter_unit", out.parameter_unit, parameters);
   in.doubles(out.parameter_value, parameters);
   in.doubles(out.parameter_stddev, parameters);
+  in.doubles(out.parameter_prior_stddev, parameters);
+  out.hand_stddev_m = in.float64();
+  in.text("verdict", out.verdict);
+  out.innovation = in.float64();
+  out.innovation_dof = in.float64();
+  out.innovation_usual = in.float64();
+  out.postures = in.integer<std::int32_t>();
+  out.posture_stddev_rad = in.float64();
+  out.outline_stddev_px = in.float64();
+  out.outline_points_alike = in.float64();
+  in.text("changed", out.changed);
+  in.text("misfit", out.misfit);
+  in.text("stalled_joint", out.stalled_joint);
+  out.stalled_motion_rad = in.float64();
+  out.cameras_swapped = in.integer<std::int8_t>();
   in.text("model_hash", out.model_hash);
   in.text("config_hash", out.config_hash);
   return in.finish();
@@ -209,6 +226,32 @@ DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limit
     if (bgr) {
       for (std::size_t i = 0; i < row_bytes; i += 3) std::swap(to[i], to[i + 2]);
     }
+  }
+  return {};
+}
+
+DecodeResult to_mask(Image& picture) {
+  const std::size_t pixels = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height);
+  if (picture.channels == 3) {
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const std::uint8_t* p = picture.data.data() + 3 * i;
+      if (p[0] != p[1] || p[1] != p[2]) {
+        return {MessageFault::kBadMask, "mask in colour; expected gray: 0 background, 128 not known, 255 robot"};
+      }
+      picture.data[i] = p[0];
+    }
+    picture.data.resize(pixels);
+    picture.channels = 1;
+  }
+  constexpr std::uint8_t kLastBackground = 63, kFirstRobot = 192;
+  std::uint8_t largest = 0;
+  for (std::uint8_t& level : picture.data) {
+    largest = std::max(largest, level);
+    level = level >= kFirstRobot ? kMaskRobot : level > kLastBackground ? kMaskUnknown : kMaskBackground;
+  }
+  if (largest > 0 && largest <= kLastBackground) {
+    return {MessageFault::kBadMask, "mask whose largest value is " + std::to_string(largest) +
+                                        "; expected 0 background, 128 not known, 255 robot"};
   }
   return {};
 }

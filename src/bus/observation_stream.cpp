@@ -2,7 +2,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <set>
+#include <utility>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
@@ -14,28 +16,13 @@ namespace {
 constexpr std::chrono::seconds kQuietTime{5};
 /// Pictures in a row that make another kind of camera believed: ten seconds at 30 Hz.
 constexpr int kAnotherCamera = 300;
+/// Encoder samples that wait for an observation: four seconds at 1 kHz.
+constexpr std::size_t kMostEncoders = 4096;
 
 std::vector<std::string> joint_names(const RobotModel& robot) {
   std::vector<std::string> names;
   for (const JointInfo& joint : robot.joints()) names.push_back(joint.name);
   return names;
-}
-
-/// Joints that move nothing that is seen or sees.
-std::set<std::string> idle_joints(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
-                                  const StereoRig& rig) {
-  std::vector<std::string> links = setup.model.rendered_links;
-  links.push_back(setup.hand_link);
-  links.insert(links.end(), setup.fingertip_links.begin(), setup.fingertip_links.end());
-  for (const CameraModel& camera : rig.cameras) links.push_back(camera.link);
-  const ForwardKinematics kinematics(robot, links);
-  std::set<std::string> idle;
-  for (Eigen::Index j = 0; j < robot->joint_count(); ++j) {
-    bool matters = false;
-    for (std::size_t link = 0; link < links.size() && !matters; ++link) matters = kinematics.moves(j, link);
-    if (!matters) idle.insert(robot->joints()[static_cast<std::size_t>(j)].name);
-  }
-  return idle;
 }
 
 /// Values of the joints that need not be published: those the configuration fixes, and idle ones.
@@ -55,6 +42,22 @@ BusOptions with_idle_joints(BusOptions options, std::set<std::string> idle) {
 
 }  // namespace
 
+std::set<std::string> idle_joints(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                                  const StereoRig& rig) {
+  std::vector<std::string> links = setup.model.rendered_links;
+  links.push_back(setup.hand_link);
+  links.insert(links.end(), setup.fingertip_links.begin(), setup.fingertip_links.end());
+  for (const CameraModel& camera : rig.cameras) links.push_back(camera.link);
+  const ForwardKinematics kinematics(robot, links);
+  std::set<std::string> idle;
+  for (Eigen::Index j = 0; j < robot->joint_count(); ++j) {
+    bool matters = false;
+    for (std::size_t link = 0; link < links.size() && !matters; ++link) matters = kinematics.moves(j, link);
+    if (!matters) idle.insert(robot->joints()[static_cast<std::size_t>(j)].name);
+  }
+  return idle;
+}
+
 std::vector<std::pair<std::string, std::uint64_t>> BusStatistics::counters() const {
   std::vector<std::pair<std::string, std::uint64_t>> list;
   for (std::size_t i = 1; i < kMessageFaultCount; ++i) {
@@ -63,6 +66,8 @@ std::vector<std::pair<std::string, std::uint64_t>> BusStatistics::counters() con
   for (std::size_t i = 0; i < kDropReasonCount; ++i) {
     list.emplace_back("dropped." + std::string(name_of(static_cast<DropReason>(i))), synchroniser.images_dropped[i]);
   }
+  list.emplace_back("masks.late", synchroniser.masks_late);
+  list.emplace_back("masks.unused", synchroniser.masks_unused);
   list.emplace_back("joint_state.duplicate", synchroniser.joint_messages_duplicate);
   list.emplace_back("joint_state.out_of_order", synchroniser.joint_messages_out_of_order);
   list.emplace_back("joint_state.no_known_joint", synchroniser.joint_messages_without_known_joint);
@@ -72,6 +77,36 @@ std::vector<std::pair<std::string, std::uint64_t>> BusStatistics::counters() con
   return list;
 }
 
+std::string BusStatistics::lost_pictures(double tolerable_share) const {
+  std::vector<std::pair<std::uint64_t, std::string_view>> reasons;
+  std::uint64_t lost = 0;
+  const auto add = [&](std::uint64_t count, std::string_view why) {
+    if (count > 0) reasons.emplace_back(count, why);
+    lost += count;
+  };
+  for (std::size_t i = 0; i < kDropReasonCount; ++i) {
+    add(synchroniser.images_dropped[i], in_words(static_cast<DropReason>(i)));
+  }
+  std::uint64_t of_pictures = 0;  // the other faults may be of encoder messages as well
+  for (const auto& [fault, why] : {std::pair{MessageFault::kWrongSize, "of another size than configured"},
+                                   {MessageFault::kUnsupportedFormat, "not gray, RGB or JPEG"},
+                                   {MessageFault::kBrokenPicture, "a broken JPEG"},
+                                   {MessageFault::kOtherKind, "gray among coloured ones or the reverse"}}) {
+    const auto count = std::min(faults[static_cast<std::size_t>(fault)], images_malformed - of_pictures);
+    add(count, why);
+    of_pictures += count;
+  }
+  add(images_malformed - of_pictures, "malformed");
+  const std::uint64_t all = synchroniser.images + images_malformed;
+  if (all == 0 || static_cast<double>(lost) <= tolerable_share * static_cast<double>(all)) return "";
+  std::stable_sort(reasons.begin(), reasons.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::string text = std::to_string(lost) + " of " + std::to_string(all) + " pictures are not used: ";
+  for (std::size_t i = 0; i < reasons.size(); ++i) {
+    text += (i > 0 ? ", " : "") + std::to_string(reasons[i].first) + " " + std::string(reasons[i].second);
+  }
+  return text;
+}
+
 ObservationStream::ObservationStream(const std::vector<std::string>& joint_names,
                                      const std::map<std::string, double>& fixed_rad,
                                      const std::vector<CameraModel>& cameras, const BusOptions& options)
@@ -79,13 +114,12 @@ ObservationStream::ObservationStream(const std::vector<std::string>& joint_names
       synchroniser_(joint_names, fixed_rad, static_cast<int>(cameras.size()), options.synchroniser),
       assembler_(joint_names, fixed_rad, options.synchroniser.clock_step, options.synchroniser.joints.idle_joints) {
   for (const CameraModel& camera : cameras) {
-    const bool left = camera.name == "left";
-    if ((!left && camera.name != "right") || cameras.size() > 2 || (!cameras_.empty() && left)) {
+    if (cameras.size() > 2 || (!cameras_.empty() && camera.number() <= cameras_.front().type)) {
       throw ConfigurationError("cameras: '" + camera.name +
-                               "': a rig is one camera named left or right, or both, left first");
+                               "': a rig is one camera or two, the one with the smaller number in messages first");
     }
-    cameras_.push_back({camera.name, left ? bot_core::images_t::LEFT : bot_core::images_t::RIGHT,
-                        camera.intrinsics.width, camera.intrinsics.height, 0, false, 0});
+    cameras_.push_back(
+        {camera.name, camera.number(), camera.intrinsics.width, camera.intrinsics.height, 0, false, 0});
   }
 }
 
@@ -109,6 +143,11 @@ bool ObservationStream::receive(std::string_view channel, Bytes message, std::in
     receive_images(message, arrival_us);
     return true;
   }
+  if (expects_masks() && channel == channels_.masks) {
+    ++statistics_.messages;
+    receive_masks(message, arrival_us);
+    return true;
+  }
   return false;
 }
 
@@ -119,38 +158,44 @@ void ObservationStream::receive_joints(Bytes message) {
     return refuse(channels_.joint_state, result);
   }
   synchroniser_.add(joint_state_);
-  if (follower_) show_follower();
+  keep_encoders();
 }
 
-/// The follower sees what the synchroniser saw, clock steps included; and it must go back where a stamp lay so
-/// far ahead by mistake that its sample would be the last for long.
-void ObservationStream::show_follower() {
+/// Samples go on where the synchroniser's do, clock steps included; and back where a stamp lay so far ahead by mistake
+/// that its sample would be the last for long.
+void ObservationStream::keep_encoders() {
   if (const auto steps = synchroniser_.statistics().clock_steps; steps != clock_steps_) {
     clock_steps_ = steps;
     assembler_.forget();
-    follower_->forget();
+    encoders_.clear();
+    encoders_begin_anew_ = true;
+    kept_ = -1;
   }
   const JointSample* sample = assembler_.take(joint_state_);
   if (sample == nullptr) return;
-  if (sample->utime < shown_) follower_->forget();
-  shown_ = sample->utime;
-  follower_->observe(*sample);
+  if (sample->utime < kept_) {
+    encoders_.clear();
+    encoders_begin_anew_ = true;
+  }
+  kept_ = sample->utime;
+  if (!encoders_.empty() && encoders_.back().utime == sample->utime) {
+    encoders_.back() = *sample;  // head and arm apart, with one stamp
+    return;
+  }
+  // Without pictures nobody takes them: the older half is given up.
+  if (encoders_.size() >= kMostEncoders) {
+    encoders_.erase(encoders_.begin(), encoders_.begin() + static_cast<std::ptrdiff_t>(kMostEncoders / 2));
+  }
+  encoders_.push_back(*sample);
 }
 
 std::optional<ArrivedObservation> ObservationStream::next() {
   auto arrived = synchroniser_.next();
-  if (arrived && follower_) annotate(arrived->observation);
-  return arrived;
-}
-
-void ObservationStream::annotate(Observation& observation) {
-  auto& cameras = observation.cameras;
-  // The earlier exposure first: what has a memory goes with time.
-  const bool right_first = cameras.size() > 1 && cameras[0] && cameras[1] && cameras[1]->utime < cameras[0]->utime;
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const std::size_t c = right_first ? cameras.size() - 1 - i : i;
-    if (cameras[c]) follower_->annotate(*cameras[c], c);
+  if (arrived) {
+    arrived->observation.encoders = std::exchange(encoders_, {});
+    arrived->observation.encoders_begin_anew = std::exchange(encoders_begin_anew_, false);
   }
+  return arrived;
 }
 
 void ObservationStream::receive_images(Bytes message, std::int64_t arrival_us) {
@@ -188,6 +233,40 @@ void ObservationStream::receive_images(Bytes message, std::int64_t arrival_us) {
   const std::uint64_t missing_before = synchroniser_.statistics().dropped(DropReason::kMissingJoint);
   synchroniser_.add(std::move(images));
   if (synchroniser_.statistics().dropped(DropReason::kMissingJoint) > missing_before) warn_of_missing_joints();
+}
+
+void ObservationStream::receive_masks(Bytes message, std::int64_t arrival_us) {
+  const DecodeResult result = decode(message, images_, options_.limits);
+  if (!result.ok()) {
+    ++statistics_.messages_malformed;
+    return refuse(channels_.masks, result);
+  }
+  for (const ImageView& view : images_.images) {
+    for (std::size_t c = 0; c < cameras_.size(); ++c) {
+      const CameraFormat& camera = cameras_[c];
+      if (view.type != camera.type) continue;
+      StampedImage mask;
+      DecodeResult unpacked;
+      if (view.width != camera.width || view.height != camera.height) {
+        unpacked = {MessageFault::kBadMask, "mask of " + std::to_string(view.width) + "x" +
+                                                  std::to_string(view.height) + ", its pictures are " +
+                                                  std::to_string(camera.width) + "x" + std::to_string(camera.height)};
+      } else if (view.pixelformat == bot_core::image_t::PIXEL_FORMAT_MJPEG) {
+        unpacked = {MessageFault::kBadMask, "mask as JPEG, which changes its values; expected raw gray"};
+      } else {
+        unpacked = unpack(view, mask.image, options_.limits);
+        if (unpacked.ok()) unpacked = to_mask(mask.image);
+      }
+      if (!unpacked.ok()) {
+        refuse(channels_.masks + " " + camera.name, {MessageFault::kBadMask, unpacked.detail});
+        continue;
+      }
+      mask.camera = static_cast<int>(c);
+      mask.utime = view.utime;
+      mask.arrival_us = arrival_us;
+      synchroniser_.add_mask(std::move(mask));
+    }
+  }
 }
 
 void ObservationStream::expect_channels(std::size_t camera, int channels) {

@@ -13,8 +13,25 @@ constexpr int kStepEvidence = 3;
 std::string_view name_of(DropReason reason) {
   static constexpr std::array<std::string_view, kDropReasonCount> kNames{"unpaired",    "no_encoders",  "missing_joint",
                                                                          "encoder_gap", "encoder_jump", "clock_step",
-                                                                         "overload",    "out_of_order", "duplicate"};
+                                                                         "overload",    "out_of_order", "duplicate",
+                                                                         "no_mask"};
   return kNames[static_cast<std::size_t>(reason)];
+}
+
+std::string_view in_words(DropReason reason) {
+  switch (reason) {
+    case DropReason::kUnpaired: return "without partner from the other camera";
+    case DropReason::kNoEncoders: return "without encoder readings before and after";
+    case DropReason::kMissingJoint: return "without readings of a joint";
+    case DropReason::kEncoderGap: return "in a gap of the encoder readings";
+    case DropReason::kEncoderJump: return "where encoders jumped";
+    case DropReason::kClockStep: return "where the clock stepped back";
+    case DropReason::kOverload: return "beyond what may wait";
+    case DropReason::kOutOfOrder: return "with a stamp before the last one's";
+    case DropReason::kDuplicate: return "with the same stamp as another";
+    case DropReason::kNoMask: return "whose mask did not come in time";
+  }
+  return "for another reason";
 }
 
 std::uint64_t SynchroniserStatistics::total_dropped() const {
@@ -56,6 +73,7 @@ void Synchroniser::add(const JointStateMessage& message) {
       // other must not hide that.
       if (history_.newest() - message.utime <= options_.clock_step) older_joints_in_a_row_ = 0;
       ++statistics_.joint_messages;
+      newest_joints_ = message.utime;
       resolve(false);
       break;
     case JointHistory::Arrival::kDuplicate: ++statistics_.joint_messages_duplicate; break;
@@ -87,6 +105,53 @@ void Synchroniser::add(std::vector<StampedImage> images) {
   }
   pair(false);
   resolve(false);
+}
+
+void Synchroniser::add_mask(StampedImage mask) {
+  if (!options_.masks || mask.camera < 0 || static_cast<std::size_t>(mask.camera) >= cameras_.size()) return;
+  ++statistics_.masks;
+  Camera& camera = cameras_[static_cast<std::size_t>(mask.camera)];
+  if (mask.utime <= camera.settled && camera.settled - mask.utime <= options_.clock_step) {
+    ++statistics_.masks_late;
+    return;
+  }
+  camera.masks.push_back(std::move(mask));
+  if (camera.masks.size() > static_cast<std::size_t>(options_.max_waiting)) {
+    camera.masks.pop_front();
+    ++statistics_.masks_unused;
+  }
+  resolve(false);
+}
+
+std::deque<StampedImage>::iterator Synchroniser::mask_of(const StampedImage& picture) {
+  auto& masks = cameras_[static_cast<std::size_t>(picture.camera)].masks;
+  return std::find_if(masks.begin(), masks.end(), [&](const StampedImage& m) { return m.utime == picture.utime; });
+}
+
+bool Synchroniser::settle_masks(Instant& instant, bool finishing) {
+  if (!options_.masks) return true;
+  const auto lacks = [&](const std::optional<StampedImage>& picture) {
+    return picture && mask_of(*picture) == cameras_[static_cast<std::size_t>(picture->camera)].masks.end();
+  };
+  if (std::none_of(instant.images.begin(), instant.images.end(), lacks)) return true;
+  const Microseconds now = std::max(newest_image_, newest_joints_);
+  if (!finishing && now - instant.utime() <= options_.mask_wait) return false;
+  for (auto& picture : instant.images) {
+    if (!lacks(picture)) continue;
+    count_dropped(DropReason::kNoMask);
+    settle(*picture);
+    picture.reset();
+  }
+  return true;
+}
+
+/// The masks up to this picture's belong to no picture that is still to come.
+void Synchroniser::settle(const StampedImage& picture) {
+  Camera& camera = cameras_[static_cast<std::size_t>(picture.camera)];
+  camera.settled = std::max(camera.settled, picture.utime);
+  for (; !camera.masks.empty() && camera.masks.front().utime <= picture.utime; camera.masks.pop_front()) {
+    ++statistics_.masks_unused;
+  }
 }
 
 /// Whether a picture with this stamp may enter its camera's queue.
@@ -183,8 +248,18 @@ void Synchroniser::resolve(bool finishing) {
   using Verdict = JointHistory::Verdict;
   for (; !instants_.empty(); instants_.pop_front()) {
     Instant& instant = instants_.front();
+    if (instant.utime() <= last_emitted_) {
+      drop(instant, DropReason::kOutOfOrder);
+      continue;
+    }
+    if (!settle_masks(instant, finishing)) return;
+    if (instant.count() == 0) continue;  // no mask came
+    if (instant.count() < cameras_.size() && !options_.allow_mono) {
+      drop(instant, DropReason::kUnpaired);
+      continue;
+    }
     const Microseconds utime = instant.utime();
-    if (utime <= last_emitted_) {
+    if (utime <= last_emitted_) {  // that of the other camera, the first being left out
       drop(instant, DropReason::kOutOfOrder);
       continue;
     }
@@ -218,8 +293,16 @@ void Synchroniser::resolve(bool finishing) {
     }
     for (std::size_t c = 0; c < cameras_.size(); ++c) {
       if (!instant.images[c]) continue;
-      arrived.observation.cameras[c]->image = std::move(instant.images[c]->image);
-      arrived.arrival_us = std::max(arrived.arrival_us, instant.images[c]->arrival_us);
+      StampedImage& picture = *instant.images[c];
+      CameraObservation& camera = *arrived.observation.cameras[c];
+      camera.image = std::move(picture.image);
+      arrived.arrival_us = std::max(arrived.arrival_us, picture.arrival_us);
+      if (!options_.masks) continue;
+      const auto mask = mask_of(picture);
+      camera.given_mask = std::move(mask->image);
+      arrived.arrival_us = std::max(arrived.arrival_us, mask->arrival_us);
+      cameras_[c].masks.erase(mask);
+      settle(picture);
     }
     last_emitted_ = utime;
     statistics_.images_used += instant.count();
@@ -249,6 +332,10 @@ std::optional<ArrivedObservation> Synchroniser::next() {
 void Synchroniser::finish() {
   pair(true);
   resolve(true);
+  for (Camera& camera : cameras_) {
+    statistics_.masks_unused += camera.masks.size();
+    camera.masks.clear();
+  }
 }
 
 /// After a clock step nothing seen before can be compared with what comes.
@@ -256,17 +343,22 @@ void Synchroniser::start_anew() {
   ++statistics_.clock_steps;
   for (Camera& camera : cameras_) {
     count_dropped(DropReason::kClockStep, camera.queue.size());
+    statistics_.masks_unused += camera.masks.size();
     camera = Camera{};
   }
-  for (const Instant& instant : instants_) drop(instant, DropReason::kClockStep);
+  for (const Instant& instant : instants_) count_dropped(DropReason::kClockStep, instant.count());
   instants_.clear();
   history_.clear();
-  newest_image_ = last_emitted_ = -1;
+  newest_image_ = newest_joints_ = last_emitted_ = -1;
   older_joints_in_a_row_ = 0;
 }
 
 void Synchroniser::drop(const Instant& instant, DropReason reason) {
   count_dropped(reason, instant.count());
+  if (!options_.masks) return;
+  for (const auto& picture : instant.images) {
+    if (picture) settle(*picture);
+  }
 }
 
 void Synchroniser::count_dropped(DropReason reason, std::uint64_t images) {

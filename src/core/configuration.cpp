@@ -25,8 +25,8 @@ constexpr std::size_t kMaxEntries = 20000;  // bounds documents that multiply th
 constexpr int kMaxDepth = 32;
 
 /// Those of all programs; a file may hold them beside its version.
-constexpr std::array kSections = {"robot",  "cameras",    "vision",    "bus",        "estimator",
-                                  "filter", "silhouette", "simulator", "yarp_import"};
+constexpr std::array kSections = {"robot",  "cameras",    "vision",    "bus",    "estimator",
+                                  "filter", "silhouette", "simulator", "import", "yarp_import"};
 
 }  // namespace
 
@@ -463,6 +463,11 @@ bool Configuration::has(const std::string& key) const {
   return entry != nullptr && (entry->mapping || (entry->leaf.IsDefined() && !entry->leaf.IsNull()));
 }
 
+bool Configuration::is_mapping(const std::string& key) const {
+  const Entry* entry = document_->find(below(section_, key));
+  return entry != nullptr && entry->mapping;
+}
+
 std::vector<std::string> Configuration::keys() const {
   std::vector<std::string> names;
   if (Entry* entry = document_->find(section_)) {
@@ -546,6 +551,23 @@ std::vector<double> Configuration::numbers(const std::string& key) const {
     values.push_back(*value);
   }
   return values;
+}
+
+std::vector<std::vector<double>> Configuration::rows(const std::string& key) const {
+  const Entry* entry = document_->find(below(section_, key));
+  constexpr const char* kExpected = "a list of equally long lists of numbers";
+  if (entry == nullptr || entry->mapping || !entry->leaf.IsSequence()) fail(key, kExpected);
+  std::vector<std::vector<double>> table;
+  for (const auto& row : entry->leaf) {
+    if (!row.IsSequence() || (!table.empty() && row.size() != table.front().size())) fail(key, kExpected);
+    std::vector<double>& values = table.emplace_back();
+    for (const auto& item : row) {
+      const auto value = item.IsScalar() ? parse_number(item.Scalar()) : std::nullopt;
+      if (!value) fail(key, kExpected);
+      values.push_back(*value);
+    }
+  }
+  return table;
 }
 
 std::vector<std::string> Configuration::texts(const std::string& key) const {

@@ -24,21 +24,6 @@ namespace {
 constexpr int kMostStartFrames = 150;
 constexpr int kFramesAfterConvergence = 10;
 
-const char* in_words(DropReason reason) {
-  switch (reason) {
-    case DropReason::kUnpaired: return "without partner from the other camera";
-    case DropReason::kNoEncoders: return "without encoder readings before and after";
-    case DropReason::kMissingJoint: return "without readings of a joint";
-    case DropReason::kEncoderGap: return "in a gap of the encoder readings";
-    case DropReason::kEncoderJump: return "where encoders jumped";
-    case DropReason::kClockStep: return "where the clock stepped back";
-    case DropReason::kOverload: return "beyond what may wait";
-    case DropReason::kOutOfOrder: return "with a stamp before the last one's";
-    case DropReason::kDuplicate: return "with the same stamp as another";
-  }
-  return "for another reason";
-}
-
 using diagnosis::JointStream;
 using diagnosis::LogPictures;
 
@@ -162,7 +147,7 @@ class LogDiagnosis {
                       "it happened, may be wrong; record again with one steady clock",
                       steps == 1 ? "once" : fmt::format("{} times", steps)));
     }
-    if (auto lost = lost_pictures(facts_.bus, kTolerableLoss); !lost.empty()) {
+    if (auto lost = facts_.bus.lost_pictures(kTolerableLoss); !lost.empty()) {
       report.warnings.push_back(std::move(lost));
     }
     const auto& roles = measurement_.roles();
@@ -213,6 +198,10 @@ class LogDiagnosis {
     if (!facts_.missing_joints.empty()) {
       throw DataError(log + ": no reading of joint '" + facts_.missing_joints.front() +
                       "'; publish and record it, or give it a value under robot.fixed_joints_deg");
+    }
+    if (pictures_seen_ == 0 && sync.dropped(DropReason::kNoMask) > 0) {
+      throw DataError(log + ": " + facts_.bus.lost_pictures(0.0) + "; vision.method: given needs masks on channel " +
+                      channels.masks + ", each with its picture's stamp");
     }
     if (pictures_seen_ == 0) {
       throw DataError(log + ": none of " + std::to_string(sync.images) +
@@ -312,35 +301,6 @@ class LogDiagnosis {
 };
 
 }  // namespace
-
-std::string lost_pictures(const BusStatistics& bus, double tolerable_share) {
-  std::vector<std::pair<std::uint64_t, std::string>> reasons;
-  std::uint64_t lost = 0;
-  const auto add = [&](std::uint64_t count, const char* why) {
-    if (count > 0) reasons.emplace_back(count, why);
-    lost += count;
-  };
-  const auto& sync = bus.synchroniser;
-  for (std::size_t i = 0; i < kDropReasonCount; ++i) add(sync.images_dropped[i], in_words(static_cast<DropReason>(i)));
-  std::uint64_t of_pictures = 0;  // the other faults may be of encoder messages as well
-  for (const auto& [fault, why] : {std::pair{MessageFault::kWrongSize, "another size than configured"},
-                                   {MessageFault::kUnsupportedFormat, "not gray, RGB or JPEG"},
-                                   {MessageFault::kBrokenPicture, "a broken JPEG"},
-                                   {MessageFault::kOtherKind, "gray among coloured ones or the reverse"}}) {
-    const auto count = bus.faults[static_cast<std::size_t>(fault)];
-    add(count, why);
-    of_pictures += count;
-  }
-  if (bus.images_malformed > of_pictures) add(bus.images_malformed - of_pictures, "malformed");
-  const std::uint64_t all = sync.images + bus.images_malformed;
-  if (all == 0 || static_cast<double>(lost) <= tolerable_share * static_cast<double>(all)) return "";
-  std::stable_sort(reasons.begin(), reasons.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::string text = fmt::format("{} of {} pictures are not used: ", lost, all);
-  for (std::size_t i = 0; i < reasons.size(); ++i) {
-    text += fmt::format("{}{} {}", i > 0 ? ", " : "", reasons[i].first, reasons[i].second);
-  }
-  return text;
-}
 
 DiagnosisReport diagnose_log(const Configuration& configuration, const LogDiagnosisOptions& options) {
   {

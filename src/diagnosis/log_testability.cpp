@@ -81,7 +81,7 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
   const auto bus = BusOptions::from(configuration.section("bus"));
   configuration.reject_unknown_sections();
   for (const char* read : {"robot", "cameras", "bus"}) configuration.section(read).reject_unknown_keys();
-  const auto model = setup.load();
+  const auto model = load_robot(setup, rig);
   Motion motion(model, setup, rig);
   diagnosis::JointStream joints(*model, setup, bus);
   ObservationStream stream(model, setup, rig, bus);

@@ -1,44 +1,39 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
 /// The axis of a joint lies beside where the URDF has it, moved along the two directions about which
-/// `axis_tilt` turns it (CorrectedKinematics::tilt_axis): a length across a link, or along it, is
-/// wrong. All beyond the joint moves with it.
-class AxisShift final : public Clonable<AxisShift> {
- public:
-  AxisShift(const EffectTarget& target, Eigen::Index joint)
-      : Clonable("axis_shift", target, {shift("shift_1"), shift("shift_2")}), joint_(joint) {}
-  void apply(const Instant&, Corrections& add_to) const override {
-    auto& adjustment = add_to.adjustments[static_cast<std::size_t>(joint_)];
-    adjustment.shift_1_m += value(0);
-    adjustment.shift_2_m += value(1);
-  }
-
- private:
-  static EffectParameter shift(const char* name) {
-    return {.name = name, .unit = "mm", .si_per_unit = 1e-3, .typical = 3e-3};
-  }
-
-  Eigen::Index joint_;
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_axis_shift(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<AxisShift>(target, roles.index(target.joint));
-}
-
-Targets axis_shift_targets(const JointRoles& roles) {
-  // The first two of an arm look like a shifted base.
-  auto targets = arm_targets(roles);
-  targets.erase(targets.begin(),
-                targets.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(2, targets.size())));
-  return targets;
+/// `axis_tilt` turns it (CorrectedKinematics::tilt_axis). All beyond the joint moves with it.
+EffectKind axis_shift() {
+  return {.name = "axis_shift",
+          .targets =
+              [](const JointRoles& roles) {
+                // The first two of an arm look like a shifted base.
+                auto targets = arm_targets(roles);
+                targets.erase(targets.begin(), targets.begin() + static_cast<std::ptrdiff_t>(
+                                                                     std::min<std::size_t>(2, targets.size())));
+                return targets;
+              },
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return plain("axis_shift", target, {in_mm("shift_1", 3.0), in_mm("shift_2", 3.0)},
+                             [joint = static_cast<std::size_t>(roles.index(target.joint))](
+                                 Parameters p, const Instant&, Corrections& c) {
+                               c.adjustments[joint].shift_1_m += p[0].value;
+                               c.adjustments[joint].shift_2_m += p[1].value;
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "the axis of " + e.target().joint + " lies beside where the URDF has it, by " + amounts[0] +
+                       " and " + amounts.back() + " along two directions across it";
+              },
+          .lookalikes = {"link_length", "base_shift"},
+          .splitting_motion = "Move the joint and its neighbours one at a time through their full ranges.",
+          .home = EffectHome::kUrdf};
 }
 
 }  // namespace bodyschema::effects

@@ -1,36 +1,32 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
 /// The axis of a joint is not quite where the URDF has it: it is turned by two small angles about
 /// directions perpendicular to it (CorrectedKinematics::tilt_axis). The pose at joint angle zero
 /// stays as it is, so what is left is the part that no offset can absorb.
-class AxisTilt final : public Clonable<AxisTilt> {
- public:
-  AxisTilt(const EffectTarget& target, Eigen::Index joint)
-      : Clonable("axis_tilt", target,
-                 {EffectParameter{.name = "tilt_1", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg},
-                  EffectParameter{.name = "tilt_2", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
-        joint_(joint) {}
-  void apply(const Instant&, Corrections& add_to) const override {
-    auto& adjustment = add_to.adjustments[static_cast<std::size_t>(joint_)];
-    adjustment.tilt_1_rad += value(0);
-    adjustment.tilt_2_rad += value(1);
-  }
-
- private:
-  Eigen::Index joint_;
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_axis_tilt(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<AxisTilt>(target, roles.index(target.joint));
-}
-
-Targets axis_tilt_targets(const JointRoles& roles) {
-  return arm_targets(roles);
+EffectKind axis_tilt() {
+  return {.name = "axis_tilt",
+          .targets = arm_targets,
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return plain("axis_tilt", target, {in_degrees("tilt_1", 0.5), in_degrees("tilt_2", 0.5)},
+                             [joint = static_cast<std::size_t>(roles.index(target.joint))](
+                                 Parameters p, const Instant&, Corrections& c) {
+                               c.adjustments[joint].tilt_1_rad += p[0].value;
+                               c.adjustments[joint].tilt_2_rad += p[1].value;
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "the axis of " + e.target().joint + " is tilted against the URDF's, by " + amounts[0] + " and " +
+                       amounts.back() + " about two directions across it";
+              },
+          .not_testable = [](const EffectTarget& target, const JointRoles& roles,
+                             const LogMotion& motion) { return too_little_motion(target.joint, roles, motion); },
+          .lookalikes = {"joint_coupling"},
+          .splitting_motion = "Move the joint and its neighbours one at a time through their full ranges.",
+          .home = EffectHome::kUrdf};
 }
 
 }  // namespace bodyschema::effects

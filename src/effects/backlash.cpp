@@ -1,17 +1,21 @@
 #include <algorithm>
 
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
 namespace {
 
 /// Play between encoder and link (play operator): the link stays where it is until the encoder has
 /// taken up the slack, then follows at half the width behind. `width` is the full play.
-class Backlash final : public Clonable<Backlash> {
+class Backlash final : public ClonableEffect<Backlash> {
  public:
   Backlash(const EffectTarget& target, Eigen::Index joint)
-      : Clonable("backlash", target,
-                 {EffectParameter{.name = "width", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
+      : ClonableEffect("backlash", target,
+                       {{.name = "width",
+                         .unit = "deg",
+                         .si_per_unit = kDeg,
+                         .typical = 0.5 * kDeg,
+                         .at_least = 1e-5}}),
         joint_(joint) {}
 
   [[nodiscard]] bool has_memory() const override { return true; }
@@ -53,14 +57,44 @@ class Backlash final : public Clonable<Backlash> {
   bool started_ = false;
 };
 
-}  // namespace
-
-std::unique_ptr<Effect> make_backlash(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<Backlash>(target, roles.index(target.joint));
+/// Why a log with this motion does not show which way the joint moved last.
+std::string not_testable(const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) {
+  constexpr double kSparse_s = 0.025;
+  constexpr double kJump_rad = 8.0 * kDeg;  // between readings 100 ms apart even a fast arm moves less
+  if (motion.reading_period_s > kSparse_s) {
+    // Of an arm that is read from one posture to the next it does not matter how often.
+    if (motion.reading_step_rad > kJump_rad) {
+      return "the arm's readings jump from posture to posture, by " + short_number(motion.reading_step_rad / kDeg, 0) +
+             " deg (median); how the joints moved between them, and in which direction last, was not seen";
+    }
+    return "the arm's encoders come every " + short_number(1e3 * motion.reading_period_s, 0) +
+           " ms; the direction of motion needs 100 Hz or more";
+  }
+  if (auto still = too_little_motion(target.joint, roles, motion); !still.empty()) return still;
+  // Backlash shows where a joint passes the same angles in both directions.
+  const int reversals = motion.reversals[static_cast<std::size_t>(roles.index(target.joint))];
+  if (reversals >= 2) return {};
+  return target.joint + " turned round " + (reversals == 0 ? "never" : "once") +
+         "; both directions through the same postures are needed";
 }
 
-Targets backlash_targets(const JointRoles& roles) {
-  return arm_targets(roles);
+}  // namespace
+
+EffectKind backlash() {
+  return {.name = "backlash",
+          .targets = arm_targets,
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return std::make_unique<Backlash>(target, roles.index(target.joint));
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return e.target().joint + " has " + amounts[0] + " of play between encoder and link";
+              },
+          .not_testable = not_testable,
+          .lookalikes = {"latency"},
+          .splitting_motion = "Repeat the same path at two speeds and in both directions.",
+          .remark = "depends on the direction of motion; approach targets from one side"};
 }
 
 }  // namespace bodyschema::effects

@@ -1,31 +1,37 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
 /// The arm is mounted elsewhere, seen from the eyes: every part of it lies further along the root's
 /// axes. Errors in the lengths between base and eyes look like this while torso and head stand still.
-class BaseShift final : public Clonable<BaseShift> {
- public:
-  explicit BaseShift(const EffectTarget& target) : Clonable("base_shift", target, {axis("x"), axis("y"), axis("z")}) {}
-  void apply(const Instant&, Corrections& add_to) const override {
-    add_to.base_shift_m += Eigen::Vector3d(value(0), value(1), value(2));
-  }
-
- private:
-  static EffectParameter axis(const char* name) {
-    return {.name = name, .unit = "mm", .si_per_unit = 1e-3, .typical = 3e-3};
-  }
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_base_shift(const EffectTarget& target, const JointRoles&) {
-  return std::make_unique<BaseShift>(target);
-}
-
-Targets base_shift_targets(const JointRoles& roles) {
-  return whole_robot(roles);
+EffectKind base_shift() {
+  return {.name = "base_shift",
+          .targets = whole_robot,
+          .make =
+              [](const EffectTarget& target, const JointRoles&) {
+                return plain("base_shift", target, {in_mm("x", 3.0), in_mm("y", 3.0), in_mm("z", 3.0)},
+                             [](Parameters p, const Instant&, Corrections& c) {
+                               c.base_shift_m += Eigen::Vector3d(p[0].value, p[1].value, p[2].value);
+                             });
+              },
+          .sentence =
+              [](const Effect&, const JointRoles&, std::span<const std::string> amounts) {
+                std::string text = "the arm is mounted elsewhere, seen from the cameras: moved along the root's axes by ";
+                for (std::size_t i = 0; i < amounts.size(); ++i) text += (i > 0 ? ", " : "") + amounts[i];
+                return text;
+              },
+          .not_testable = [](const EffectTarget&, const JointRoles& roles, const LogMotion& motion) -> std::string {
+            constexpr double kHeadStill = 5.0 * kDeg;
+            if (roles.head.empty()) {
+              return "the cameras do not move against the base: a shifted base looks like errors of their place";
+            }
+            if (motion.neck_range_rad >= kHeadStill) return {};
+            return "the neck moved " + short_number(motion.neck_range_rad / kDeg) +
+                   " deg: a shifted base looks like errors of neck and eyes";
+          },
+          .lookalikes = {"head_offset", "principal_point", "camera_pose"},
+          .splitting_motion = "Move the head by 20 to 30 deg with the arm still.",
+          .home = EffectHome::kUrdf};
 }
 
 }  // namespace bodyschema::effects

@@ -1,27 +1,29 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
-/// The eyes are further apart: the right camera lies that much further along its x axis.
-class Baseline final : public Clonable<Baseline> {
- public:
-  explicit Baseline(const EffectTarget& target)
-      : Clonable("baseline", target,
-                 {EffectParameter{.name = "distance", .unit = "mm", .si_per_unit = 1e-3, .typical = 1e-3}}) {}
-  void apply(const Instant& at, Corrections& add_to) const override {
-    if (at.camera == 1) add_to.camera.shift_x_m += value(0);
-  }
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_baseline(const EffectTarget& target, const JointRoles&) {
-  return std::make_unique<Baseline>(target);
-}
-
-Targets baseline_targets(const JointRoles& roles) {
-  return whole_robot(roles);
+/// The cameras are further apart: the second lies that much further along its x axis.
+EffectKind baseline() {
+  return {.name = "baseline",
+          .targets = [](const JointRoles& roles) { return roles.cameras.size() > 1 ? whole_robot(roles) : Targets{}; },
+          .make =
+              [](const EffectTarget& target, const JointRoles&) {
+                return plain("baseline", target, {in_mm("distance", 1.0)},
+                             [](Parameters p, const Instant& at, Corrections& c) {
+                               if (at.camera == 1) c.camera.shift_m.x() += p[0].value;
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "the cameras are " + amounts[0] + by_sign(e.parameters()[0], " further apart", " nearer together") +
+                       " than configured";
+              },
+          .not_testable = [](const EffectTarget&, const JointRoles&,
+                             const LogMotion& motion) { return needs_two_cameras(motion); },
+          .lookalikes = {"vergence", "principal_point", "camera_pair"},
+          .splitting_motion =
+              "Show the hand at depths from 0.2 to 0.6 m and in the corners of the picture, or a checkerboard.",
+          .home = EffectHome::kUrdf};
 }
 
 }  // namespace bodyschema::effects

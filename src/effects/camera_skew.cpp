@@ -1,31 +1,36 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
 /// The right picture is taken later than the left one although their stamps agree; second order in time
-/// as Latency is.
-class CameraSkew final : public Clonable<CameraSkew> {
- public:
-  explicit CameraSkew(const EffectTarget& target)
-      : Clonable("camera_skew", target,
-                 {EffectParameter{.name = "skew", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {}
-  [[nodiscard]] bool follows_motion() const override { return true; }
-  void apply(const Instant& at, Corrections& add_to) const override {
-    if (at.camera != 1) return;
-    add_to.dq.noalias() += value(0) * at.qdot;
-    add_to.dq.noalias() += 0.5 * value(0) * value(0) * at.qddot;
-  }
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_camera_skew(const EffectTarget& target, const JointRoles&) {
-  return std::make_unique<CameraSkew>(target);
-}
-
-Targets camera_skew_targets(const JointRoles& roles) {
-  return whole_robot(roles);
+/// as latency is.
+EffectKind camera_skew() {
+  return {.name = "camera_skew",
+          .targets = whole_robot,
+          .make =
+              [](const EffectTarget& target, const JointRoles&) {
+                return plain(
+                    "camera_skew", target, {in_ms("skew", 20.0)},
+                    [](Parameters p, const Instant& at, Corrections& c) {
+                      if (at.camera != 1) return;
+                      c.dq.noalias() += p[0].value * at.qdot;
+                      c.dq.noalias() += 0.5 * p[0].value * p[0].value * at.qddot;
+                    },
+                    Follows::kMotion);
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "the second camera's pictures are taken " + amounts[0] +
+                       by_sign(e.parameters()[0], " later", " earlier") + " than their stamps say, against the first's";
+              },
+          .not_testable =
+              [](const EffectTarget&, const JointRoles&, const LogMotion& motion) {
+                const auto one = needs_two_cameras(motion);
+                return one.empty() ? too_slow(motion) : one;
+              },
+          .lookalikes = {"latency", "backlash"},
+          .splitting_motion = "Repeat the same path at two speeds and in both directions.",
+          .remark = "stamp the right camera's pictures later by the skew"};
 }
 
 }  // namespace bodyschema::effects

@@ -1,45 +1,69 @@
-#include "bodyschema/effects/catalogue.hpp"
-
 #include <algorithm>
+#include <deque>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema {
-namespace {
+namespace effects {
 
-struct Entry {
-  const char* name;
-  std::unique_ptr<Effect> (*make)(const EffectTarget&, const JointRoles&);
-  effects::Targets (*targets)(const JointRoles&);
-};
-
-#define BODYSCHEMA_EFFECT(name)                            \
-  Entry {                                                  \
-#name, &effects::make_##name, &effects::name##_targets \
-  }
-constexpr Entry kCatalogue[] = {
-    BODYSCHEMA_EFFECT(joint_offset),   BODYSCHEMA_EFFECT(compliance),
-    BODYSCHEMA_EFFECT(payload),        BODYSCHEMA_EFFECT(backlash),
-    BODYSCHEMA_EFFECT(encoder_gain),   BODYSCHEMA_EFFECT(eccentricity),
-    BODYSCHEMA_EFFECT(joint_coupling), BODYSCHEMA_EFFECT(latency),
-    BODYSCHEMA_EFFECT(camera_skew),    BODYSCHEMA_EFFECT(link_length),
-    BODYSCHEMA_EFFECT(axis_tilt),      BODYSCHEMA_EFFECT(head_offset),
-    BODYSCHEMA_EFFECT(vergence),       BODYSCHEMA_EFFECT(baseline),
-    BODYSCHEMA_EFFECT(focal_length),   BODYSCHEMA_EFFECT(principal_point),
-    BODYSCHEMA_EFFECT(distortion),     BODYSCHEMA_EFFECT(silhouette_bias),
-    BODYSCHEMA_EFFECT(mesh_scale),     BODYSCHEMA_EFFECT(finger_posture),
-    BODYSCHEMA_EFFECT(drift),          BODYSCHEMA_EFFECT(slip),
-    BODYSCHEMA_EFFECT(base_shift),     BODYSCHEMA_EFFECT(axis_shift),
-};
+#define BODYSCHEMA_EFFECT(name) EffectKind name();
+#include "effect_list.inc"
 #undef BODYSCHEMA_EFFECT
 
-const Entry& entry(const std::string& name) {
-  for (const auto& e : kCatalogue) {
-    if (name == e.name) return e;
+Targets body_targets(const JointRoles& roles) {
+  Targets targets = {EffectTarget{}};
+  if (roles.segments.size() < 2) return targets;
+  for (const auto& segment : roles.segments) targets.push_back({"", segment.name});
+  return targets;
+}
+
+std::vector<std::size_t> segments_of(const EffectTarget& target, const JointRoles& roles) {
+  std::vector<std::size_t> list;
+  for (std::size_t s = 0; s < roles.segments.size(); ++s) {
+    if (target.source.empty() || roles.segments[s].name == target.source) list.push_back(s);
   }
-  throw ConfigurationError("unknown effect '" + name + "'; did you mean '" + nearest_name(name, effect_names()) + "'?");
+  return list;
+}
+
+std::string short_number(double value, int decimals) {
+  std::ostringstream text;
+  text.setf(std::ios::fixed);
+  text.precision(decimals);
+  text << value;
+  return text.str();
+}
+
+std::string too_little_motion(const std::string& joint, const JointRoles& roles, const LogMotion& motion) {
+  constexpr double kLeastRange = 5.0 * kDeg;
+  const double range = motion.range_rad[roles.index(joint)];
+  return range < kLeastRange ? joint + " moved " + short_number(range / kDeg) + " deg" : "";
+}
+
+std::string too_slow(const LogMotion& motion) {
+  constexpr double kLeastSpeed = 3.0 * kDeg;  // rad/s
+  return motion.arm_speed_rad_s < kLeastSpeed
+             ? "the arm moved at " + short_number(motion.arm_speed_rad_s / kDeg) + " deg/s"
+             : "";
+}
+
+std::string needs_two_cameras(const LogMotion& motion) {
+  return motion.cameras < 2 ? "the log has one camera" : "";
+}
+
+namespace {
+
+/// References to entries hold when more are registered.
+std::deque<EffectKind>& catalogue() {
+  static std::deque<EffectKind> kinds = [] {
+    std::deque<EffectKind> list;
+#define BODYSCHEMA_EFFECT(name) list.push_back(name());
+#include "effect_list.inc"
+#undef BODYSCHEMA_EFFECT
+    return list;
+  }();
+  return kinds;
 }
 
 using Part = std::string EffectTarget::*;
@@ -47,18 +71,27 @@ using Part = std::string EffectTarget::*;
 /// Throws unless some target has this joint or source. Of a coupling joint and source are looked at by
 /// themselves: any two joints of the arm may be coupled.
 void check_is_listed(const std::string& effect, const char* key, Part part, const EffectTarget& target,
-                     const effects::Targets& targets) {
+                     const Targets& targets) {
   std::vector<std::string> known;
   for (const auto& t : targets) {
     if (std::find(known.begin(), known.end(), t.*part) == known.end()) known.push_back(t.*part);
   }
   if (std::find(known.begin(), known.end(), target.*part) != known.end()) return;
-  std::string expected = known.front().empty() ? "none" : known.front();
+  std::erase(known, "");
+  std::string expected = known.empty() ? "none" : known.front();
   for (std::size_t i = 1; i < known.size(); ++i) expected += (i + 1 < known.size() ? ", " : " or ") + known[i];
   throw ConfigurationError(effect + ": " + key + " is '" + target.*part + "', expected " + expected);
 }
 
 }  // namespace
+}  // namespace effects
+
+std::string EffectParameter::key() const {
+  if (unit == "1") return name;
+  std::string suffix = unit == "%" ? "percent" : unit;
+  if (const auto slash = suffix.find('/'); slash != std::string::npos) suffix.replace(slash, 1, "_per_");
+  return name + "_" + suffix;
+}
 
 std::string Effect::description() const {
   std::string text = name_;
@@ -67,43 +100,48 @@ std::string Effect::description() const {
   return text;
 }
 
-const std::vector<std::string>& effect_names() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> list;
-    for (const auto& e : kCatalogue) list.emplace_back(e.name);
-    return list;
-  }();
+std::vector<std::reference_wrapper<const EffectKind>> effect_kinds() {
+  const auto& kinds = effects::catalogue();
+  return {kinds.begin(), kinds.end()};
+}
+
+void register_effect(EffectKind kind) {
+  for (const auto& known : effects::catalogue()) {
+    if (known.name == kind.name) throw ConfigurationError("effect '" + kind.name + "' is in the catalogue already");
+  }
+  effects::catalogue().push_back(std::move(kind));
+}
+
+std::vector<std::string> effect_names() {
+  std::vector<std::string> names;
+  for (const auto& kind : effects::catalogue()) names.push_back(kind.name);
   return names;
 }
 
+const EffectKind& effect_kind(const std::string& name) {
+  for (const auto& kind : effects::catalogue()) {
+    if (kind.name == name) return kind;
+  }
+  throw ConfigurationError("unknown effect '" + name + "'; did you mean '" + nearest_name(name, effect_names()) + "'?");
+}
+
 std::unique_ptr<Effect> make_effect(const std::string& name, const EffectTarget& target, const JointRoles& roles) {
-  const auto& e = entry(name);
-  const auto targets = e.targets(roles);
-  if (targets.empty()) throw ConfigurationError(name + ": this robot lacks the joints for it");
+  const auto& kind = effect_kind(name);
+  const auto targets = kind.targets(roles);
+  if (targets.empty()) throw ConfigurationError(name + ": this robot lacks what it needs");
   const bool needs_joint = !targets.front().joint.empty();
   if (needs_joint == target.joint.empty()) {
     throw ConfigurationError(name +
                              (needs_joint ? ": expected a joint" : ": takes no joint, found '" + target.joint + "'"));
   }
   if (needs_joint) static_cast<void>(roles.index(target.joint));  // says which one may be meant
-  check_is_listed(name, "joint", &EffectTarget::joint, target, targets);
-  check_is_listed(name, "source", &EffectTarget::source, target, targets);
-  return e.make(target, roles);
+  effects::check_is_listed(name, "joint", &EffectTarget::joint, target, targets);
+  effects::check_is_listed(name, "source", &EffectTarget::source, target, targets);
+  return kind.make(target, roles);
 }
 
 std::vector<EffectTarget> effect_targets(const std::string& name, const JointRoles& roles) {
-  return entry(name).targets(roles);
+  return effect_kind(name).targets(roles);
 }
 
-namespace effects {
-
-Targets arm_targets(const JointRoles& roles) {
-  Targets targets;
-  for (const auto joint : roles.arm) {
-    targets.push_back({roles.names[static_cast<std::size_t>(joint)], ""});
-  }
-  return targets;
-}
-
-}  // namespace effects
 }  // namespace bodyschema

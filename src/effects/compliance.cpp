@@ -1,32 +1,37 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
 /// The joint gives way under the torque of gravity: dq = compliance * torque. Positive: it sags.
-class Compliance final : public Clonable<Compliance> {
- public:
-  Compliance(const EffectTarget& target, Eigen::Index joint)
-      : Clonable("compliance", target,
-                 {EffectParameter{.name = "compliance", .unit = "deg/Nm", .si_per_unit = kDeg, .typical = 0.3 * kDeg}}),
-        joint_(joint) {}
-  [[nodiscard]] bool follows_gravity() const override { return true; }
-  void apply(const Instant& at, Corrections& add_to) const override {
-    if (at.gravity_torque.size() > 0) add_to.dq[joint_] += value(0) * at.gravity_torque[joint_];
-  }
-
- private:
-  Eigen::Index joint_;
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_compliance(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<Compliance>(target, roles.index(target.joint));
-}
-
-Targets compliance_targets(const JointRoles& roles) {
-  return arm_targets(roles);
+EffectKind compliance() {
+  return {.name = "compliance",
+          .targets = arm_targets,
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return plain(
+                    "compliance", target,
+                    {{.name = "compliance", .unit = "deg/Nm", .si_per_unit = kDeg, .typical = 0.3 * kDeg}},
+                    [joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
+                      if (at.gravity_torque.size() > 0) c.dq[joint] += p[0].value * at.gravity_torque[joint];
+                    },
+                    Follows::kGravity);
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return e.target().joint + by_sign(e.parameters()[0], " gives way", " rises") +
+                       " under gravity's torque by " + amounts[0];
+              },
+          .not_testable =
+              [](const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) -> std::string {
+            constexpr double kLeastTorque_nm = 0.05;
+            if (!motion.has_masses) return "the robot's URDF has no masses";
+            const double range = motion.torque_range_nm[roles.index(target.joint)];
+            if (range >= kLeastTorque_nm) return {};
+            return "gravity's torque on " + target.joint + " changed by " + short_number(range, 3) + " Nm";
+          },
+          .lookalikes = {"payload"},
+          .splitting_motion = "Record one log with and one without the load.",
+          .remark = "the joint gives way with gravity's torque, which depends on the posture"};
 }
 
 }  // namespace bodyschema::effects

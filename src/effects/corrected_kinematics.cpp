@@ -16,6 +16,16 @@ Eigen::Vector3d perpendicular(const Eigen::Vector3d& axis) {
   return axis.cross(Eigen::Vector3d::Unit(first)).normalized();
 }
 
+/// Moved along and turned about the axes of a frame.
+Pose small_motion(const Eigen::Vector3d& shift_m, const Eigen::Vector3d& turn_rad) {
+  Pose X = Pose::Identity();
+  X.translation() = shift_m;
+  if (const double angle = turn_rad.norm(); angle > 0.0) {
+    X.linear() = Eigen::AngleAxisd(angle, turn_rad / angle).toRotationMatrix();
+  }
+  return X;
+}
+
 }  // namespace
 
 CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model, std::vector<std::string> links,
@@ -69,6 +79,8 @@ void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q, co
   q_ = q + corrections.dq;
   fk_->compute(q_, X_W_);
   X_WC_ = X_W_[link_count_ + camera];
+  const bool rig_moves = !corrections.camera.rig_shift_m.isZero(0.0) || !corrections.camera.rig_turn_rad.isZero(0.0);
+  Pose X_WF = X_W_[link_count_];  // of the rig's first camera
   std::copy_n(X_W_.begin(), link_count_, X_CB.begin());
   // Tip first: each C uses plain frames, so the product builds up from the right.
   for (auto j = joints_.size(); j-- > 0;) {
@@ -92,8 +104,13 @@ void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q, co
       if (moves(joint, l)) X_CB[l] = C * X_CB[l];
     }
     if (moves(joint, link_count_ + camera)) X_WC_ = C * X_WC_;
+    if (rig_moves && moves(joint, link_count_)) X_WF = C * X_WF;
   }
-  X_WC_.translate(Eigen::Vector3d(corrections.camera.shift_x_m, 0.0, 0.0));
+  if (rig_moves) {
+    const Pose X_FC = X_WF.inverse(Eigen::Isometry) * X_WC_;
+    X_WC_ = X_WF * small_motion(corrections.camera.rig_shift_m, corrections.camera.rig_turn_rad) * X_FC;
+  }
+  X_WC_ = X_WC_ * small_motion(corrections.camera.shift_m, corrections.camera.turn_rad);
   X_WC_.pretranslate(-corrections.base_shift_m);
   const Pose X_CW = X_WC_.inverse(Eigen::Isometry);
   for (auto& X : X_CB.first(link_count_)) X = X_CW * X;
@@ -103,6 +120,13 @@ Eigen::Vector3d CorrectedKinematics::tilt_axis(Eigen::Index joint, int which) co
   const auto& frames = joints_[static_cast<std::size_t>(joint)];
   if (!frames.moves_something) return Eigen::Vector3d::Zero();
   return X_W_[frames.parent].linear() * frames.tilt_P[static_cast<std::size_t>(which)];
+}
+
+Eigen::Vector3d CorrectedKinematics::shift_axis(Eigen::Index joint, int which) const {
+  const auto& frames = joints_[static_cast<std::size_t>(joint)];
+  if (!frames.moves_something) return Eigen::Vector3d::Zero();
+  return which == 0 ? Eigen::Vector3d(frames.outwards * fk_->joint_axis(joint).direction_W)
+                    : tilt_axis(joint, which - 1);
 }
 
 bool CorrectedKinematics::moves(Eigen::Index joint, std::size_t link) const {

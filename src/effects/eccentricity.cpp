@@ -1,35 +1,29 @@
-#include <cmath>
-
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
 /// The encoder disc is off centre: dq = a sin q + b cos q.
-class Eccentricity final : public Clonable<Eccentricity> {
- public:
-  Eccentricity(const EffectTarget& target, Eigen::Index joint)
-      : Clonable("eccentricity", target,
-                 {EffectParameter{.name = "sine", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg},
-                  EffectParameter{.name = "cosine", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
-        joint_(joint) {}
-  void apply(const Instant& at, Corrections& add_to) const override {
-    const double q = at.q[joint_];
-    add_to.dq[joint_] += value(0) * std::sin(q) + value(1) * std::cos(q);
-  }
-
- private:
-  Eigen::Index joint_;
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_eccentricity(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<Eccentricity>(target, roles.index(target.joint));
-}
-
-Targets eccentricity_targets(const JointRoles& roles) {
-  return arm_targets(roles);
+EffectKind eccentricity() {
+  return {.name = "eccentricity",
+          .targets = arm_targets,
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return plain("eccentricity", target, {in_degrees("sine", 0.5), in_degrees("cosine", 0.5)},
+                             [joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
+                               c.dq[joint] +=
+                                   p[0].value * std::sin(at.q[joint]) + p[1].value * std::cos(at.q[joint]);
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "the encoder disc of " + e.target().joint + " runs off centre: its error swings with the angle" +
+                       " by " + amounts[0] + " (sine) and " + amounts[1] + " (cosine)";
+              },
+          .not_testable = [](const EffectTarget& target, const JointRoles& roles,
+                             const LogMotion& motion) { return too_little_motion(target.joint, roles, motion); },
+          .lookalikes = {"encoder_gain"},
+          .splitting_motion = "Sweep the joint through more than 90 deg.",
+          .remark = "add sine * sin q + cosine * cos q where the encoder is read"};
 }
 
 }  // namespace bodyschema::effects

@@ -1,30 +1,29 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
 /// The encoder's scale is wrong: dq = gain * q. The reference angle is zero; another reference
 /// is another joint offset.
-class EncoderGain final : public Clonable<EncoderGain> {
- public:
-  EncoderGain(const EffectTarget& target, Eigen::Index joint)
-      : Clonable("encoder_gain", target,
-                 {EffectParameter{.name = "gain", .unit = "%", .si_per_unit = 0.01, .typical = 0.01}}),
-        joint_(joint) {}
-  void apply(const Instant& at, Corrections& add_to) const override { add_to.dq[joint_] += value(0) * at.q[joint_]; }
-
- private:
-  Eigen::Index joint_;
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_encoder_gain(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<EncoderGain>(target, roles.index(target.joint));
-}
-
-Targets encoder_gain_targets(const JointRoles& roles) {
-  return arm_targets(roles);
+EffectKind encoder_gain() {
+  return {.name = "encoder_gain",
+          .targets = arm_targets,
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return plain("encoder_gain", target, {in_percent("gain", 1.0)},
+                             [joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
+                               c.dq[joint] += p[0].value * at.q[joint];
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return e.target().joint + " turns " + amounts[0] + by_sign(e.parameters()[0], " further", " less far") +
+                       " than its encoder says";
+              },
+          .not_testable = [](const EffectTarget& target, const JointRoles& roles,
+                             const LogMotion& motion) { return too_little_motion(target.joint, roles, motion); },
+          .lookalikes = {"eccentricity"},
+          .splitting_motion = "Sweep the joint through more than 90 deg.",
+          .remark = "scale the reading, offset taken off, by 1 + gain where the encoder is read"};
 }
 
 }  // namespace bodyschema::effects

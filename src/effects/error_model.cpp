@@ -18,16 +18,6 @@ namespace {
 constexpr int kVersion = 1;
 constexpr std::uintmax_t kMaxFileBytes = 1 << 20;
 
-/// "width_deg", "compliance_deg_per_Nm", "gain_percent", "k1".
-std::string key_of(const EffectParameter& p) {
-  if (p.unit == "1") return p.name;
-  std::string suffix = p.unit == "%" ? "percent" : p.unit;
-  if (const auto slash = suffix.find('/'); slash != std::string::npos) {
-    suffix.replace(slash, 1, "_per_");
-  }
-  return p.name + "_" + suffix;
-}
-
 [[noreturn]] void fail(const std::string& origin, const YAML::Mark& mark, const std::string& what) {
   throw ConfigurationError(origin + ":" + std::to_string(mark.line + 1) + ": " + what);
 }
@@ -43,7 +33,7 @@ void read_parameters(const YAML::Node& entry, const std::string& origin, Effect&
     fail(origin, entry.Mark(), effect.description() + ": expected a mapping 'parameters'");
   }
   std::vector<std::string> keys;
-  for (const auto& p : effect.parameters()) keys.push_back(key_of(p));
+  for (const auto& p : effect.parameters()) keys.push_back(p.key());
   for (const auto& item : node) {
     const auto key = item.first.Scalar();
     const auto at = std::find(keys.begin(), keys.end(), key);
@@ -156,7 +146,7 @@ std::string ErrorModel::to_yaml() const {
     }
     out << YAML::Key << "parameters" << YAML::Value << YAML::BeginMap;
     for (const auto& p : std::as_const(*effect).parameters()) {
-      out << YAML::Key << key_of(p) << YAML::Value << p.in_unit();
+      out << YAML::Key << p.key() << YAML::Value << p.in_unit();
     }
     out << YAML::EndMap << YAML::EndMap;
   }
@@ -222,7 +212,7 @@ StereoRig ErrorModel::corrected(const StereoRig& rig) const {
   at.q.setZero(joints);
   at.qdot.setZero(joints);
   at.qddot.setZero(joints);
-  Corrections corrections(joints);
+  Corrections corrections = roles_.no_corrections();
   for (std::size_t c = 0; c < result.cameras.size(); ++c) {
     at.camera = c;
     this->corrections(at, corrections);

@@ -1,25 +1,27 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
-/// Both cameras' focal length is longer than configured.
-class FocalLength final : public Clonable<FocalLength> {
- public:
-  explicit FocalLength(const EffectTarget& target)
-      : Clonable("focal_length", target,
-                 {EffectParameter{.name = "scale", .unit = "%", .si_per_unit = 0.01, .typical = 0.01}}) {}
-  void apply(const Instant&, Corrections& add_to) const override { add_to.camera.focal_scale += value(0); }
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_focal_length(const EffectTarget& target, const JointRoles&) {
-  return std::make_unique<FocalLength>(target);
-}
-
-Targets focal_length_targets(const JointRoles& roles) {
-  return whole_robot(roles);
+/// All cameras' focal length is longer than configured.
+EffectKind focal_length() {
+  return {.name = "focal_length",
+          .targets = whole_robot,
+          .make =
+              [](const EffectTarget& target, const JointRoles&) {
+                return plain("focal_length", target, {in_percent("scale", 1.0)},
+                             [](Parameters p, const Instant&, Corrections& c) {
+                               c.camera.focal_scale += p[0].value;
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "the focal length is " + amounts[0] + by_sign(e.parameters()[0], " longer", " shorter") +
+                       " than configured";
+              },
+          .lookalikes = {"mesh_scale", "camera_pose", "distortion"},
+          .splitting_motion =
+              "Show the hand at depths from 0.2 to 0.6 m and in the corners of the picture, or a checkerboard.",
+          .home = EffectHome::kCameras};
 }
 
 }  // namespace bodyschema::effects

@@ -1,31 +1,26 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
-/// A joint of neck or eyes stands elsewhere than its encoder says: dq = angle.
-class HeadOffset final : public Clonable<HeadOffset> {
- public:
-  HeadOffset(const EffectTarget& target, Eigen::Index joint)
-      : Clonable("head_offset", target,
-                 {EffectParameter{.name = "angle", .unit = "deg", .si_per_unit = kDeg, .typical = 1.0 * kDeg}}),
-        joint_(joint) {}
-  void apply(const Instant&, Corrections& add_to) const override { add_to.dq[joint_] += value(0); }
-
- private:
-  Eigen::Index joint_;
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_head_offset(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<HeadOffset>(target, roles.index(target.joint));
-}
-
-Targets head_offset_targets(const JointRoles& roles) {
-  Targets targets;  // pans of the eyes belong to vergence
-  for (const auto joint : roles.neck) targets.push_back({roles.names[static_cast<std::size_t>(joint)], ""});
-  return targets;
+/// A joint of neck or eyes stands elsewhere than its encoder says: dq = angle. Pans of the eyes belong to vergence.
+EffectKind head_offset() {
+  return {.name = "head_offset",
+          .targets = [](const JointRoles& roles) { return joint_targets(roles, roles.neck); },
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return plain("head_offset", target, {in_degrees("angle", 1.0)},
+                             [joint = roles.index(target.joint)](Parameters p, const Instant&, Corrections& c) {
+                               c.dq[joint] += p[0].value;
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "the head's joint " + e.target().joint + " stands " + amounts[0] + " " +
+                       by_sign(e.parameters()[0], "further", "less far") + " than its encoder says";
+              },
+          .lookalikes = {"principal_point", "base_shift", "camera_pose"},
+          .splitting_motion = "Move the head by 20 to 30 deg with the arm still.",
+          .home = EffectHome::kUrdf};
 }
 
 }  // namespace bodyschema::effects

@@ -1,37 +1,15 @@
 #include <cstdlib>
 
 #include "bodyschema/core/error.hpp"
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
 namespace {
 
-/// Tendons of one joint run past another: dq_joint = ratio * q_source.
-class JointCoupling final : public Clonable<JointCoupling> {
- public:
-  JointCoupling(const EffectTarget& target, Eigen::Index joint, Eigen::Index source)
-      : Clonable("joint_coupling", target,
-                 {EffectParameter{.name = "ratio", .unit = "%", .si_per_unit = 0.01, .typical = 0.02}}),
-        joint_(joint), source_(source) {}
-  void apply(const Instant& at, Corrections& add_to) const override { add_to.dq[joint_] += value(0) * at.q[source_]; }
-
- private:
-  Eigen::Index joint_, source_;
-};
-
 /// Tendons are routed past the next joint or the one after it.
 constexpr int kReach = 2;
 
-}  // namespace
-
-std::unique_ptr<Effect> make_joint_coupling(const EffectTarget& target, const JointRoles& roles) {
-  if (target.joint == target.source) {
-    throw ConfigurationError("joint_coupling of '" + target.joint + "': expected another joint as source");
-  }
-  return std::make_unique<JointCoupling>(target, roles.index(target.joint), roles.index(target.source));
-}
-
-Targets joint_coupling_targets(const JointRoles& roles) {
+Targets neighbours(const JointRoles& roles) {
   Targets targets;
   const int n = static_cast<int>(roles.arm.size());
   const auto name = [&](int i) {
@@ -43,6 +21,38 @@ Targets joint_coupling_targets(const JointRoles& roles) {
     }
   }
   return targets;
+}
+
+}  // namespace
+
+/// Tendons of one joint run past another: dq_joint = ratio * q_source.
+EffectKind joint_coupling() {
+  return {.name = "joint_coupling",
+          .targets = neighbours,
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                if (target.joint == target.source) {
+                  throw ConfigurationError("joint_coupling of '" + target.joint + "': expected another joint as source");
+                }
+                return plain("joint_coupling", target, {in_percent("ratio", 2.0)},
+                             [joint = roles.index(target.joint), source = roles.index(target.source)](
+                                 Parameters p, const Instant& at, Corrections& c) {
+                               c.dq[joint] += p[0].value * at.q[source];
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return e.target().joint + " turns by " + amounts[0] + " of the angle of " + e.target().source +
+                       by_sign(e.parameters()[0], "", ", the other way");
+              },
+          .not_testable =
+              [](const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) {
+                const auto source = too_little_motion(target.source, roles, motion);
+                return source.empty() ? too_little_motion(target.joint, roles, motion) : source;
+              },
+          .lookalikes = {"axis_tilt"},
+          .splitting_motion = "Move the joint and its neighbours one at a time through their full ranges.",
+          .remark = "correct the coupling matrix where encoders are read"};
 }
 
 }  // namespace bodyschema::effects

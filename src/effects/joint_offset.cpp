@@ -1,29 +1,24 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
 /// encoder = true + offset (the paper's convention): dq = -offset.
-class JointOffset final : public Clonable<JointOffset> {
- public:
-  JointOffset(const EffectTarget& target, Eigen::Index joint)
-      : Clonable("joint_offset", target,
-                 {EffectParameter{.name = "offset", .unit = "deg", .si_per_unit = kDeg, .typical = 1.0 * kDeg}}),
-        joint_(joint) {}
-  void apply(const Instant&, Corrections& add_to) const override { add_to.dq[joint_] -= value(0); }
-
- private:
-  Eigen::Index joint_;
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_joint_offset(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<JointOffset>(target, roles.index(target.joint));
-}
-
-Targets joint_offset_targets(const JointRoles& roles) {
-  return arm_targets(roles);
+EffectKind joint_offset() {
+  return {.name = "joint_offset",
+          .targets = arm_targets,
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return plain("joint_offset", target, {in_degrees("offset", 1.0)},
+                             [joint = roles.index(target.joint)](Parameters p, const Instant&, Corrections& c) {
+                               c.dq[joint] -= p[0].value;
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "the encoder of " + e.target().joint + " reads " + amounts[0] + " too " +
+                       by_sign(e.parameters()[0], "much", "little");
+              },
+          .home = EffectHome::kUrdf};
 }
 
 }  // namespace bodyschema::effects

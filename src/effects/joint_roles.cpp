@@ -4,7 +4,8 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
-#include "bodyschema/effects/effect.hpp"
+#include "bodyschema/effects/corrected_kinematics.hpp"
+#include "bodyschema/effects/joint_roles.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
 
 namespace bodyschema {
@@ -82,6 +83,94 @@ class FingerJoints {
   std::vector<Joint> joints_;
 };
 
+/// The bodies that the arm's joints move, and the links between these joints.
+class ArmAnatomy {
+ public:
+  ArmAnatomy(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup,
+             const std::vector<std::string>& cameras, const std::vector<Eigen::Index>& arm)
+      : model_(*model), arm_(arm), rendered_(setup.model.rendered_links), links_(links_of(setup)),
+        kinematics_(model, links_), corrected_(model, links_, cameras), X_WB_(links_.size()) {
+    const auto q = setup.default_joints(*model);
+    kinematics_.compute(q, X_WB_);
+    std::vector<Pose> X_CB(links_.size());
+    corrected_.compute(q, Corrections(q.size()), 0, X_CB);
+  }
+
+  /// Parts that the same joint of the arm moves last.
+  [[nodiscard]] std::vector<BodySegment> segments() const {
+    std::vector<BodySegment> segments;
+    std::vector<Eigen::Index> last;
+    for (std::size_t part = 0; part < rendered_.size(); ++part) {
+      const auto joint = last_that_moves(part);
+      const auto at = std::find(last.begin(), last.end(), joint);
+      if (at == last.end()) {
+        last.push_back(joint);
+        segments.push_back({rendered_[part], {part}});
+      } else {
+        segments[static_cast<std::size_t>(at - last.begin())].parts.push_back(part);
+      }
+    }
+    return segments;
+  }
+
+  [[nodiscard]] std::vector<ArmLink> links() const {
+    constexpr double kApart_m = 0.02;
+    std::vector<ArmLink> list;
+    for (const auto joint : arm_) {
+      const auto before = joint_before(joint);
+      if (before < 0) continue;
+      const Eigen::Vector3d along = origin(joint) - origin(before);
+      const double length = along.norm();
+      if (length < kApart_m) continue;
+      const Eigen::Vector3d direction = along / length;
+      JointAdjustment step;
+      step.along_m = direction.dot(corrected_.shift_axis(joint, 0));
+      step.shift_1_m = direction.dot(corrected_.shift_axis(joint, 1));
+      step.shift_2_m = direction.dot(corrected_.shift_axis(joint, 2));
+      list.push_back({info(joint).parent_link, joint, length, step});
+    }
+    return list;
+  }
+
+ private:
+  std::vector<std::string> links_of(const RobotSetup& setup) const {
+    auto links = setup.model.rendered_links;
+    links.push_back(setup.hand_link);
+    for (const auto joint : arm_) links.push_back(info(joint).parent_link);
+    for (const auto joint : arm_) links.push_back(info(joint).child_link);
+    return links;
+  }
+  [[nodiscard]] const JointInfo& info(Eigen::Index joint) const {
+    return model_.joints()[static_cast<std::size_t>(joint)];
+  }
+  [[nodiscard]] std::size_t position(Eigen::Index joint) const {
+    return static_cast<std::size_t>(std::find(arm_.begin(), arm_.end(), joint) - arm_.begin());
+  }
+  [[nodiscard]] Eigen::Index last_that_moves(std::size_t link) const {
+    Eigen::Index last = -1;
+    for (const auto joint : arm_) {
+      if (kinematics_.moves(joint, link)) last = std::max(last, joint);
+    }
+    return last;
+  }
+  /// The arm's joint before it on the way from the root; -1: none.
+  [[nodiscard]] Eigen::Index joint_before(Eigen::Index joint) const {
+    return last_that_moves(rendered_.size() + 1 + position(joint));
+  }
+  /// Of the joint's frame, which its own rotation leaves where it is; root frame, m.
+  [[nodiscard]] Eigen::Vector3d origin(Eigen::Index joint) const {
+    return X_WB_[rendered_.size() + 1 + arm_.size() + position(joint)].translation();
+  }
+
+  const RobotModel& model_;
+  const std::vector<Eigen::Index>& arm_;
+  std::vector<std::string> rendered_;
+  std::vector<std::string> links_;  ///< rendered, the hand, parents of the arm's joints, their children
+  ForwardKinematics kinematics_;
+  CorrectedKinematics corrected_;
+  std::vector<Pose> X_WB_;
+};
+
 }  // namespace
 
 JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSetup& setup, const StereoRig& rig) {
@@ -93,7 +182,10 @@ JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSe
   std::sort(roles.head.begin(), roles.head.end());
 
   std::vector<std::string> cameras;
-  for (const auto& camera : rig.cameras) cameras.push_back(camera.link);
+  for (const auto& camera : rig.cameras) {
+    roles.cameras.push_back(camera.name);
+    cameras.push_back(camera.link);
+  }
   ForwardKinematics eyes(model, cameras);
   std::vector<Pose> X_WC(cameras.size());
   eyes.compute(setup.default_joints(*model), X_WC);
@@ -113,6 +205,9 @@ JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSe
     }
   }
   roles.fingers = FingerJoints(model, setup).curling();
+  const ArmAnatomy anatomy(model, setup, cameras, roles.arm);
+  roles.segments = anatomy.segments();
+  roles.links = anatomy.links();
   return roles;
 }
 

@@ -1,31 +1,33 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
 /// The image shows the past: at its stamp the arm was where the encoders were `delay` earlier, head and
 /// arm alike. dq = -delay * velocity + delay^2 / 2 * acceleration; without the second term 60 ms would be
 /// 0.2 deg off in an arm that babbles.
-class Latency final : public Clonable<Latency> {
- public:
-  explicit Latency(const EffectTarget& target)
-      : Clonable("latency", target,
-                 {EffectParameter{.name = "delay", .unit = "ms", .si_per_unit = 1e-3, .typical = 0.02}}) {}
-  [[nodiscard]] bool follows_motion() const override { return true; }
-  void apply(const Instant& at, Corrections& add_to) const override {
-    add_to.dq.noalias() -= value(0) * at.qdot;
-    add_to.dq.noalias() += 0.5 * value(0) * value(0) * at.qddot;
-  }
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_latency(const EffectTarget& target, const JointRoles&) {
-  return std::make_unique<Latency>(target);
-}
-
-Targets latency_targets(const JointRoles& roles) {
-  return whole_robot(roles);
+EffectKind latency() {
+  return {.name = "latency",
+          .targets = whole_robot,
+          .make =
+              [](const EffectTarget& target, const JointRoles&) {
+                return plain(
+                    "latency", target, {in_ms("delay", 20.0)},
+                    [](Parameters p, const Instant& at, Corrections& c) {
+                      c.dq.noalias() -= p[0].value * at.qdot;
+                      c.dq.noalias() += 0.5 * p[0].value * p[0].value * at.qddot;
+                    },
+                    Follows::kMotion);
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "pictures arrive " + amounts[0] + by_sign(e.parameters()[0], " late", " early") +
+                       " against the encoders";
+              },
+          .not_testable = [](const EffectTarget&, const JointRoles&,
+                             const LogMotion& motion) { return too_slow(motion); },
+          .lookalikes = {"backlash", "camera_skew"},
+          .splitting_motion = "Repeat the same path at two speeds and in both directions.",
+          .remark = "stamp the pictures earlier by the delay"};
 }
 
 }  // namespace bodyschema::effects

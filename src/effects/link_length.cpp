@@ -1,40 +1,46 @@
-#include "factories.hpp"
+#include <algorithm>
+
+#include "bodyschema/core/error.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
-/// A link is longer than nominal. The target is the joint that turns about the link's long axis
-/// (shoulder yaw for the upper arm, wrist pronation for the forearm): all beyond it moves along
-/// that axis, away from the root when `change` is positive.
-class LinkLength final : public Clonable<LinkLength> {
- public:
-  LinkLength(const EffectTarget& target, Eigen::Index joint)
-      : Clonable("link_length", target,
-                 {EffectParameter{.name = "change", .unit = "mm", .si_per_unit = 1e-3, .typical = 2e-3}}),
-        joint_(joint) {}
-  void apply(const Instant&, Corrections& add_to) const override {
-    add_to.adjustments[static_cast<std::size_t>(joint_)].along_m += value(0);
-  }
-
- private:
-  Eigen::Index joint_;
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_link_length(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<LinkLength>(target, roles.index(target.joint));
-}
-
-Targets link_length_targets(const JointRoles& roles) {
-  // An arm of seven joints: roll-pitch-yaw shoulder, elbow, pronation, two wrist joints.
-  Targets targets;
-  for (const std::size_t i : {std::size_t{2}, std::size_t{4}}) {
-    if (roles.arm.size() == 7) {
-      targets.push_back({roles.names[static_cast<std::size_t>(roles.arm[i])], ""});
-    }
-  }
-  return targets;
+/// A link of the arm is longer than nominal: the joint at its far end, the target, and all beyond lie further away
+/// from the joint before it, along the line between the two.
+EffectKind link_length() {
+  return {.name = "link_length",
+          .targets =
+              [](const JointRoles& roles) {
+                Targets targets;
+                for (const auto& link : roles.links) {
+                  targets.push_back({roles.names[static_cast<std::size_t>(link.joint)], ""});
+                }
+                return targets;
+              },
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                const auto joint = roles.index(target.joint);
+                const auto link = std::find_if(roles.links.begin(), roles.links.end(),
+                                               [&](const ArmLink& l) { return l.joint == joint; });
+                return plain("link_length", target, {in_mm("change", 2.0)},
+                             [at = static_cast<std::size_t>(joint), step = link->per_metre](
+                                 Parameters p, const Instant&, Corrections& c) {
+                               c.adjustments[at].along_m += p[0].value * step.along_m;
+                               c.adjustments[at].shift_1_m += p[0].value * step.shift_1_m;
+                               c.adjustments[at].shift_2_m += p[0].value * step.shift_2_m;
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles& roles, std::span<const std::string> amounts) {
+                const auto joint = roles.index(e.target().joint);
+                const auto link = std::find_if(roles.links.begin(), roles.links.end(),
+                                               [&](const ArmLink& l) { return l.joint == joint; });
+                return "the link " + link->name + ", which ends at " + e.target().joint + ", is " + amounts[0] +
+                       by_sign(e.parameters()[0], " longer", " shorter") + " than in the URDF";
+              },
+          .lookalikes = {"axis_shift"},
+          .splitting_motion = "Show the hand near and far, and from palm and back.",
+          .home = EffectHome::kUrdf};
 }
 
 }  // namespace bodyschema::effects

@@ -1,25 +1,26 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
-/// The real parts are larger than their meshes.
-class MeshScale final : public Clonable<MeshScale> {
- public:
-  explicit MeshScale(const EffectTarget& target)
-      : Clonable("mesh_scale", target,
-                 {EffectParameter{.name = "scale", .unit = "%", .si_per_unit = 0.01, .typical = 0.01}}) {}
-  void apply(const Instant&, Corrections& add_to) const override { add_to.mesh_scale += value(0); }
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_mesh_scale(const EffectTarget& target, const JointRoles&) {
-  return std::make_unique<MeshScale>(target);
-}
-
-Targets mesh_scale_targets(const JointRoles& roles) {
-  return whole_robot(roles);
+/// The real parts are larger than their meshes: of the whole body or of one segment, each about its own frame.
+EffectKind mesh_scale() {
+  return {.name = "mesh_scale",
+          .targets = body_targets,
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return plain("mesh_scale", target, {in_percent("scale", 1.0)},
+                             [segments = segments_of(target, roles)](Parameters p, const Instant&, Corrections& c) {
+                               for (const auto s : segments) c.shapes[s].scale += p[0].value;
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return (e.target().source.empty() ? "all parts of the body are " : "the part " + e.target().source + " is ") +
+                       amounts[0] + by_sign(e.parameters()[0], " larger", " smaller") + " than in the meshes";
+              },
+          .lookalikes = {"silhouette_bias", "focal_length"},
+          .splitting_motion = "Show the hand near and far, and from palm and back.",
+          .remark = "scale the visual meshes; collision meshes may be right"};
 }
 
 }  // namespace bodyschema::effects

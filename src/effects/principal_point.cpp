@@ -1,41 +1,54 @@
 #include "bodyschema/core/error.hpp"
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
-/// The optical axis meets the picture elsewhere than configured. `source` says where: "left" or
-/// "right", "common" (both by the same) or "difference" (left by +half, right by -half).
-class PrincipalPoint final : public Clonable<PrincipalPoint> {
- public:
-  PrincipalPoint(const EffectTarget& target, double left, double right)
-      : Clonable("principal_point", target,
-                 {EffectParameter{.name = "cx", .unit = "px", .si_per_unit = 1.0, .typical = 2.0},
-                  EffectParameter{.name = "cy", .unit = "px", .si_per_unit = 1.0, .typical = 2.0}}),
-        share_{left, right} {}
-  void apply(const Instant& at, Corrections& add_to) const override {
-    const double share = at.camera < 2 ? share_[at.camera] : 0.0;
-    add_to.camera.cx_px += share * value(0);
-    add_to.camera.cy_px += share * value(1);
-  }
-
- private:
-  double share_[2];
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_principal_point(const EffectTarget& target, const JointRoles&) {
-  if (target.source == "left") return std::make_unique<PrincipalPoint>(target, 1.0, 0.0);
-  if (target.source == "right") return std::make_unique<PrincipalPoint>(target, 0.0, 1.0);
-  if (target.source == "common") return std::make_unique<PrincipalPoint>(target, 1.0, 1.0);
-  if (target.source == "difference") return std::make_unique<PrincipalPoint>(target, 0.5, -0.5);
-  throw ConfigurationError("principal_point: source '" + target.source +
-                           "', expected left, right, common or difference");
-}
-
-Targets principal_point_targets(const JointRoles&) {
-  return {{"", "common"}, {"", "difference"}, {"", "left"}, {"", "right"}};
+/// The optical axis meets the picture elsewhere than configured. `source` says where: the name of a camera, "common"
+/// (all by the same) or "difference" (the first by +half, the second by -half).
+EffectKind principal_point() {
+  return {.name = "principal_point",
+          .targets =
+              [](const JointRoles& roles) {
+                Targets targets = {{"", "common"}};
+                if (roles.cameras.size() < 2) return targets;
+                targets.push_back({"", "difference"});
+                for (const auto& camera : roles.cameras) targets.push_back({"", camera});
+                return targets;
+              },
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                std::vector<double> share(std::max<std::size_t>(1, roles.cameras.size()), 0.0);
+                if (target.source == "common") {
+                  share.assign(share.size(), 1.0);
+                } else if (target.source == "difference") {
+                  share[0] = 0.5;
+                  share[1] = -0.5;
+                } else {
+                  for (std::size_t c = 0; c < roles.cameras.size(); ++c) share[c] = roles.cameras[c] == target.source;
+                }
+                return plain("principal_point", target, {in_px("cx", 2.0), in_px("cy", 2.0)},
+                             [share](Parameters p, const Instant& at, Corrections& c) {
+                               const double s = at.camera < share.size() ? share[at.camera] : 0.0;
+                               c.camera.cx_px += s * p[0].value;
+                               c.camera.cy_px += s * p[1].value;
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                const auto& source = e.target().source;
+                const std::string where = source == "common"       ? "of the cameras"
+                                          : source == "difference" ? "of the first camera, against the second's,"
+                                                                   : "of camera '" + source + "'";
+                return "the principal point " + where + " lies elsewhere than configured, by " + amounts[0] + " along x and " +
+                       amounts.back() + " along y";
+              },
+          .not_testable =
+              [](const EffectTarget& target, const JointRoles&, const LogMotion& motion) {
+                return target.source == "common" ? std::string() : needs_two_cameras(motion);
+              },
+          .lookalikes = {"head_offset", "base_shift", "vergence", "camera_pose", "camera_pair"},
+          .splitting_motion = "Move the head by 20 to 30 deg with the arm still.",
+          .home = EffectHome::kCameras};
 }
 
 }  // namespace bodyschema::effects

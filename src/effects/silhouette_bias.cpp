@@ -1,25 +1,27 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
-/// Segmentation makes the mask fatter: the observed outline lies outside the true one.
-class SilhouetteBias final : public Clonable<SilhouetteBias> {
- public:
-  explicit SilhouetteBias(const EffectTarget& target)
-      : Clonable("silhouette_bias", target,
-                 {EffectParameter{.name = "dilation", .unit = "px", .si_per_unit = 1.0, .typical = 0.5}}) {}
-  void apply(const Instant&, Corrections& add_to) const override { add_to.dilation_px += value(0); }
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_silhouette_bias(const EffectTarget& target, const JointRoles&) {
-  return std::make_unique<SilhouetteBias>(target);
-}
-
-Targets silhouette_bias_targets(const JointRoles& roles) {
-  return whole_robot(roles);
+/// The observed outline lies outside the true one, of the whole body or of one segment: segmentation makes masks
+/// fatter, or a cover is thicker than its mesh.
+EffectKind silhouette_bias() {
+  return {.name = "silhouette_bias",
+          .targets = body_targets,
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return plain("silhouette_bias", target, {in_px("dilation", 0.5)},
+                             [segments = segments_of(target, roles)](Parameters p, const Instant&, Corrections& c) {
+                               for (const auto s : segments) c.shapes[s].dilation_px += p[0].value;
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "the outline " + (e.target().source.empty() ? "" : "of " + e.target().source + " ") + "in the pictures lies " +
+                       amounts[0] + by_sign(e.parameters()[0], " outside", " inside") + " that of the meshes";
+              },
+          .lookalikes = {"mesh_scale", "focal_length"},
+          .splitting_motion = "Show the hand near and far, and from palm and back.",
+          .remark = "belongs to the segmentation or to a cover that the meshes lack, not to the robot's joints"};
 }
 
 }  // namespace bodyschema::effects

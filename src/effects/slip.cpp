@@ -1,32 +1,28 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
 /// The offset jumps at one time: dq = step from then on.
-class Slip final : public Clonable<Slip> {
- public:
-  Slip(const EffectTarget& target, Eigen::Index joint)
-      : Clonable("slip", target,
-                 {EffectParameter{.name = "step", .unit = "deg", .si_per_unit = kDeg, .typical = 1.0 * kDeg},
-                  EffectParameter{.name = "time", .unit = "s", .si_per_unit = 1.0, .fitted = false, .typical = 0.0}}),
-        joint_(joint) {}
-  void apply(const Instant& at, Corrections& add_to) const override {
-    if (seconds(at.utime) >= value(1)) add_to.dq[joint_] += value(0);
-  }
-
- private:
-  Eigen::Index joint_;
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_slip(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<Slip>(target, roles.index(target.joint));
-}
-
-Targets slip_targets(const JointRoles& roles) {
-  return arm_targets(roles);
+EffectKind slip() {
+  return {.name = "slip",
+          .targets = arm_targets,
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return plain("slip", target,
+                             {in_degrees("step", 1.0),
+                              {.name = "time", .unit = "s", .si_per_unit = 1.0, .fitted = false, .typical = 0.0}},
+                             [joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
+                               if (seconds(at.utime) >= p[1].value) c.dq[joint] += p[0].value;
+                             });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return e.target().joint + " slipped by " + amounts[0] + by_sign(e.parameters()[0], "", ", backwards");
+              },
+          .lookalikes = {"drift"},
+          .splitting_motion = "Revisit the first postures in the middle and at the end of the log.",
+          .timing = EffectTiming::kFromATime,
+          .remark = "happened once: the replay's offsets are those after it"};
 }
 
 }  // namespace bodyschema::effects

@@ -1,33 +1,32 @@
-#include "factories.hpp"
+#include "kinds.hpp"
 
 namespace bodyschema::effects {
-namespace {
 
 /// The eyes look further inwards than their encoders say. vergence = left pan - right pan, as on
 /// the iCub, so each eye turns by half of `angle`.
-class Vergence final : public Clonable<Vergence> {
- public:
-  Vergence(const EffectTarget& target, Eigen::Index left, Eigen::Index right)
-      : Clonable("vergence", target,
-                 {EffectParameter{.name = "angle", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg}}),
-        left_(left), right_(right) {}
-  void apply(const Instant&, Corrections& add_to) const override {
-    add_to.dq[left_] += 0.5 * value(0);
-    add_to.dq[right_] -= 0.5 * value(0);
-  }
-
- private:
-  Eigen::Index left_, right_;
-};
-
-}  // namespace
-
-std::unique_ptr<Effect> make_vergence(const EffectTarget& target, const JointRoles& roles) {
-  return std::make_unique<Vergence>(target, roles.left_pan, roles.right_pan);
-}
-
-Targets vergence_targets(const JointRoles& roles) {
-  return roles.has_pans() ? Targets{EffectTarget{}} : Targets{};
+EffectKind vergence() {
+  return {.name = "vergence",
+          .targets = [](const JointRoles& roles) { return roles.has_pans() ? whole_robot(roles) : Targets{}; },
+          .make =
+              [](const EffectTarget& target, const JointRoles& roles) {
+                return plain(
+                    "vergence", target, {in_degrees("angle", 0.5)},
+                    [left = roles.left_pan, right = roles.right_pan](Parameters p, const Instant&, Corrections& c) {
+                      c.dq[left] += 0.5 * p[0].value;
+                      c.dq[right] -= 0.5 * p[0].value;
+                    });
+              },
+          .sentence =
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "the eyes look " + amounts[0] + by_sign(e.parameters()[0], " further", " less far") +
+                       " inwards than their encoders say";
+              },
+          .not_testable = [](const EffectTarget&, const JointRoles&,
+                             const LogMotion& motion) { return needs_two_cameras(motion); },
+          .lookalikes = {"principal_point", "baseline", "camera_pair"},
+          .splitting_motion =
+              "Show the hand at depths from 0.2 to 0.6 m and in the corners of the picture, or a checkerboard.",
+          .home = EffectHome::kUrdf};
 }
 
 }  // namespace bodyschema::effects

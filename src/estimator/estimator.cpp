@@ -1,23 +1,25 @@
 #include "bodyschema/estimator/estimator.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
-#include <limits>
+#include <map>
 #include <numeric>
 #include <optional>
 
-#include "bodyschema/estimator/body_pose_model.hpp"
-#include "bodyschema/estimator/offset_fusion.hpp"
-#include "bodyschema/estimator/stalled_encoders.hpp"
+#include "bodyschema/evidence/batch_fit.hpp"
+#include "bodyschema/evidence/distributions.hpp"
 #include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/filter/particle_filter.hpp"
+#include "explanations.hpp"
 #include "eye_order.hpp"
+#include "frame_model.hpp"
 #include "hypothesis_scorer.hpp"
-#include "offset_memory.hpp"
+#include "limits.hpp"
 #include "outline_fitter.hpp"
+#include "stalled_encoders.hpp"
 
 namespace bodyschema {
 namespace {
@@ -28,26 +30,19 @@ double elapsed_ms(Clock::time_point since) {
   return std::chrono::duration<double, std::milli>(Clock::now() - since).count();
 }
 
-SilhouetteModel make_silhouette_model(const RobotModel& robot, const RobotSetup& setup) {
-  SilhouetteModel model;
-  model.culling = setup.culling;
-  for (const auto& part : robot.meshes()) model.parts.push_back(part.mesh);
+/// What is known of the robot, joint offsets left out: these are found anew.
+ErrorModel without_offsets(const ErrorModel& known) {
+  ErrorModel model(known.roles());
+  for (std::size_t e = 0; e < known.size(); ++e) {
+    if (known[e].name() != "joint_offset") model.add(known[e].clone());
+  }
   return model;
 }
 
-Eigen::VectorXd prior_sds(const std::vector<Parameter>& parameters) {
-  Eigen::VectorXd sd(static_cast<Eigen::Index>(parameters.size()));
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    sd(static_cast<Eigen::Index>(k)) = parameters[k].prior_sd;
-  }
-  return sd;
-}
-
-/// Encoder errors of one frame: those of the arm's joints.
-Eigen::VectorXd encoder_sds(const std::vector<Parameter>& parameters, std::size_t arm_joints, double sd_rad) {
-  Eigen::VectorXd sd = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
-  sd.head(static_cast<Eigen::Index>(arm_joints)).setConstant(sd_rad);
-  return sd;
+ErrorModel effects_of(const std::vector<Belief>& beliefs, const JointRoles& roles) {
+  ErrorModel model(roles);
+  for (const auto& belief : beliefs) model.add(belief.effect, belief.target);
+  return model;
 }
 
 /// Both eyes, each with what the other one saw of the robot.
@@ -59,6 +54,15 @@ Observation with_eyes_exchanged(Observation observation) {
   return observation;
 }
 
+/// Smallest first.
+std::vector<Eigen::Index> in_order(const Eigen::VectorXd& values) {
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(values.size()));
+  std::iota(order.begin(), order.end(), Eigen::Index{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Eigen::Index a, Eigen::Index b) { return values(a) < values(b); });
+  return order;
+}
+
 }  // namespace
 
 const char* to_string(EstimatorState state) {
@@ -68,33 +72,45 @@ const char* to_string(EstimatorState state) {
     case EstimatorState::kConverging: return "converging";
     case EstimatorState::kConverged: return "converged";
     case EstimatorState::kDiverged: return "diverged";
+    case EstimatorState::kModelMisfit: return "model_misfit";
   }
   return "unknown";
 }
 
+const char* to_string(FrameVerdict verdict) {
+  switch (verdict) {
+    case FrameVerdict::kNothingKnown: return "nothing_known";
+    case FrameVerdict::kAgrees: return "agrees";
+    case FrameVerdict::kDoubtful: return "doubtful";
+    case FrameVerdict::kContradicts: return "contradicts";
+  }
+  return "unknown";
+}
+
+bool Estimate::told(std::size_t joint) const {
+  constexpr double kTold_rad = 0.5 * kPi / 180.0;
+  const auto k = static_cast<Eigen::Index>(joint);
+  const double sd = std::sqrt(std::max(0.0, covariance_rad2(k, k)));
+  return sd < kTold_rad && (prior_sd_rad.size() <= k || sd < prior_sd_rad(k) / 3.0);
+}
+
 struct Estimator::Impl {
-  Impl(std::shared_ptr<const RobotModel> robot_model, const RobotSetup& robot_setup, const StereoRig& stereo_rig,
-       const EstimatorOptions& estimator_options)
-      : options(estimator_options), setup(robot_setup), rig(stereo_rig), own_correction(rig.cameras.size()),
-        parameters(estimated_parameters(robot_model, setup, rig, options)),
-        silhouettes(make_silhouette_model(*robot_model, setup)), intrinsics(rig.intrinsics()),
-        body(robot_model, setup, rig, parameters), alignment(body, silhouettes, intrinsics, options.contour),
-        scorer(body, silhouettes, intrinsics, options.silhouette, options.filter.particles),
-        filter(static_cast<Eigen::Index>(setup.estimated_joints.size()), options.filter),
-        first_look(prior_sds(parameters),
-                   encoder_sds(parameters, setup.estimated_joints.size(), options.encoder_sd_rad)),
-        memory(first_look, options.memory_frames, options.correlated_frames),
-        fitter(alignment, scorer, first_look, static_cast<Eigen::Index>(setup.estimated_joints.size()), options) {
-    for (const auto& name : setup.estimated_joints) joint_index.push_back(robot_model->joint_index(name));
-    joints = static_cast<Eigen::Index>(setup.estimated_joints.size());
-    state = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
-    reading.resize(joints);
+  Impl(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& robot_setup, const StereoRig& stereo_rig,
+       const Beliefs& beliefs, const EstimatorOptions& estimator_options, const ErrorModel& known)
+      : options(estimator_options), setup(robot_setup), rig(stereo_rig),
+        model(robot, setup, rig, known.roles(), State(without_offsets(known), beliefs.state),
+              effects_of(beliefs.tolerances, known.roles())),
+        joints(model.state().joints()),
+        scorer(model, silhouette_model(*robot, setup), rig.intrinsics(), options.silhouette, options.filter.particles),
+        filter(joints, options.filter),
+        memory(memory_layout(model.state(), beliefs.tolerances), options.memory),
+        fitter(model, scorer, options, rig.cameras.size()), state(model.state().prior_mean()), in_frame(memory.estimate()),
+        stalled(joints) {
     first_guesses = filter.states();
-    stalled = StalledEncoders(joints);
     cloud_covariance = filter.covariance();
-    frame_state = memory.fusion().frame_state();
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
     weights.resize(static_cast<Eigen::Index>(options.filter.particles));
+    reading.resize(joints);
   }
 
   // --- one step -------------------------------------------------------------------------------
@@ -102,27 +118,24 @@ struct Estimator::Impl {
   Estimate step(const Observation& observation) {
     const auto start = Clock::now();
     times = {};
-    Estimate estimate;
-    estimate.utime = observation.utime;
-    estimate.joint_names = setup.estimated_joints;
-
-    const bool in_view = scorer.observe(observation, options.min_mask_px);
-    explained = false;
-    cameras_swapped = false;
-    best_likelihood = effective_size = contour_rms_px = 0.0;
-    if (!in_view) {
-      frame_state =
-          particles_only() ? OffsetFusion::FrameState{state, cloud_covariance} : memory.fusion().frame_state();
-      if (memory.empty()) frame_state.x = state;
+    now_s = seconds(observation.utime);
+    frame = model.take(observation, state);
+    changed.clear();
+    cameras_swapped = contradicted = near = false;
+    best_likelihood = effective_size = rms_px = 0.0;
+    verdict = FrameVerdict::kNothingKnown;
+    innovation = {};
+    if (!scorer.observe(observation, frame, options.min_mask_share)) {
+      in_frame = particles_only() ? cloud() : memory.in_posture();
+      if (memory.empty()) in_frame.x = state;
       current = EstimatorState::kHandNotInView;
-      contradicted = false;
+    } else if (starts_swapped(observation)) {
+      begin_again();
+      doubt(state);
+      cameras_swapped = true;
     } else {
-      const bool swapped = starts_swapped(observation);
-      if (!swapped) score_particles();
-      if (swapped) {
-        begin_again();
-        learn_nothing();
-      } else if (options.mode == EstimatorMode::kPaper) {
+      score_particles();
+      if (options.mode == EstimatorMode::kPaper) {
         weights = distance.unaryExpr(&hammoude_likelihood);
         particle_step();
       } else {
@@ -134,7 +147,8 @@ struct Estimator::Impl {
         }
       }
     }
-    report(observation, estimate);
+    Estimate estimate = report();
+    estimate.utime = observation.utime;
     times.scoring_ms = scorer.take_scoring_ms();
     estimate.times = times;
     estimate.times.total_ms = elapsed_ms(start);
@@ -144,6 +158,7 @@ struct Estimator::Impl {
   void score_particles() {
     const auto start = Clock::now();
     Eigen::VectorXd x = state;
+    model.settle(frame, state);
     for (std::size_t i = 0; i < options.filter.particles; ++i) {
       x.head(joints) = filter.states().col(static_cast<Eigen::Index>(i));
       scorer.place(x, i);
@@ -155,6 +170,14 @@ struct Estimator::Impl {
   /// The estimate is one of the particles, as in the paper.
   [[nodiscard]] bool particles_only() const { return options.mode == EstimatorMode::kPaper || !options.refine_outline; }
 
+  [[nodiscard]] MemoryEstimate cloud() const {
+    MemoryEstimate estimate = memory.estimate();
+    estimate.x = state;
+    estimate.own.topLeftCorner(joints, joints) = cloud_covariance;
+    estimate.covariance = estimate.own;
+    return estimate;
+  }
+
   void particle_step() {
     const auto start = Clock::now();
     if (weights.maxCoeff() <= 0.0) weights.setConstant(1.0);
@@ -163,7 +186,7 @@ struct Estimator::Impl {
     best_likelihood = hammoude_likelihood(distance(filter.estimate_index()));
     effective_size = filter.effective_sample_size();
     cloud_covariance = filter.covariance();
-    frame_state = {state, cloud_covariance};
+    in_frame = cloud();
     filter.resample_and_spread();
     // Says that the spread is at its smallest, no more: the published filter knows no better of itself.
     current = EstimatorState::kConverging;
@@ -173,9 +196,11 @@ struct Estimator::Impl {
 
   Eigen::VectorXd likelihood(const Observation& observation, const Eigen::MatrixXd& offsets) {
     Eigen::VectorXd result = Eigen::VectorXd::Zero(offsets.cols());
-    if (!scorer.observe(observation, options.min_mask_px)) return result;
+    Eigen::VectorXd x = model.state().prior_mean();
+    frame = model.take(observation, x);
+    if (!scorer.observe(observation, frame, options.min_mask_share)) return result;
+    model.settle(frame, x);
     const auto batch = static_cast<Eigen::Index>(options.filter.particles);
-    Eigen::VectorXd x = Eigen::VectorXd::Zero(state.size());
     for (Eigen::Index begin = 0; begin < offsets.cols(); begin += batch) {
       const Eigen::Index n = std::min(batch, offsets.cols() - begin);
       for (Eigen::Index i = 0; i < n; ++i) {
@@ -192,20 +217,20 @@ struct Estimator::Impl {
   /// With a memory: whether it explains the pictures once they are exchanged, and only then.
   bool turned_swapped(const Observation& observation) {
     if (!scorer.can_be_exchanged()) return false;
-    const Eigen::VectorXd known = memory.fusion().mean();
+    const Eigen::VectorXd known = memory.estimate().x;
     const Observation exchanged = with_eyes_exchanged(observation);
-    scorer.observe(exchanged, options.min_mask_px);
+    scorer.observe(exchanged, frame, options.min_mask_share);
     const double other_distance = scorer.distance(known);
-    scorer.observe(observation, options.min_mask_px);
-    return other_distance < 2.0 * options.lock_distance &&
-           EyeOrder::clearly_exchanged(scorer.distance(known), other_distance);
+    scorer.observe(observation, frame, options.min_mask_share);
+    return EyeOrder::clearly_exchanged(scorer.distance(known), other_distance);
   }
 
   /// Without one: by how near the arm can be brought to them from the guesses that the search began with, which
   /// no wrong minimum has led astray.
   bool starts_swapped(const Observation& observation) {
     if (particles_only() || eye_order.settled() || !scorer.can_be_exchanged()) return false;
-    Eigen::VectorXd x = Eigen::VectorXd::Zero(state.size());
+    Eigen::VectorXd x = model.state().prior_mean();
+    model.settle(frame, x);
     const auto n = static_cast<std::size_t>(first_guesses.cols());
     for (std::size_t i = 0; i < n; ++i) {
       x.head(joints) = first_guesses.col(static_cast<Eigen::Index>(i));
@@ -213,13 +238,13 @@ struct Estimator::Impl {
     }
     const Eigen::VectorXd distances = scorer.score(n);
     const Observation exchanged = with_eyes_exchanged(observation);
-    scorer.observe(exchanged, options.min_mask_px);
+    scorer.observe(exchanged, frame, options.min_mask_share);
     const Eigen::VectorXd other_distances = scorer.score(n);
 
     double as_they_are = distances.minCoeff(), other_distance = other_distances.minCoeff();
     const bool worth_searches = EyeOrder::worth_searches(as_they_are, other_distance);
     if (worth_searches) other_distance = nearest_distance(exchanged, other_distances);
-    scorer.observe(observation, options.min_mask_px);
+    scorer.observe(observation, frame, options.min_mask_share);
     if (worth_searches) as_they_are = nearest_distance(observation, distances);
     return eye_order.exchanged(as_they_are, other_distance);
   }
@@ -227,41 +252,23 @@ struct Estimator::Impl {
   /// Of the arm that is found from the first guesses, with these distances, in a frame that the scorer has.
   double nearest_distance(const Observation& observation, const Eigen::VectorXd& distances) {
     constexpr std::size_t kStarts = 12;  // from three, one arm in 300 that began far off was not found
-    return search(observation, first_guesses, distances, Eigen::VectorXd::Zero(state.size()), kStarts).distance;
+    Frame shown = frame;
+    for (std::size_t c = 0; c < shown.seen.size(); ++c) shown.seen[c] = &*observation.cameras[c];
+    const auto fit = fitter.search(shown, starts_from(first_guesses, distances, model.state().prior_mean(), kStarts),
+                                   memory.beliefs());
+    return scorer.distance(fit.x);
   }
 
-  /// From pictures that seem to be exchanged.
-  void learn_nothing() {
-    cameras_swapped = true;
-    contradicted = !memory.empty();
-    fall_back_on(memory.empty() ? state : memory.fusion().mean(), EstimatorState::kDiverged);
-  }
+  // --- mode best: what the frame says, and what may have happened ------------------------------
 
-  /// A frame that said nothing of the offsets: reports `x` in doubt.
-  void fall_back_on(const Eigen::VectorXd& x, EstimatorState doubt) {
-    current = doubt;
-    state = x;
-    frame_state = first_look.frame_state();
-    frame_state.x = state;
-    best_likelihood = hammoude_likelihood(scorer.distance(state));
-  }
-
-  /// Whether a search has run off from masks that are not the arm's: further than any arm whose joints are all
-  /// within three standard deviations.
-  [[nodiscard]] bool strayed(const Eigen::VectorXd& offsets) const {
-    return offsets.norm() > 3.0 * std::sqrt(static_cast<double>(joints)) * options.filter.initial_sd_rad;
-  }
-
-  // --- mode best: memory and search -----------------------------------------------------------
-
-  using Verdict = OffsetMemory::Verdict;
-
-  /// Takes a memory back from the shelf once a frame agrees with it.
-  void reconsider(const Observation& observation) {
-    if (stalled.suspected()) memory.clear_shelf();  // what was learned then may be wrong itself
-    if (memory.shelved() == nullptr) return;
-    const OutlineFit fit = fitter.follow(observation, *memory.shelved());
-    memory.reconsider(fitter.pull_of(fit), fitter.fits(fit.evidence));
+  /// The first `count` of some offsets, nearest first, with the nuisances of `rest`.
+  [[nodiscard]] std::vector<Eigen::VectorXd> starts_from(const Eigen::MatrixXd& offsets,
+                                                         const Eigen::VectorXd& distances, const Eigen::VectorXd& rest,
+                                                         std::size_t count) const {
+    const auto order = in_order(distances);
+    std::vector<Eigen::VectorXd> starts(std::min(count, order.size()), rest);
+    for (std::size_t i = 0; i < starts.size(); ++i) starts[i].head(joints) = offsets.col(order[i]);
+    return starts;
   }
 
   void best_step(const Observation& observation) {
@@ -271,123 +278,245 @@ struct Estimator::Impl {
     times.filter_ms += elapsed_ms(start);
 
     start = Clock::now();
-    const double variance = fitter.variance_px2();
-    forget_a_stall(observation);
-    reconsider(observation);
-    OutlineFit best;
-    std::optional<OutlineFit> found;
-    double pull = 0.0;
-    Verdict verdict = Verdict::kNothingKnown;
-    if (!memory.empty()) {
-      best = fitter.follow(observation, memory.fusion());
-      pull = fitter.pull_of(best);
-      verdict = memory.judge(pull, fitter.fits(best.evidence));
-      if (verdict != Verdict::kContradicts && memory.young()) {
-        // So few frames must not fit worse than what a new search finds.
-        found = search(observation);
-        const bool holds = found->distance > kClearlyBetter * scorer.distance(best.x) || !fitter.fits(found->evidence);
-        if (!holds) verdict = Verdict::kContradicts;
+    if (!options.remember) memory.forget_all();
+    read_encoders();
+    for (const auto joint : stalled.look(reading)) memory.release(std::vector{joint}, now_s);
+    if (memory.empty()) {
+      find_anew();
+    } else {
+      OutlineFit fit = fitter.follow(frame, memory);
+      judge(fit);
+      if (verdict == FrameVerdict::kAgrees && memory.postures() >= options.least_postures) {
+        learn(fit);
+      } else {
+        explain_frame(observation, std::move(fit));
       }
     }
-    if (verdict == Verdict::kContradicts && turned_swapped(observation)) {
-      times.refinement_ms += elapsed_ms(start);
-      learn_nothing();
-      return;
-    }
-    switch (verdict) {
-      case Verdict::kAgrees: memory.learn(best.evidence, best.x, variance, pull); break;
-      case Verdict::kDoubtful: break;
-      case Verdict::kContradicts:
-        if (!found) suspect_slips();
-        [[fallthrough]];
-      case Verdict::kNothingKnown:
-        if (!found) found = search(observation);
-        if (!begin_with(*found)) {
-          times.refinement_ms += elapsed_ms(start);
-          return;
-        }
-        best = std::move(*found);
-    }
-    state = memory.empty() ? best.x : memory.fusion().mean();
-    // A frame that the memory contradicts speaks for itself alone, with the uncertainty that has.
-    contradicted = memory.doubted();
-    frame_state = (contradicted ? first_look : memory.fusion()).frame_state(best.evidence, best.x, variance);
-    contour_rms_px = best.evidence.rms_px();
-    best_likelihood = hammoude_likelihood(scorer.distance(frame_state.x));
-    explained = fitter.fits(best.evidence) && 1.0 - best_likelihood < options.lock_distance;
     times.refinement_ms += elapsed_ms(start);
 
     start = Clock::now();
-    const bool lost = memory.empty() && memory.surprised();
-    current = lost ? EstimatorState::kDiverged : EstimatorState::kConverging;
     spread(!memory.empty());
     times.filter_ms += elapsed_ms(start);
   }
 
-  /// What a search found where nothing is known, or where the frame contradicts what is: becomes the memory if it
-  /// fits. False when the search has run off; then everything begins again.
-  bool begin_with(const OutlineFit& found) {
-    const bool good = fitter.fits(found.evidence) && found.distance < options.lock_distance;
-    const bool given_up = memory.contradict(good, !stalled.suspected());
-    if (good) {
-      memory.begin(found.evidence, found.x, fitter.variance_px2());
-      return true;
-    }
-    if (given_up) filter.reset(state.head(joints));
-    if (!memory.empty() || !strayed(found.x.head(joints))) return true;
-    const bool lost = memory.surprised();
-    begin_again();
-    contradicted = false;
-    fall_back_on(state, lost ? EstimatorState::kDiverged : EstimatorState::kConverging);
-    return false;
+  /// How the frame agrees with the memory that its fit was held by.
+  void judge(const OutlineFit& fit) {
+    near = fitter.fits(fit.evidence);
+    innovation = memory.innovation(fit.quadratic);
+    const double ratio = innovation.dof > 0.0 ? innovation.nis / innovation.dof : 0.0;
+    const double limit = chi_square_quantile(limits::kDoubt_tail, std::max(1.0, innovation.dof)) * usual();
+    verdict = !near ? FrameVerdict::kContradicts
+              : innovation.nis > limit ? FrameVerdict::kDoubtful
+                                       : FrameVerdict::kAgrees;
+    if (verdict != FrameVerdict::kAgrees || innovation.dof <= 0.0) return;
+    usual_sum += (ratio - usual_sum) / limits::kUsualFrames;
+  }
+  /// What innovations are times what is believed of them, in this log.
+  [[nodiscard]] double usual() const { return std::max(1.0, usual_sum); }
+
+  void learn(const OutlineFit& fit) {
+    doubted_since_s = -1.0;
+    fitter.learn_noise(fit);
+    if (const auto block = memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.quadratic, fit.x)) keep_frame(*block);
+    look_again();
+    settle_on(fit);
   }
 
-  /// What was known until now no longer fits: most likely one joint slipped. The worse half of the
-  /// particles makes way for slips of each joint, both ways and of all sizes up to the largest.
+  /// The first frame of every posture is kept, to be looked at again where the estimate has moved on.
+  void keep_frame(std::uint64_t block) {
+    const auto kept = memory.blocks();
+    std::erase_if(keyframes, [&](const auto& item) { return std::find(kept.begin(), kept.end(), item.first) == kept.end(); });
+    auto& keyframe = keyframes[block];
+    keyframe.frame = frame;
+    keyframe.pictures.resize(frame.seen.size());
+    for (std::size_t c = 0; c < frame.seen.size(); ++c) {
+      if (frame.seen[c] == nullptr) continue;
+      auto& picture = keyframe.pictures[c];
+      picture.mask = frame.seen[c]->mask;
+      picture.valid = frame.seen[c]->valid;
+      picture.coverage = frame.seen[c]->coverage;
+      keyframe.frame.seen[c] = &picture;
+    }
+  }
+
+  /// Linearises anew what was linearised far from where the estimate is by now, a little in every frame.
+  void look_again() {
+    constexpr int kAtOnce = 2;
+    for (int i = 0; i < kAtOnce; ++i) {
+      const auto stale = memory.most_stale();
+      const auto keyframe = stale ? keyframes.find(stale->block) : keyframes.end();
+      if (keyframe == keyframes.end()) return;
+      const auto first = fitter.about(keyframe->second.frame, stale->x);
+      if (!first) return;
+      memory.relinearise(stale->block, *first, stale->x);
+    }
+  }
+
+  /// The frame and what is known of it, as it is reported.
+  void settle_on(const OutlineFit& fit) {
+    state = memory.empty() ? fit.x : memory.estimate().x;
+    in_frame = (contradicted || memory.empty() ? memory.beliefs() : memory).in_posture(fit.quadratic);
+    rms_px = fit.evidence.rms_px();
+    near = fitter.fits(fit.evidence);
+    best_likelihood = hammoude_likelihood(scorer.distance(in_frame.x));
+    current = EstimatorState::kConverging;
+  }
+
+  /// The frame contradicts the memory, or the memory is so young that it may be wrong.
+  void explain_frame(const Observation& observation, OutlineFit fit) {
+    const bool young = memory.postures() < options.least_postures;
+    if (verdict != FrameVerdict::kAgrees && turned_swapped(observation)) {
+      doubt(memory.estimate().x);
+      cameras_swapped = true;
+      return;
+    }
+    if (verdict != FrameVerdict::kAgrees && !young) suspect_slips();
+    auto better = explain(hypotheses(fit, young), memory, fit, now_s, frame, fitter);
+    if (better) {
+      take(std::move(*better));
+      return;
+    }
+    if (verdict == FrameVerdict::kAgrees) {
+      learn(fit);
+      return;
+    }
+    // Nothing explains it better: the memory stays, the frame is not learned from.
+    if (doubted_since_s < 0.0) doubted_since_s = now_s;
+    contradicted = true;
+    settle_on(fit);
+    state = memory.estimate().x;
+    if (now_s - doubted_since_s > limits::kPatience_s) {
+      verdict = FrameVerdict::kContradicts;
+      current = EstimatorState::kDiverged;
+    }
+  }
+
+  [[nodiscard]] std::vector<Hypothesis> hypotheses(const OutlineFit& fit, bool young) {
+    std::vector<Hypothesis> list;
+    const auto anew = starts_from(filter.states(), distance, state, 3);
+    std::vector<Eigen::Index> everything(static_cast<std::size_t>(state.size()));
+    std::iota(everything.begin(), everything.end(), Eigen::Index{0});
+    if (!young) {
+      for (Eigen::Index joint = 0; joint < joints; ++joint) list.push_back(slip(joint, fit));
+      if (const auto camera = camera_parameters(); !camera.empty()) list.push_back({"the cameras were moved", camera, {}});
+      if (alternative && now_s - alternative_s < limits::kAlternative_s && !stalled.suspected()) {
+        list.push_back({"what was known before holds", {}, {}, &*alternative});
+      }
+    }
+    list.push_back({"the arm was found elsewhere", everything, anew});
+    return list;
+  }
+
+  /// A joint slipped: from where the outline's slopes point to, or where silhouettes say.
+  [[nodiscard]] Hypothesis slip(Eigen::Index joint, const OutlineFit& fit) {
+    Hypothesis result{"", {joint}, {}};
+    Eigen::VectorXd start = memory.estimate().x;
+    const auto order = in_order(distance);
+    double step = memory.step(fit.quadratic, result.released).size[0];
+    for (const auto particle : order) {
+      if (slip_of_particle.empty() || slip_of_particle[static_cast<std::size_t>(particle)] != joint) continue;
+      // Outlines further off than they are looked for say nothing: then the silhouettes do.
+      if (!near) step = filter.states()(joint, particle) - start[joint];
+      break;
+    }
+    start[joint] += step;
+    result.starts = {start};
+    return result;
+  }
+
+  [[nodiscard]] std::vector<Eigen::Index> camera_parameters() const {
+    std::vector<Eigen::Index> list;
+    for (Eigen::Index k = joints; k < state.size(); ++k) {
+      const auto& effect = model.state().model()[model.state().parameters()[static_cast<std::size_t>(k)].ref.effect];
+      if (effect.name() == "camera_pose" || effect.name() == "head_offset") list.push_back(k);
+    }
+    return list;
+  }
+
+  /// What happened instead becomes what is known.
+  void take(Explanation better) {
+    const auto& released = better.hypothesis.released;
+    if (released.size() == 1 && released[0] < joints) {
+      const double step = better.fit.x[released[0]] - state[released[0]];
+      stalled.stepped(released[0], step);
+      changed = fmt::format("{} slipped by {:.1f} deg", setup.estimated_joints[static_cast<std::size_t>(released[0])],
+                            degrees(step));
+    } else if (memory.postures() >= options.least_postures) {
+      changed = better.hypothesis.what;
+    }
+    if (better.hypothesis.instead == nullptr && memory.postures() >= options.least_postures) {
+      alternative = std::move(memory);
+      alternative_s = now_s;
+    } else {
+      alternative.reset();
+    }
+    memory = std::move(better.memory);
+    usual_sum = 1.0;
+    innovation = {};
+    verdict = FrameVerdict::kContradicts;
+    learn(better.fit);
+  }
+
+  /// Nothing is known: the best of what the particles found becomes the memory if it fits.
+  void find_anew() {
+    OutlineFit fit = fitter.search(frame, starts_from(filter.states(), distance, state, 3), memory);
+    if (fitter.fits(fit.evidence)) {
+      learn(fit);
+      return;
+    }
+    if (strayed(fit.x.head(joints))) {
+      begin_again();
+      doubt(state);
+      current = EstimatorState::kConverging;
+      return;
+    }
+    settle_on(fit);
+  }
+
+  /// Whether a search has run off from masks that are not the arm's: further than any arm whose joints are all
+  /// within three standard deviations.
+  [[nodiscard]] bool strayed(const Eigen::VectorXd& offsets) const {
+    return offsets.norm() > 3.0 * std::sqrt(static_cast<double>(joints)) * options.filter.initial_sd_rad;
+  }
+
+  /// A frame that said nothing of the offsets: reports `x` in doubt.
+  void doubt(const Eigen::VectorXd& x) {
+    contradicted = !memory.empty();
+    current = EstimatorState::kDiverged;
+    state = x;
+    in_frame = memory.beliefs().in_posture();
+    in_frame.x = state;
+    best_likelihood = hammoude_likelihood(scorer.distance(state));
+  }
+
+  /// The worse half of the particles makes way for slips of each joint, both ways and of all sizes up to the largest.
   void suspect_slips() {
-    const std::vector<Eigen::Index> order = in_order(distance);
+    const auto order = in_order(distance);
     const Eigen::Index slips = filter.states().cols() / 2;
     const Eigen::Index sizes = std::max<Eigen::Index>(1, slips / (2 * joints));  // each way
+    slip_of_particle.assign(static_cast<std::size_t>(filter.states().cols()), -1);
     Eigen::VectorXd x(joints);
     for (Eigen::Index i = 0; i < std::min(slips, 2 * sizes * joints); ++i) {
       const Eigen::Index step = i / joints;
-      const double size = kLargestSlip_rad * static_cast<double>(step / 2 + 1) / static_cast<double>(sizes);
+      const double size = limits::kLargestSlip_rad * static_cast<double>(step / 2 + 1) / static_cast<double>(sizes);
       x = state.head(joints);
       x(i % joints) += step % 2 == 0 ? size : -size;
-      filter.set_state(order[order.size() - 1 - static_cast<std::size_t>(i)], x);
+      const auto particle = order[order.size() - 1 - static_cast<std::size_t>(i)];
+      filter.set_state(particle, x);
+      slip_of_particle[static_cast<std::size_t>(particle)] = i % joints;
     }
     score_particles();
   }
 
-  /// Smallest distance first.
-  [[nodiscard]] static std::vector<Eigen::Index> in_order(const Eigen::VectorXd& distances) {
-    std::vector<Eigen::Index> order(static_cast<std::size_t>(distances.size()));
-    std::iota(order.begin(), order.end(), Eigen::Index{0});
-    std::stable_sort(order.begin(), order.end(),
-                     [&](Eigen::Index a, Eigen::Index b) { return distances(a) < distances(b); });
-    return order;
-  }
-
-  /// The best of the three most likely particles once they are moved onto the outline.
-  OutlineFit search(const Observation& observation) { return search(observation, filter.states(), distance, state, 3); }
-  /// The same of the first `count` of any offsets.
-  /// @param rest  its nuisances go with them
-  OutlineFit search(const Observation& observation, const Eigen::MatrixXd& offsets, const Eigen::VectorXd& distances,
-                    const Eigen::VectorXd& rest, std::size_t count) {
-    const std::vector<Eigen::Index> order = in_order(distances);
-    std::vector<Eigen::VectorXd> starts(std::min(count, order.size()), rest);
-    for (std::size_t i = 0; i < starts.size(); ++i) starts[i].head(joints) = offsets.col(order[i]);
-    return fitter.search(observation, starts);
-  }
-
   /// Next frame's particles: resampled survivors, and half of them around the estimate.
   void spread(bool locked) {
+    slip_of_particle.clear();
     filter.resample_and_spread();
-    if (!locked && filter.spread_rad() < kSearchSpread_rad) filter.set_spread(kSearchSpread_rad);
+    if (!locked && filter.spread_rad() < limits::kSearchSpread_rad) filter.set_spread(limits::kSearchSpread_rad);
     const Eigen::Index n = filter.states().cols();
     Eigen::VectorXd sd(joints);
     if (locked) {
-      sd = memory.fusion().covariance().diagonal().head(joints).cwiseSqrt();
+      sd = memory.estimate().covariance.diagonal().head(joints).cwiseMax(0.0).cwiseSqrt();
       sd = sd.cwiseMax(options.filter.spread_min_rad);
     } else {
       sd.setConstant(filter.spread_rad());
@@ -395,194 +524,216 @@ struct Estimator::Impl {
     std::normal_distribution<double> normal(0.0, 1.0);
     Eigen::VectorXd x(joints);
     for (Eigen::Index i = 0; i < n / 2; ++i) {
-      for (Eigen::Index k = 0; k < joints; ++k) {
-        x(k) = state(k) + sd(k) * normal(filter.random());
-      }
+      for (Eigen::Index k = 0; k < joints; ++k) x(k) = state(k) + sd(k) * normal(filter.random());
       filter.set_state(i, x);
     }
   }
 
   // --- results --------------------------------------------------------------------------------
 
-  void report(const Observation& observation, Estimate& estimate) {
+  Estimate report() {
+    Estimate estimate;
+    estimate.joint_names = setup.estimated_joints;
     estimate.offset_rad = state.head(joints);
+    estimate.prior_sd_rad = model.state().prior_sd().head(joints);
     estimate.effective_sample_size = effective_size;
     estimate.best_likelihood = best_likelihood;
-    estimate.contour_rms_px = contour_rms_px;
+    estimate.contour_rms_px = rms_px;
+    estimate.cameras_swapped = cameras_swapped;
     if (particles_only()) {
       estimate.covariance_rad2 = cloud_covariance;
     } else {
-      const Eigen::MatrixXd covariance = contradicted ? frame_state.covariance : memory.fusion().covariance();
-      estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
-      for (std::size_t k = static_cast<std::size_t>(joints); k < parameters.size(); ++k) {
-        estimate.nuisance_names.push_back(parameters[k].name);
-        estimate.head_joints += parameters[k].kind == ParameterKind::kJointOffset ? 1 : 0;
-        estimate.nuisance_units.push_back(unit_of(parameters[k].kind));
-      }
-      estimate.nuisance = state.tail(state.size() - joints);
-      estimate.nuisance_sd = covariance.diagonal().tail(state.size() - joints).cwiseMax(0.0).cwiseSqrt();
+      report_memory(estimate);
     }
-    estimate.cameras_swapped = cameras_swapped;
-    look_for_stalls(observation, estimate);
-    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-      const std::optional<Exposure> at = exposure(observation, c);
-      if (!at) continue;
-      estimate.X_CP.push_back(body.hand_pose(*at, frame_state.x, c));
-      estimate.X_CP_nominal.push_back(body.hand_pose(at->q, uncorrected(), c));
-      if (c == 0 || estimate.hand_sd_m == 0.0) {
-        estimate.hand_sd_m = std::sqrt(std::max(0.0, hand_covariance_m2(*at, c).trace()));
-      }
+    for (std::size_t c = 0; c < rig.cameras.size() && frame.exposed(); ++c) {
+      const Exposure& exposure = frame.exposures[c];
+      estimate.X_CP.push_back(model.hand_pose(exposure, in_frame.x));
+      estimate.X_CP_nominal.push_back(model.nominal_hand_pose(exposure));
+      if (c == 0) estimate.hand_sd_m = std::sqrt(std::max(0.0, hand_covariance_m2(exposure).trace()));
     }
     estimate.weakest = weakest_direction(estimate.covariance_rad2, setup.estimated_joints);
-    if (!particles_only() && !contradicted && current == EstimatorState::kConverging && memory.settled() &&
-        !stalled.suspected() && !stalled.dropped_while_standing() && estimate.hand_sd_m < options.converged_hand_sd_m) {
+    if (!particles_only()) conclude(estimate);
+    estimate.state = current;
+    return estimate;
+  }
+
+  void report_memory(Estimate& estimate) {
+    const Eigen::MatrixXd covariance = contradicted ? in_frame.covariance : memory.estimate().covariance;
+    estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
+    for (Eigen::Index k = joints; k < state.size(); ++k) {
+      const auto& p = model.state().parameters()[static_cast<std::size_t>(k)];
+      const Effect& effect = model.state().model()[p.ref.effect];
+      estimate.effects.push_back({effect.name(), effect.target().joint, effect.target().source,
+                                  effect.parameters()[p.ref.parameter].name, p.name, p.unit, p.si_per_unit, state(k),
+                                  std::sqrt(std::max(0.0, covariance(k, k))), p.prior_sd});
+    }
+    estimate.verdict = verdict;
+    estimate.innovation = innovation.nis;
+    estimate.innovation_dof = innovation.dof;
+    estimate.innovation_usual = usual();
+    estimate.postures = memory.postures();
+    estimate.posture_sd_rad = memory.posture_sd_rad();
+    estimate.outline_sd_px = fitter.noise().front().sd_px();
+    estimate.outline_alike = fitter.noise().front().correlated_points();
+    estimate.changed = changed;
+    if (const auto joint = stalled.joint(); joint >= 0) {
+      estimate.stalled_joint = setup.estimated_joints[static_cast<std::size_t>(joint)];
+      estimate.stalled_motion_rad = stalled.moved_rad();
+    }
+  }
+
+  /// Whether the estimate may be relied on.
+  void conclude(Estimate& estimate) {
+    estimate.hand_sd_limit_m = hand_sd_limit_m(estimate);
+    if (current != EstimatorState::kConverging || memory.postures() < options.least_postures) return;
+    estimate.misfit = misfit();
+    if (!estimate.misfit.empty()) {
+      current = EstimatorState::kModelMisfit;
+    } else if (!contradicted && near && verdict == FrameVerdict::kAgrees && !stalled.suspected() &&
+               estimate.hand_sd_m < estimate.hand_sd_limit_m) {
       current = EstimatorState::kConverged;
     }
-    estimate.state = current;
   }
 
-  /// The first camera that saw something; null: none did.
-  static const CameraObservation* first_seen(const Observation& observation) {
-    const auto seen = std::find_if(observation.cameras.begin(), observation.cameras.end(),
-                                   [](const auto& camera) { return camera.has_value(); });
-    return seen == observation.cameras.end() ? nullptr : &**seen;
+  /// How well the hand is to be known: as configured, or as well as this distance and these tolerances allow.
+  [[nodiscard]] double hand_sd_limit_m(const Estimate& estimate) {
+    if (options.converged_hand_sd_m > 0.0) return options.converged_hand_sd_m;
+    if (estimate.X_CP.empty()) return 0.0;
+    constexpr double kMore = 1.5;
+    const double tolerated = std::sqrt(std::max(0.0, (hand_covariance_m2(frame.exposures[0]) - own_hand_covariance_m2()).trace()));
+    return std::hypot(limits::kHandPerDistance * estimate.X_CP.front().translation().norm(), kMore * tolerated);
   }
 
-  /// What the hand's pose in a camera is predicted from; none where no camera saw anything. A camera that is absent
-  /// borrows the arm of one that is not, but where it sits itself only its own pictures have told.
-  std::optional<Exposure> exposure(const Observation& observation, std::size_t camera) {
-    const bool present = camera < observation.cameras.size() && observation.cameras[camera];
-    const CameraObservation* seen = present ? &*observation.cameras[camera] : first_seen(observation);
-    if (seen == nullptr) return std::nullopt;
-    if (present) own_correction[camera] = seen->corrections ? seen->corrections->camera : CameraCorrection{};
-    if (present || !seen->corrections) return Exposure(*seen);
-    borrowed = *seen->corrections;
-    borrowed.camera = own_correction[camera];
-    return Exposure(seen->joints.q, &borrowed);
+  /// What is wrong by more than is believed possible; empty: nothing.
+  [[nodiscard]] std::string misfit() {
+    const auto& known = memory.estimate();
+    const Eigen::VectorXd prior_sd = memory.layout().prior_sd;
+    const Eigen::VectorXd away = (known.x - memory.layout().prior_mean).cwiseQuotient(prior_sd);
+    Eigen::Index worst = -1;
+    for (Eigen::Index k = joints; k < away.size(); ++k) {
+      if (std::abs(away[k]) > limits::kBeyondBelief_sd && (worst < 0 || std::abs(away[k]) > std::abs(away[worst]))) {
+        worst = k;
+      }
+    }
+    if (worst >= 0) {
+      const auto& p = model.state().parameters()[static_cast<std::size_t>(worst)];
+      return fmt::format(
+          "the pictures ask for {} {:.3g} {}, {:.0f} times what is believed possible (estimator.state); something else "
+          "is wrong with the model: run bodyschema diagnose on a log",
+          p.name, known.x[worst] / p.si_per_unit, p.unit, std::abs(away[worst]));
+    }
+    if (memory.dispersion() > limits::kDisagreement) {
+      return fmt::format(
+          "postures disagree by {:.1f} times what is claimed; the model of the robot is wrong in a way that offsets do "
+          "not explain: run bodyschema diagnose on a log",
+          std::sqrt(memory.dispersion()));
+    }
+    return {};
   }
 
-  /// Encoders of the estimated joints at the exposure of the first camera that saw something.
-  bool read_encoders(const Observation& observation) {
-    const CameraObservation* seen = first_seen(observation);
-    if (seen == nullptr) return false;
-    for (Eigen::Index k = 0; k < joints; ++k) reading(k) = seen->joints.q(joint_index[static_cast<std::size_t>(k)]);
-    return true;
+  /// Encoders of the estimated joints at the exposure of the first camera.
+  void read_encoders() {
+    const Instant& at = frame.exposures[0].at;
+    for (Eigen::Index k = 0; k < joints; ++k) {
+      reading(k) = at.encoder(model.state().parameters()[static_cast<std::size_t>(k)].joint);
+    }
   }
-
-  /// An encoder that stalled reads on: nothing that its dead reading taught may outlive it.
-  void forget_a_stall(const Observation& observation) {
-    if (!read_encoders(observation) || !stalled.ends(reading)) return;
-    memory.forget_all();
-  }
-
-  /// An encoder that stands while its joint moves: what the estimate lags behind is added to its
-  /// uncertainty, and once it is certain, nothing is called converged.
-  void look_for_stalls(const Observation& observation, Estimate& estimate) {
-    if (particles_only() || !read_encoders(observation)) return;
-    const bool remembers = memory.settled();
-    const bool settled = remembers && !contradicted;
-    stalled.look(1e-6 * static_cast<double>(observation.utime), reading, estimate.offset_rad,
-                 estimate.covariance_rad2.diagonal().cwiseMax(0.0).cwiseSqrt(), explained, settled, remembers);
-    const auto drift = stalled.drift_rad().array().square();
-    estimate.covariance_rad2.diagonal().array() += drift;
-    frame_state.covariance.diagonal().head(joints).array() += drift;
-    if (stalled.joint() < 0) return;
-    estimate.stalled_joint = setup.estimated_joints[static_cast<std::size_t>(stalled.joint())];
-    estimate.stalled_motion_rad = stalled.moved_rad();
-  }
-
-  /// The state of a robot that is as its encoders and model say.
-  [[nodiscard]] Eigen::VectorXd uncorrected() const { return Eigen::VectorXd::Zero(state.size()); }
 
   /// The state that an estimate reports.
   [[nodiscard]] Eigen::VectorXd state_of(const Estimate& estimate) const {
-    Eigen::VectorXd x = uncorrected();
+    Eigen::VectorXd x = model.state().prior_mean();
     x.head(joints) = estimate.offset_rad;
-    x.segment(joints, estimate.nuisance.size()) = estimate.nuisance;
+    for (std::size_t k = 0; k < estimate.effects.size(); ++k) {
+      x(joints + static_cast<Eigen::Index>(k)) = estimate.effects[k].value;
+    }
     return x;
   }
 
   /// How well the hand is known in a camera, by this frame's covariance.
-  Eigen::Matrix3d hand_covariance_m2(const Exposure& at, std::size_t camera) {
-    constexpr double kStep = 1e-4;
-    const Eigen::Index n = std::min<Eigen::Index>(state.size(), frame_state.covariance.rows());
-    Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, n);
-    Eigen::VectorXd x = frame_state.x;
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const double value = x(k);
-      x(k) = value + kStep;
-      const Eigen::Vector3d plus = body.hand_pose(at, x, camera).translation();
-      x(k) = value - kStep;
-      J.col(k) = (plus - body.hand_pose(at, x, camera).translation()) / (2.0 * kStep);
-      x(k) = value;
-    }
-    return J * frame_state.covariance * J.transpose();
+  Eigen::Matrix3d hand_covariance_m2(const Exposure& exposure) {
+    const Eigen::MatrixXd J = model.hand_jacobian(exposure, in_frame.x);
+    const auto n = state.size();
+    hand_own = J.leftCols(n) * in_frame.own * J.leftCols(n).transpose();
+    if (J.cols() == n) return hand_own;
+    const Eigen::MatrixXd T =
+        (J.leftCols(n) * in_frame.sensitivity + J.rightCols(J.cols() - n)) * memory.layout().considered_sd.asDiagonal();
+    return hand_own + T * T.transpose();
   }
+  /// Of the last `hand_covariance_m2`, the share that tolerances have no part in.
+  [[nodiscard]] Eigen::Matrix3d own_hand_covariance_m2() const { return hand_own; }
 
   void reset() {
     begin_again();
     filter = ParticleFilter(joints, options.filter);
-    frame_state = memory.fusion().frame_state();
+    in_frame = memory.in_posture();
     current = EstimatorState::kHandNotInView;
     cloud_covariance = filter.covariance();
     contradicted = false;
     eye_order = {};
-    own_correction.assign(rig.cameras.size(), {});
+    fitter.forget();
+    model.forget();
   }
 
   /// Nothing that was learned holds.
   void begin_again() {
     filter.reset(Eigen::VectorXd::Zero(joints));
     memory.forget_all();
-    state.setZero();
+    keyframes.clear();
+    alternative.reset();
+    state = model.state().prior_mean();
     stalled = StalledEncoders(joints);
+    usual_sum = 1.0;
+    doubted_since_s = -1.0;
   }
-
-  static constexpr double kSearchSpread_rad = 0.0349066;  ///< 2 deg
-  static constexpr double kLargestSlip_rad = 0.2094395;   ///< 12 deg; larger ones take more frames
-  static constexpr double kClearlyBetter = 0.8;           ///< Hammoude distance against that of the memory
 
   EstimatorOptions options;
   RobotSetup setup;
   StereoRig rig;
-  std::vector<CameraCorrection> own_correction;  ///< of each camera, when it was last seen
-  Corrections borrowed;                          ///< what `exposure` last made for a camera that is absent
-  std::vector<Parameter> parameters;
-  SilhouetteModel silhouettes;
-  std::vector<PinholeIntrinsics> intrinsics;
-  BodyPoseModel body;
-  ContourAlignment alignment;
+  FrameModel model;
+  Frame frame;  ///< the last one; its observation is gone once `step` has returned
+  Eigen::Index joints;  ///< estimated ones; the first entries of a state
   HypothesisScorer scorer;
   ParticleFilter filter;
-  const OffsetFusion first_look;  ///< the prior alone
-  OffsetMemory memory;
+  PostureMemory memory;
+  struct Keyframe {
+    Frame frame;
+    std::vector<CameraObservation> pictures;  ///< per camera: masks, not the pictures themselves
+  };
+  std::map<std::uint64_t, Keyframe> keyframes;  ///< by the memory's blocks
+  std::optional<PostureMemory> alternative;  ///< the memory that the last change of mind cost
+  double alternative_s = 0.0;
   OutlineFitter fitter;
 
-  Eigen::Index joints = 0;
-  std::vector<Eigen::Index> joint_index;  ///< of the estimated joints in the RobotModel
-  Eigen::VectorXd reading;                ///< their encoders
-  Eigen::VectorXd state;                  ///< one value per parameter, fused over frames
-  OffsetFusion::FrameState frame_state;   ///< the same with the last frame's own encoder error
+  Eigen::VectorXd state;    ///< fused over postures
+  MemoryEstimate in_frame;  ///< the same with this frame's own error
+  Eigen::Matrix3d hand_own = Eigen::Matrix3d::Zero();
   EstimatorState current = EstimatorState::kHandNotInView;
-  double best_likelihood = 0.0;
-  double effective_size = 0.0;
-  double contour_rms_px = 0.0;
-  bool contradicted = false;
-  bool cameras_swapped = false;   ///< the last frame's pictures
+  FrameVerdict verdict = FrameVerdict::kNothingKnown;
+  Innovation innovation;
+  double usual_sum = 1.0;
+  double now_s = 0.0, doubted_since_s = -1.0;
+  double best_likelihood = 0.0, effective_size = 0.0, rms_px = 0.0;
+  bool contradicted = false;  ///< the memory does not explain the last frame
+  bool near = false;          ///< the last frame's outlines lie near what is reported
+  bool cameras_swapped = false;
+  std::string changed;
   Eigen::MatrixXd first_guesses;  ///< of the joint offsets: the first particles
   EyeOrder eye_order;
-  StalledEncoders stalled{0};
-  bool explained = false;            ///< the last frame's pictures, by its estimate
+  StalledEncoders stalled;
+  Eigen::VectorXd reading;           ///< encoders of the estimated joints
   Eigen::MatrixXd cloud_covariance;  ///< of the particles as they were last weighed
   StageTimes times;
-
   Eigen::VectorXd distance;  ///< Hammoude, of the particles
   Eigen::VectorXd weights;
+  std::vector<Eigen::Index> slip_of_particle;  ///< which joint's slip a particle stands for; -1: none
 };
 
 Estimator::Estimator(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
-                     const EstimatorOptions& options)
-    : impl_(std::make_unique<Impl>(std::move(robot), setup, rig, options)) {}
+                     const Beliefs& beliefs, const EstimatorOptions& options)
+    : Estimator(robot, setup, rig, beliefs, options, ErrorModel(JointRoles::of(robot, setup, rig))) {}
+Estimator::Estimator(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                     const Beliefs& beliefs, const EstimatorOptions& options, const ErrorModel& known)
+    : impl_(std::make_unique<Impl>(robot, setup, rig, beliefs, options, known)) {}
 Estimator::~Estimator() = default;
 Estimator::Estimator(Estimator&&) noexcept = default;
 
@@ -597,44 +748,46 @@ void Estimator::reset() {
   impl_->reset();
 }
 
+const Exposure& Estimator::exposure(std::size_t camera) const {
+  return impl_->frame.exposures.at(camera);
+}
+
+Exposure Estimator::at_rest(const Eigen::VectorXd& q, std::size_t camera) const {
+  return impl_->model.at_rest(q, camera);
+}
+
 BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::size_t camera, bool corrected) {
-  std::vector<Eigen::Isometry3f> X_CB(impl_->body.part_count());
-  const CameraObservation& seen = *observation.cameras[camera];
-  if (corrected) {
-    impl_->body.compute(seen, impl_->state, camera, X_CB);
-  } else {
-    impl_->body.compute(seen.joints.q, impl_->uncorrected(), camera, X_CB);
-  }
+  std::vector<Eigen::Isometry3f> X_CB(impl_->model.part_count());
+  const Exposure exposure = impl_->model.preview(observation.cameras[camera]->joints, camera);
+  (corrected ? impl_->model.project(exposure, impl_->state) : impl_->model.project_nominal(exposure)).parts(X_CB);
   return impl_->scorer.render(X_CB, camera);
 }
 
 BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::size_t camera,
                                            const Estimate& estimate) {
-  std::vector<Eigen::Isometry3f> X_CB(impl_->body.part_count());
-  impl_->body.compute(*observation.cameras[camera], impl_->state_of(estimate), camera, X_CB);
+  std::vector<Eigen::Isometry3f> X_CB(impl_->model.part_count());
+  const Exposure exposure = impl_->model.preview(observation.cameras[camera]->joints, camera);
+  impl_->model.project(exposure, impl_->state_of(estimate)).parts(X_CB);
   return impl_->scorer.render(X_CB, camera);
 }
 
-Pose Estimator::hand_pose(const Exposure& at, std::size_t camera, bool corrected) {
-  return corrected ? impl_->body.hand_pose(at, impl_->state, camera)
-                   : impl_->body.hand_pose(at.q, impl_->uncorrected(), camera);
+Pose Estimator::hand_pose(const Exposure& exposure, bool corrected) {
+  return corrected ? impl_->model.hand_pose(exposure, impl_->state) : impl_->model.nominal_hand_pose(exposure);
 }
 
-Pose Estimator::hand_pose(const Exposure& at, std::size_t camera, const Estimate& estimate) {
-  return impl_->body.hand_pose(at, impl_->state_of(estimate), camera);
+Pose Estimator::hand_pose(const Exposure& exposure, const Estimate& estimate) {
+  return impl_->model.hand_pose(exposure, impl_->state_of(estimate));
 }
 
-Eigen::Matrix3d Estimator::hand_covariance_m2(const Exposure& at, std::size_t camera) {
-  return impl_->hand_covariance_m2(at, camera);
+Eigen::Matrix3d Estimator::hand_covariance_m2(const Exposure& exposure) {
+  return impl_->hand_covariance_m2(exposure);
 }
 
-std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& at, std::size_t camera, bool corrected) {
+std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& exposure, bool corrected) {
+  auto& projection =
+      corrected ? impl_->model.project(exposure, impl_->state) : impl_->model.project_nominal(exposure);
   std::vector<Eigen::Vector3d> tips;
-  if (corrected) {
-    impl_->body.fingertips(at, impl_->state, camera, tips);
-  } else {
-    impl_->body.fingertips(at.q, impl_->uncorrected(), camera, tips);
-  }
+  for (const auto& X_CT : projection.fingertips()) tips.push_back(X_CT.translation());
   return tips;
 }
 

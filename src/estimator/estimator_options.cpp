@@ -1,5 +1,8 @@
 #include "bodyschema/estimator/estimator_options.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace bodyschema {
 
 EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
@@ -26,31 +29,86 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
   const char* mode = o.mode == EstimatorMode::kPaper ? "paper" : "best";
   o.mode =
       estimator.choice_or("mode", mode, {"paper", "best"}) == "paper" ? EstimatorMode::kPaper : EstimatorMode::kBest;
-  o.min_mask_px = static_cast<std::size_t>(
-      estimator.integer_or("min_mask_px", static_cast<std::int64_t>(o.min_mask_px), 1, 1000000000));
+  o.min_mask_share = 0.01 * estimator.number_or("min_mask_percent", 100.0 * o.min_mask_share, 1e-4, 100.0);
   const Configuration best = estimator.section("best");
   o.temperature = best.number_or("temperature", o.temperature, 1e-6, 10.0);
   o.refine_outline = best.boolean_or("refine_outline", o.refine_outline);
-  o.contour.spacing_px =
-      static_cast<float>(best.number_or("contour_spacing_px", static_cast<double>(o.contour.spacing_px), 0.5, 100.0));
-  o.contour.huber_px = best.number_or("huber_px", o.contour.huber_px, 1e-3, 100.0);
-  o.residual_sd_px = best.number_or("residual_sd_px", o.residual_sd_px, 1e-3, 100.0);
-  o.encoder_sd_rad = radians(best.number_or("encoder_sd_deg", degrees(o.encoder_sd_rad), 1e-6, 10.0));
-  o.correlated_frames = best.number_or("correlated_frames", o.correlated_frames, 1.0, 1e6);
-  o.memory_frames = best.number_or("memory_frames", o.memory_frames, 1.0, 1e9);
-  o.lock_distance = best.number_or("lock_distance", o.lock_distance, 0.0, 1.0);
-  o.lock_rms_px = best.number_or("lock_rms_px", o.lock_rms_px, 0.0, 1e3);
-  o.converged_hand_sd_m = 1e-3 * best.number_or("converged_hand_sd_mm", 1e3 * o.converged_hand_sd_m, 1e-6, 1e3);
-  const Configuration priors = best.section("prior_sd");
-  auto& p = o.priors;
-  p.head_rad = radians(priors.number_or("head_deg", degrees(p.head_rad), 0.0, 90.0));
-  p.finger_curl_rad = radians(priors.number_or("finger_curl_deg", degrees(p.finger_curl_rad), 0.0, 90.0));
-  p.vergence_rad = radians(priors.number_or("vergence_deg", degrees(p.vergence_rad), 0.0, 90.0));
-  p.focal_scale = 0.01 * priors.number_or("focal_scale_percent", 100.0 * p.focal_scale, 0.0, 50.0);
-  p.principal_difference_px = priors.number_or("principal_difference_px", p.principal_difference_px, 0.0, 100.0);
-  p.mesh_scale = 0.01 * priors.number_or("mesh_scale_percent", 100.0 * p.mesh_scale, 0.0, 50.0);
-  p.dilation_px = priors.number_or("dilation_px", p.dilation_px, 0.0, 20.0);
+  o.remember = best.boolean_or("remember", o.remember);
+  o.outline_spacing_px = best.number_or("outline_spacing_px", o.outline_spacing_px, 0.5, 100.0);
+  o.noise.sd_px = best.number_or("outline_sd_px", o.noise.sd_px, 1e-3, 100.0);
+  o.noise.floor_px = best.number_or("outline_floor_px", o.noise.floor_px, 0.0, 100.0);
+  o.noise.correlated_points = best.number_or("outline_points_alike", o.noise.correlated_points, 1.0, 1e4);
+  auto& m = o.memory;
+  m.encoder_sd_rad = radians(best.number_or("encoder_sd_deg", degrees(m.encoder_sd_rad), 1e-6, 10.0));
+  m.posture_sd_rad = radians(best.number_or("posture_sd_deg", degrees(m.posture_sd_rad), 1e-6, 10.0));
+  m.memory_s = best.number_or("memory_s", m.memory_s, 0.1, 1e9);
+  m.block_s = best.number_or("posture_s", m.block_s, 1e-3, 1e3);
+  m.same_posture_rad = radians(best.number_or("same_posture_deg", degrees(m.same_posture_rad), 0.0, 90.0));
+  m.most_blocks = static_cast<std::size_t>(
+      best.integer_or("most_postures", static_cast<std::int64_t>(m.most_blocks), 4, 10000));
+  o.least_postures = static_cast<std::size_t>(
+      best.integer_or("least_postures", static_cast<std::int64_t>(o.least_postures), 1, 1000));
+  if (!best.has("converged_hand_sd_mm") || best.text("converged_hand_sd_mm") == "auto") {
+    o.converged_hand_sd_m = 0.0;
+    static_cast<void>(best.text_or("converged_hand_sd_mm", "auto"));
+  } else {
+    o.converged_hand_sd_m = 1e-3 * best.number("converged_hand_sd_mm", 1e-6, 1e3);
+  }
   return o;
+}
+
+std::vector<Belief> camera_beliefs(const StereoRig& rig) {
+  // Physical: where nothing is known the camera is first searched for; the search leaves no more than this.
+  constexpr double kSearched_m = 0.3, kSearched_rad = 0.3;
+  const auto sds = [](const CameraMount& mount) {
+    const bool unknown = mount.knowledge == PlaceKnowledge::kUnknown;
+    const double m = unknown ? kSearched_m : mount.sd_m, rad = unknown ? kSearched_rad : mount.sd_rad;
+    return std::vector<double>{m, m, m, rad, rad, rad};
+  };
+  std::vector<Belief> list;
+  if (rig.cameras.empty()) return list;
+  const auto& first = rig.cameras.front().mount;
+  if (first.knowledge != PlaceKnowledge::kKnown) list.push_back({"camera_pose", {}, sds(first)});
+  if (rig.cameras.size() < 2) return list;
+  const auto& second = rig.cameras[1].mount;
+  std::vector<double> pair(6, 0.0);
+  for (const auto* mount : {&second, second.relative ? nullptr : &first}) {
+    if (mount == nullptr || mount->knowledge == PlaceKnowledge::kKnown) continue;
+    const auto own = sds(*mount);
+    for (std::size_t k = 0; k < pair.size(); ++k) pair[k] = std::hypot(pair[k], own[k]);
+  }
+  if (pair[0] > 0.0) list.push_back({"camera_pair", {}, pair});
+  return list;
+}
+
+Beliefs Beliefs::from(const Configuration& configuration, const JointRoles& roles, const StereoRig& rig,
+                      const EstimatorOptions& options) {
+  Beliefs beliefs;
+  beliefs.state = read_beliefs(configuration.section("estimator").section("state"), roles);
+  for (auto& belief : camera_beliefs(rig)) {
+    std::erase_if(beliefs.state,
+                  [&](const Belief& b) { return b.effect == belief.effect && b.target == belief.target; });
+    beliefs.state.push_back(std::move(belief));
+  }
+  beliefs.tolerances = read_beliefs(configuration.section("robot").section("tolerances"), roles);
+  for (const char* section : {"estimator", "robot"}) {
+    const char* key = section == std::string("robot") ? "tolerances" : "state";
+    if (configuration.section(section).section(key).has("joint_offset")) {
+      configuration.section(section).section(key).fail(
+          "joint_offset", "it nowhere here: what is believed of offsets is filter.initial_sd_deg");
+    }
+  }
+  std::vector<Belief> offsets;
+  for (const auto& target : effect_targets("joint_offset", roles)) {
+    offsets.push_back({"joint_offset", target, {options.filter.initial_sd_rad}});
+  }
+  if (options.mode == EstimatorMode::kPaper) beliefs.state.clear();
+  beliefs.state.insert(beliefs.state.begin(), offsets.begin(), offsets.end());
+  std::erase_if(beliefs.tolerances, [&](const Belief& t) {
+    return std::any_of(beliefs.state.begin(), beliefs.state.end(),
+                       [&](const Belief& b) { return b.effect == t.effect && b.target == t.target; });
+  });
+  return beliefs;
 }
 
 }  // namespace bodyschema

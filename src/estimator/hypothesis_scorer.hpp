@@ -7,29 +7,30 @@
 #include <string>
 #include <vector>
 
-#include "bodyschema/estimator/body_pose_model.hpp"
 #include "bodyschema/observation/observation.hpp"
 #include "bodyschema/silhouette/silhouette_scorer.hpp"
+#include "frame_model.hpp"
 
 namespace bodyschema {
 
 /// Hammoude distances of hypotheses about the state to one frame's masks, equation (3) over all its
-/// pictures. Hypotheses are placed in slots and scored together. One thread.
+/// pictures. Hypotheses are placed in slots and scored together; what they hold beyond the joints' offsets is that of
+/// the frame model's last `settle`. One thread.
 class HypothesisScorer {
  public:
   /// @param slots  hypotheses that can be scored at once
   /// Throws gl::ContextError when the engine cannot be had.
-  HypothesisScorer(BodyPoseModel& body, const SilhouetteModel& silhouettes, std::vector<PinholeIntrinsics> cameras,
+  HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes, std::vector<PinholeIntrinsics> cameras,
                    const SilhouetteOptions& options, std::size_t slots);
 
-  /// The frame that hypotheses are compared with until the next call; it must live as long. A camera without
-  /// a mask is not used. False when fewer than `min_mask_px` pixels of robot are seen in all.
-  bool observe(const Observation& observation, std::size_t min_mask_px);
+  /// The observation that hypotheses are compared with until the next call, and its exposures; both must live as long. A camera without
+  /// a mask is not used. False when less than this share of the pictures is robot.
+  bool observe(const Observation& observation, const Frame& frame, double min_share);
 
   void place(const Eigen::VectorXd& x, std::size_t slot);
   /// Distances of slots 0 to n - 1; valid until the next call.
   const Eigen::VectorXd& score(std::size_t n);
-  /// The distance of one hypothesis; slots and their distances stay as they are.
+  /// The distance of one state, settled for itself; slots and their distances stay as they are.
   double distance(const Eigen::VectorXd& x);
 
   /// Whether the frame has two pictures of one size: each could be the other eye's.
@@ -47,11 +48,11 @@ class HypothesisScorer {
  private:
   void score_slots(std::size_t begin, std::size_t n, Eigen::VectorXd& distances);
 
-  BodyPoseModel& body_;
+  FrameModel& model_;
+  const Frame* frame_ = nullptr;
   std::vector<PinholeIntrinsics> cameras_;
   std::string engine_reason_;
   std::unique_ptr<SilhouetteScorer> scorer_;
-  const Observation* observation_ = nullptr;
   std::uint32_t camera_mask_ = 0;  ///< cameras that have a mask
   std::vector<ObservedSilhouette> observed_;
   std::size_t slots_;                    ///< and one more behind them, for `distance`

@@ -2,57 +2,112 @@
 
 #include <algorithm>
 
+#include "limits.hpp"
+
 namespace bodyschema {
 namespace {
 
-constexpr double kMaxStep_rad = 0.2;
-constexpr double kNear_px[] = {8.0, 4.0};
-constexpr double kWide_px[] = {30.0, 20.0, 14.0, 10.0, 7.0, 5.0, 4.0};
-
-/// The cost that the evidence predicts after a change of the state, px^2.
-double predicted_cost(const ContourEvidence& evidence, const Eigen::VectorXd& step) {
-  return evidence.cost - 2.0 * evidence.b.dot(step) + step.dot(evidence.A * step);
-}
+constexpr double kNear_px[] = {8.0, 5.0};
+constexpr double kWide_px[] = {30.0, 20.0, 14.0, 10.0, 7.0, 5.0};
 
 }  // namespace
 
-void OutlineFitter::refine(const Observation& observation, const OffsetFusion& memory,
-                           std::span<const double> search_px, OutlineFit& fit) {
-  for (const double reach_px : search_px) {
-    alignment_.linearise(observation, fit.x, reach_px, fit.evidence);
-    Eigen::VectorXd step = memory.solve_with(fit.evidence, fit.x, variance_px2()) - fit.x;
-    const double largest = step.head(joints_).cwiseAbs().maxCoeff();
-    if (largest > kMaxStep_rad) step *= kMaxStep_rad / largest;
-    fit.x += step;
+OutlineFitter::OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const EstimatorOptions& options,
+                             std::size_t cameras)
+    : model_(model), scorer_(scorer), options_(options), noise_(cameras, OutlineNoise(options.noise)),
+      points_(cameras) {}
+
+std::vector<OutlineSearch> OutlineFitter::searches(double search_px, bool last) const {
+  std::vector<OutlineSearch> list;
+  for (const auto& noise : noise_) {
+    const double robust_px = last ? noise.robust_px() : std::max(noise.robust_px(), 0.5 * search_px);
+    list.push_back({search_px, options_.outline_spacing_px, robust_px});
   }
-  alignment_.linearise(observation, fit.x, search_px.back(), fit.evidence);
+  return list;
 }
 
-OutlineFit OutlineFitter::follow(const Observation& observation, const OffsetFusion& memory) {
+void OutlineFitter::look(const Frame& frame, double search_px, bool last, OutlineFit& fit) {
+  model_.linearise(frame, fit.x, searches(search_px, last), last, fit.evidence,
+                   [&](std::size_t c, std::span<const OutlinePoint> points) {
+                     if (last) points_[c].assign(points.begin(), points.end());
+                   });
+  const auto n = fit.x.size(), all = n + (last ? model_.beside_count() : 0);
+  fit.quadratic = Quadratic::zero(all);
+  for (std::size_t c = 0; c < noise_.size(); ++c) {
+    const auto& seen = fit.evidence.cameras[c];
+    if (seen.weight <= 0.0) continue;
+    const double precision = 1.0 / noise_[c].variance_px2();
+    fit.quadratic.A += precision * seen.A.topLeftCorner(all, all);
+    fit.quadratic.b += precision * seen.b.head(all);
+  }
+  // About the origin of the state; what lies beside it is zero there.
+  fit.quadratic.b += fit.quadratic.A.leftCols(n) * fit.x;
+}
+
+void OutlineFitter::refine(const Frame& frame, const PostureMemory& memory, std::span<const double> search_px, OutlineFit& fit) {
+  const Eigen::Index joints = model_.state().joints();
+  for (const double reach_px : search_px) {
+    look(frame, reach_px, false, fit);
+    Eigen::VectorXd step = memory.solve_with(fit.quadratic) - fit.x;
+    const double largest = step.head(joints).cwiseAbs().maxCoeff();
+    if (largest > limits::kMaxStep_rad) step *= limits::kMaxStep_rad / largest;
+    fit.x += step;
+  }
+  look(frame, search_px.back(), true, fit);
+  fit.misfit = memory.distance(fit.x);
+  for (std::size_t c = 0; c < noise_.size(); ++c) fit.misfit += fit.evidence.cost[c] / noise_[c].variance_px2();
+}
+
+OutlineFit OutlineFitter::follow(const Frame& frame, const PostureMemory& memory) {
   OutlineFit fit;
-  fit.x = memory.mean();
-  refine(observation, memory, kNear_px, fit);
+  fit.x = memory.estimate().x;
+  refine(frame, memory, kNear_px, fit);
   return fit;
 }
 
-OutlineFit OutlineFitter::search(const Observation& observation, std::span<const Eigen::VectorXd> starts) {
-  std::vector<OutlineFit> fits(starts.size());
-  for (std::size_t i = 0; i < fits.size(); ++i) {
-    fits[i].x = starts[i];
-    refine(observation, prior_, kWide_px, fits[i]);
-    fits[i].distance = scorer_.distance(fits[i].x);
+OutlineFit OutlineFitter::follow_from(const Frame& frame, const Eigen::VectorXd& start, const PostureMemory& memory) {
+  OutlineFit fit;
+  fit.x = start;
+  refine(frame, memory, kWide_px, fit);
+  return fit;
+}
+
+OutlineFit OutlineFitter::search(const Frame& frame, std::span<const Eigen::VectorXd> starts, const PostureMemory& memory) {
+  OutlineFit best;
+  double least = 2.0;
+  for (const auto& start : starts) {
+    OutlineFit fit = follow_from(frame, start, memory);
+    const double distance = scorer_.distance(fit.x);
+    if (distance >= least) continue;
+    least = distance;
+    best = std::move(fit);
   }
-  return std::move(*std::min_element(fits.begin(), fits.end(),
-                                     [](const auto& a, const auto& b) { return a.distance < b.distance; }));
+  return best;
 }
 
-double OutlineFitter::pull_of(const OutlineFit& fit) const {
-  const Eigen::VectorXd alone = prior_.solve_with(fit.evidence, fit.x, variance_px2()) - fit.x;
-  return (fit.evidence.cost - predicted_cost(fit.evidence, alone)) / variance_px2();
+std::optional<Quadratic> OutlineFitter::about(const Frame& frame, const Eigen::VectorXd& x) {
+  OutlineFit fit;
+  fit.x = x;
+  look(frame, kNear_px[std::size(kNear_px) - 1], true, fit);
+  if (!fits(fit.evidence)) return std::nullopt;
+  return std::move(fit.quadratic);
 }
 
-bool OutlineFitter::fits(const ContourEvidence& evidence) const {
-  return evidence.sampled > 20 && evidence.matched_share() > 0.6 && evidence.rms_px() < options_.lock_rms_px;
+bool OutlineFitter::clearly_nearer(const OutlineFit& fit, const OutlineFit& other) {
+  return scorer_.distance(fit.x) < limits::kNearer * scorer_.distance(other.x);
+}
+
+bool OutlineFitter::fits(const FrameEvidence& evidence) const {
+  return evidence.matched >= limits::kFewestPoints && evidence.matched_share() > limits::kLeastMatched &&
+         evidence.rms_px() < limits::kNear_px;
+}
+
+void OutlineFitter::learn_noise(const OutlineFit& fit) {
+  for (std::size_t c = 0; c < noise_.size(); ++c) {
+    if (fit.evidence.cameras[c].weight > 0.0) {
+      noise_[c].add(points_[c], model_.picture_unit_px(c), limits::kNoisePictures);
+    }
+  }
 }
 
 }  // namespace bodyschema

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "bodyschema/estimator/contour_alignment.hpp"
 #include "bodyschema/estimator/estimator_options.hpp"
-#include "bodyschema/estimator/offset_fusion.hpp"
+#include "bodyschema/evidence/outline_noise.hpp"
+#include "bodyschema/evidence/posture_memory.hpp"
+#include "frame_model.hpp"
 #include "hypothesis_scorer.hpp"
 
 namespace bodyschema {
@@ -14,41 +16,44 @@ namespace bodyschema {
 /// A state moved onto the observed outline, and what the outline says about it there.
 struct OutlineFit {
   Eigen::VectorXd x;
-  ContourEvidence evidence;
-  double distance = 1.0;  ///< Hammoude; of those that were searched for
+  FrameEvidence evidence;  ///< about x
+  Quadratic quadratic;     ///< the same, divided by the variance of a residual, in absolute coordinates
+  double misfit = 0.0;     ///< chi-square: of the outline, and of x against what held it
 };
 
-/// Moves states onto a frame's observed outline by Gauss-Newton, held by what earlier frames said or by
-/// the prior alone. One thread.
+/// Moves states onto a frame's observed outline by Gauss-Newton, held by what a memory knows. One thread.
 class OutlineFitter {
  public:
-  /// @param prior  a memory without any frame
-  /// @param joints  entries of the state that are joint offsets; they come first
-  OutlineFitter(ContourAlignment& alignment, HypothesisScorer& scorer, const OffsetFusion& prior, Eigen::Index joints,
-                const EstimatorOptions& options)
-      : alignment_(alignment), scorer_(scorer), prior_(prior), joints_(joints), options_(options) {}
+  OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const EstimatorOptions& options, std::size_t cameras);
 
   /// From where the memory puts the arm to where this frame and the memory together see it.
-  OutlineFit follow(const Observation& observation, const OffsetFusion& memory);
-  /// The best of several starts after refinement without memory. `scorer` must have the same frame.
-  OutlineFit search(const Observation& observation, std::span<const Eigen::VectorXd> starts);
-  /// What the frame could still win against the memory that a fit followed, chi-square.
-  [[nodiscard]] double pull_of(const OutlineFit& fit) const;
+  OutlineFit follow(const Frame& frame, const PostureMemory& memory);
+  /// The same from elsewhere, looking far at first.
+  OutlineFit follow_from(const Frame& frame, const Eigen::VectorXd& start, const PostureMemory& memory);
+  /// The best of several starts, by how their silhouettes fit; `scorer` must have the same frame.
+  OutlineFit search(const Frame& frame, std::span<const Eigen::VectorXd> starts, const PostureMemory& memory);
+  /// What a frame says about a state as it is; nothing where its outline does not lie near.
+  std::optional<Quadratic> about(const Frame& frame, const Eigen::VectorXd& x);
+
+  /// Whether a fit's silhouettes lie clearly nearer to the masks than another's; `scorer` must have the frame.
+  [[nodiscard]] bool clearly_nearer(const OutlineFit& fit, const OutlineFit& other);
   /// Whether enough of the outline was found, and near enough.
-  [[nodiscard]] bool fits(const ContourEvidence& evidence) const;
-  /// Of one residual, px^2.
-  [[nodiscard]] double variance_px2() const { return options_.residual_sd_px * options_.residual_sd_px; }
+  [[nodiscard]] bool fits(const FrameEvidence& evidence) const;
+  /// Measures the outlines' noise on what a good fit leaves.
+  void learn_noise(const OutlineFit& fit);
+  [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
+  void forget() { noise_.assign(noise_.size(), OutlineNoise(options_.noise)); }
 
  private:
-  /// Looks less and less far.
-  void refine(const Observation& observation, const OffsetFusion& memory, std::span<const double> search_px,
-              OutlineFit& fit);
+  void refine(const Frame& frame, const PostureMemory& memory, std::span<const double> search_px, OutlineFit& fit);
+  void look(const Frame& frame, double search_px, bool last, OutlineFit& fit);
+  [[nodiscard]] std::vector<OutlineSearch> searches(double search_px, bool last) const;
 
-  ContourAlignment& alignment_;
+  FrameModel& model_;
   HypothesisScorer& scorer_;
-  const OffsetFusion& prior_;
-  Eigen::Index joints_;
   const EstimatorOptions& options_;
+  std::vector<OutlineNoise> noise_;  ///< per camera
+  std::vector<std::vector<OutlinePoint>> points_;
 };
 
 }  // namespace bodyschema

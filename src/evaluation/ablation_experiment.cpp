@@ -11,6 +11,7 @@ struct Ablation {
   std::string name;  ///< key in the summary
   std::string what;
   EstimatorOptions options;
+  bool offsets_only = false;
 };
 
 /// `best` with one of its parts taken away at a time, from nothing missing to only a sharper
@@ -22,10 +23,14 @@ std::vector<Ablation> ablations(const ExperimentContext& context) {
     rows.push_back({name, what, best});
     return rows.back().options;
   };
-  without("fusion", "each frame for itself").memory_frames = 1.0;
-  without("encoder_error", "encoder error not integrated out").encoder_sd_rad = 0.0;
-  without("correlation", "frames taken as independent").correlated_frames = 1.0;
-  without("nuisances", "joint offsets only").priors = {};
+  without("fusion", "each frame for itself").remember = false;
+  {
+    auto& memory = without("posture_error", "postures taken as free of error").memory;
+    memory.encoder_sd_rad = memory.posture_sd_rad = 1e-9;
+    memory.posture_prior = 1e9;
+  }
+  without("nuisances", "joint offsets only");
+  rows.back().offsets_only = true;
   without("particles", "10 particles").filter.particles = 10;
   without("refinement", "no outline refinement: particles only").refine_outline = false;
   rows.push_back({"paper", "the published filter", options_for(context, "paper")});
@@ -37,7 +42,7 @@ std::vector<Ablation> ablations(const ExperimentContext& context) {
 void run_ablations(ExperimentContext& context) {
   const std::vector<Ablation> rows = ablations(context);
   std::vector<Contestant> contestants;
-  for (const auto& row : rows) contestants.push_back({row.what, row.options, false});
+  for (const auto& row : rows) contestants.push_back({row.what, row.options, false, row.offsets_only});
   const int trials = std::min(context.options.trials, kMostAblationTrials);
 
   struct Condition {

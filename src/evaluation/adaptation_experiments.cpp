@@ -56,7 +56,7 @@ void run_hand_leaves(ExperimentContext& context) {
   // A reach, out of view, two seconds outside, and back to where the reach ended.
   const RobotSetup setup = RobotSetup::from(context.simulated.section("robot"));
   const StereoRig rig = StereoRig::from(context.simulated.section("cameras"));
-  const auto robot = setup.load();
+  const auto robot = load_robot(setup, rig);
   const auto setting_of = [&](std::uint64_t seed) {
     TrialSetting setting = standard_setting(context);
     simulator::MotionPlanner planner(robot, setup, rig, setting.simulator.motion, seed);

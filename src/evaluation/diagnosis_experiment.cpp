@@ -210,7 +210,7 @@ void run_diagnosis(ExperimentContext& context) {
   TrialRobot robot;
   robot.setup = RobotSetup::from(context.simulated.section("robot"));
   robot.rig = StereoRig::from(context.simulated.section("cameras"));
-  robot.model = robot.setup.load();
+  robot.model = load_robot(robot.setup, robot.rig);
   const auto file = context.options.out / "trials.jsonl";
   std::ofstream trials = open_to_write(file);
 

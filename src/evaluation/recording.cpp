@@ -2,7 +2,7 @@
 #include <unistd.h>
 
 #include "bodyschema/bus/log.hpp"
-#include "bodyschema/bus/yarp_import.hpp"
+#include "bodyschema/imports/yarp_import.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/diagnosis/log_diagnosis.hpp"
@@ -108,8 +108,7 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
   struct Seen {
     std::size_t camera;
     Microseconds utime;
-    Eigen::VectorXd q;
-    std::optional<Corrections> corrections;
+    Exposure at;
   };
   std::vector<Seen> seen;
   std::vector<std::pair<Microseconds, double>> online;
@@ -122,7 +121,7 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
       if (!observation.cameras[c]) continue;
       const auto& picture = *observation.cameras[c];
-      seen.push_back({c, picture.utime, picture.joints.q, picture.corrections});
+      seen.push_back({c, picture.utime, pipeline.estimator().exposure(c)});
       if (const TruthInstant* instant = truth.at(picture.utime)) {
         online.emplace_back(instant->begin,
                             hand_error(last.X_CP[c], *instant, c, pipeline.rig().cameras[c].intrinsics).fingertip_px);
@@ -152,11 +151,8 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
     const TruthInstant* instant = truth.at(frame.utime);
     if (instant == nullptr) continue;
     const auto& intrinsics = pipeline.rig().cameras[frame.camera].intrinsics;
-    const Exposure at(frame.q, frame.corrections ? &*frame.corrections : nullptr);
-    const auto before =
-        hand_error(pipeline.estimator().hand_pose(at, frame.camera, false), *instant, frame.camera, intrinsics);
-    const auto after =
-        hand_error(pipeline.estimator().hand_pose(at, frame.camera, true), *instant, frame.camera, intrinsics);
+    const auto before = hand_error(pipeline.estimator().hand_pose(frame.at, false), *instant, frame.camera, intrinsics);
+    const auto after = hand_error(pipeline.estimator().hand_pose(frame.at, true), *instant, frame.camera, intrinsics);
     before_px.push_back(before.fingertip_px);
     before_mm.push_back(1e3 * before.fingertip_m);
     before_deg.push_back(degrees(before.rotation_rad));

@@ -17,11 +17,11 @@ Eigen::VectorXd correct_reach(Estimator& estimator, const std::vector<Eigen::Ind
   constexpr double kStep = 1e-5;
   Eigen::Matrix<double, 3, Eigen::Dynamic> J(3, static_cast<Eigen::Index>(joints.size()));
   for (int iteration = 0; iteration < 15; ++iteration) {
-    const Eigen::Vector3d hand = estimator.hand_pose(q, 0, true).translation();
+    const Eigen::Vector3d hand = estimator.hand_pose(estimator.at_rest(q, 0), true).translation();
     for (std::size_t k = 0; k < joints.size(); ++k) {
       Eigen::VectorXd moved = q;
       moved(joints[k]) += kStep;
-      J.col(static_cast<Eigen::Index>(k)) = (estimator.hand_pose(moved, 0, true).translation() - hand) / kStep;
+      J.col(static_cast<Eigen::Index>(k)) = (estimator.hand_pose(estimator.at_rest(moved, 0), true).translation() - hand) / kStep;
     }
     const Eigen::VectorXd step = J.completeOrthogonalDecomposition().solve(target_C - hand);
     for (std::size_t k = 0; k < joints.size(); ++k) q(joints[k]) += step(static_cast<Eigen::Index>(k));
@@ -42,13 +42,13 @@ void run_reach(ExperimentContext& context) {
                                                   std::size_t contestant) {
     std::vector<Eigen::Index> joints;
     for (const auto& name : names) joints.push_back(robot.joint_index(name));
-    const Eigen::Vector3d target_C = estimator.hand_pose(q, 0, false).translation();
+    const Eigen::Vector3d target_C = estimator.hand_pose(estimator.at_rest(q, 0), false).translation();
     Eigen::VectorXd q_true = correct_reach(estimator, joints, q, target_C);
     for (std::size_t k = 0; k < joints.size(); ++k) {
       q_true(joints[k]) -= radians(trial.true_offset_deg(static_cast<Eigen::Index>(k)));
     }
     trial.contestants[contestant].reach_miss_mm =
-        1e3 * (estimator.hand_pose(q_true, 0, false).translation() - target_C).norm();
+        1e3 * (estimator.hand_pose(estimator.at_rest(q_true, 0), false).translation() - target_C).norm();
   };
   const auto records = run_trials(
       context, "reach to a target", context.options.trials, [&](std::uint64_t) { return reach; }, contestants);

@@ -23,7 +23,7 @@ FrameRecord record_of(const Estimate& estimate, Estimator& estimator, const Obse
     const Eigen::Vector3d error_m = estimate.X_CP[c].translation() - truth.translation();
     record.position_mm[c] = 1e3 * error_m.norm();
     if (seen.cameras[c]) {
-      record.position_sd[c] = distance_sd(error_m, estimator.hand_covariance_m2(*seen.cameras[c], c));
+      record.position_sd[c] = distance_sd(error_m, estimator.hand_covariance_m2(estimator.exposure(c)));
     }
     record.rotation_deg[c] = degrees(rotation_distance(truth.linear(), estimate.X_CP[c].linear()));
     record.nominal_mm[c] = 1e3 * (estimate.X_CP_nominal[c].translation() - truth.translation()).norm();
@@ -41,7 +41,11 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
     EstimatorOptions options = contestant.options;
     options.filter.seed = seed * 1000003u + 17u;
     options.silhouette.threads = 1;
-    estimators.emplace_back(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(), options);
+    auto beliefs = pipeline.beliefs();
+    if (contestant.offsets_only || options.mode == EstimatorMode::kPaper) {
+      std::erase_if(beliefs.state, [](const Belief& b) { return b.effect != "joint_offset"; });
+    }
+    estimators.emplace_back(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(), beliefs, options);
   }
   simulator::SimulationPlan plan = setting.plan;
   plan.seed = seed;
@@ -66,6 +70,7 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
     history.insert(history.end(), frame->encoders.begin(), frame->encoders.end());
     if (history.size() > 400) history.erase(history.begin(), history.end() - 200);
     Observation observation = simulator::to_observation(*frame, history);
+    observation.encoders = frame->encoders;
     const bool ready = pipeline.segment(observation);
     if (frame->phase != simulator::Phase::kMotion || !ready) continue;
     if (observation.cameras[0]) last_q = observation.cameras[0]->joints.q;

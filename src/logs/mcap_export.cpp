@@ -89,10 +89,11 @@ Json json_of(const JointStateMessage& m, const std::set<std::string>& sliding_jo
 
 /// Estimated joints turn, all of them.
 Json json_of(const joint_offsets_t& m, const std::set<std::string>&) {
-  Json mean = Json::object(), sd = Json::object(), hand = Json::object(), others = Json::object();
+  Json mean = Json::object(), sd = Json::object(), told = Json::object(), hand = Json::object(), others = Json::object();
   for (std::size_t i = 0; i < m.joint_name.size(); ++i) {
     mean[m.joint_name[i]] = number(degrees(m.mean_rad[i]));
     sd[m.joint_name[i]] = number(degrees(std::sqrt(std::max(0.0, m.covariance_rad2[i][i]))));
+    told[m.joint_name[i]] = m.told[i] != 0;
   }
   for (std::size_t c = 0; c < m.camera_name.size(); ++c) {
     const auto& p = m.hand_pose_in_camera[c].position_m;
@@ -104,6 +105,7 @@ Json json_of(const joint_offsets_t& m, const std::set<std::string>&) {
   for (std::size_t i = 0; i < m.parameter_name.size(); ++i) {
     others[m.parameter_name[i]] = {{"value", number(m.parameter_value[i])},
                                    {"stddev", number(m.parameter_stddev[i])},
+                                   {"prior_stddev", number(m.parameter_prior_stddev[i])},
                                    {"unit", m.parameter_unit[i]}};
   }
   return {{"timestamp", timestamp(m.utime)},
@@ -112,7 +114,22 @@ Json json_of(const joint_offsets_t& m, const std::set<std::string>&) {
           {"offset_deg", mean},
           {"stddev_deg", sd},
           {"hand_in_camera", hand},
+          {"told", told},
           {"parameters", others},
+          {"hand_stddev_m", number(m.hand_stddev_m)},
+          {"verdict", m.verdict},
+          {"innovation", number(m.innovation)},
+          {"innovation_dof", number(m.innovation_dof)},
+          {"innovation_usual", number(m.innovation_usual)},
+          {"postures", m.postures},
+          {"posture_stddev_deg", number(degrees(m.posture_stddev_rad))},
+          {"outline_stddev_px", number(m.outline_stddev_px)},
+          {"outline_points_alike", number(m.outline_points_alike)},
+          {"changed", m.changed},
+          {"misfit", m.misfit},
+          {"stalled_joint", m.stalled_joint},
+          {"stalled_motion_deg", number(degrees(m.stalled_motion_rad))},
+          {"cameras_swapped", m.cameras_swapped != 0},
           {"effective_sample_size", number(m.effective_sample_size)},
           {"best_likelihood", number(m.best_likelihood)},
           {"latency_ms", number(m.latency_ms)},

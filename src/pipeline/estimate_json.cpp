@@ -19,11 +19,6 @@ Json matrix_json(const Pose& X) {
   return rows;
 }
 
-/// "vergence_rad", "focal_scale" (relative: has no unit).
-std::string with_unit(const std::string& name, const std::string& unit) {
-  return unit == "1" ? name : name + '_' + unit;
-}
-
 }  // namespace
 
 nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
@@ -35,16 +30,20 @@ nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
     json["offset_deg"][e.joint_names[k]] = degrees(e.offset_rad(i));
     json["stddev_deg"][e.joint_names[k]] = degrees(std::sqrt(std::max(0.0, e.covariance_rad2(i, i))));
   }
-  for (std::size_t k = 0; k < e.nuisance_names.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    if (k < e.head_joints) {
-      json["head_offset_deg"][e.nuisance_names[k]] = degrees(e.nuisance(i));
-      json["head_stddev_deg"][e.nuisance_names[k]] = degrees(e.nuisance_sd(i));
-    } else {
-      const std::string name = with_unit(e.nuisance_names[k], e.nuisance_units[k]);
-      json["nuisance"][name] = e.nuisance(i);
-      json["nuisance_stddev"][name] = e.nuisance_sd(i);
-    }
+  json["told"] = Json::array();
+  for (std::size_t k = 0; k < e.joint_names.size(); ++k) {
+    if (e.told(k)) json["told"].push_back(e.joint_names[k]);
+  }
+  for (const auto& p : e.effects) {
+    Json entry = {{"name", p.effect}};
+    if (!p.joint.empty()) entry["joint"] = p.joint;
+    if (!p.source.empty()) entry["source"] = p.source;
+    entry["parameter"] = p.parameter;
+    entry["unit"] = p.unit;
+    entry["value"] = p.value / p.si_per_unit;
+    entry["stddev"] = p.sd / p.si_per_unit;
+    entry["prior_stddev"] = p.prior_sd / p.si_per_unit;
+    json["effects"].push_back(std::move(entry));
   }
   for (std::size_t c = 0; c < e.X_CP.size(); ++c) {
     json["hand_pose_" + rig.cameras[c].name + "_camera"] = matrix_json(e.X_CP[c]);
@@ -53,6 +52,19 @@ nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
   json["effective_sample_size"] = e.effective_sample_size;
   json["contour_rms_px"] = e.contour_rms_px;
   json["hand_sd_mm"] = 1e3 * e.hand_sd_m;
+  if (e.hand_sd_limit_m <= 0.0) return json;
+  json["hand_sd_limit_mm"] = 1e3 * e.hand_sd_limit_m;
+  json["verdict"] = to_string(e.verdict);
+  json["innovation"] = {{"nis", e.innovation}, {"dof", e.innovation_dof}, {"usual", e.innovation_usual}};
+  json["postures"] = e.postures;
+  json["posture_sd_deg"] = degrees(e.posture_sd_rad);
+  json["outline"] = {{"stddev_px", e.outline_sd_px}, {"points_alike", e.outline_alike}};
+  if (!e.changed.empty()) json["changed"] = e.changed;
+  if (!e.misfit.empty()) json["misfit"] = e.misfit;
+  if (!e.stalled_joint.empty()) {
+    json["stalled"] = {{"joint", e.stalled_joint}, {"moved_deg", degrees(e.stalled_motion_rad)}};
+  }
+  if (e.cameras_swapped) json["cameras_swapped"] = true;
   return json;
 }
 

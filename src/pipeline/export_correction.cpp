@@ -24,6 +24,7 @@ namespace {
 using tinyxml2::XMLElement;
 
 constexpr double kHardlyKnown_deg = 0.5;
+constexpr const char* kHeadOffset = "head_offset";
 
 Eigen::Vector3d triple(const XMLElement* element, const char* attribute, const Eigen::Vector3d& fallback) {
   return urdf_triple(element != nullptr ? element->Attribute(attribute) : nullptr, fallback);
@@ -60,18 +61,21 @@ void correct_joint(tinyxml2::XMLDocument& document, XMLElement* joint, double of
   }
 }
 
-/// Moves the joint by `step` of its own frame.
-void move_joint(tinyxml2::XMLDocument& document, XMLElement* joint, const Eigen::Vector3d& step) {
+/// Moves the joint within its own frame.
+void move_joint(tinyxml2::XMLDocument& document, XMLElement* joint, const Pose& X) {
   XMLElement* origin = origin_of(document, joint);
   const Eigen::Matrix3d R = urdf_rotation(triple(origin, "rpy", Eigen::Vector3d::Zero()));
-  const Eigen::Vector3d p = triple(origin, "xyz", Eigen::Vector3d::Zero()) + R * step;
+  const Eigen::Vector3d p = triple(origin, "xyz", Eigen::Vector3d::Zero()) + R * X.translation();
   origin->SetAttribute("xyz", urdf_text(p).c_str());
+  if (!X.linear().isIdentity(1e-12)) origin->SetAttribute("rpy", urdf_text(urdf_rpy(R * X.linear())).c_str());
 }
 
 void place_joint(tinyxml2::XMLDocument& document, XMLElement* joint, const JointPlacement& placement) {
   XMLElement* axis_element = joint->FirstChildElement("axis");
   Eigen::Vector3d axis = triple(axis_element, "xyz", Eigen::Vector3d::UnitX()).normalized();
-  move_joint(document, joint, placement.along_m * axis);
+  Pose along = Pose::Identity();
+  along.translation() = placement.along_m * axis;
+  move_joint(document, joint, along);
   XMLElement* origin = origin_of(document, joint);
   const Eigen::Vector3d p = triple(origin, "xyz", Eigen::Vector3d::Zero()) + placement.shift_m;
   origin->SetAttribute("xyz", urdf_text(p).c_str());
@@ -151,8 +155,8 @@ std::string joints_delta(const std::vector<std::pair<std::string, double>>& offs
 
 std::string cameras_yaml(const StereoRig& rig) {
   std::string text =
-      "# Intrinsics with the extended model applied: px; distortion k1 k2 p1 p2 k3 as OpenCV. Put in place\n"
-      "# of the section of the same name, and do not load the extended model as well.\ncameras:\n";
+      "# Intrinsics as found: px; distortion k1 k2 p1 p2 k3 as OpenCV. Put in place of the section of the same name,\n"
+      "# and do not load an extended model as well.\ncameras:\n";
   for (const auto& camera : rig.cameras) {
     const auto& k = camera.intrinsics;
     const auto& d = camera.distortion;
@@ -164,7 +168,7 @@ std::string cameras_yaml(const StereoRig& rig) {
   return text;
 }
 
-std::string applied_text(const std::vector<AppliedEffect>& applied) {
+std::string applied_text(const std::vector<AppliedEffect>& applied, bool extended) {
   std::string yes, no;
   for (const auto& effect : applied) {
     (effect.applied.empty() ? no : yes) +=
@@ -172,15 +176,17 @@ std::string applied_text(const std::vector<AppliedEffect>& applied) {
                     effect.remark.empty() ? "" : (effect.applied.empty() ? "" : "; ") + effect.remark);
   }
   std::string text;
-  if (!yes.empty()) text += "Of the extended model these files hold:\n" + yes;
+  if (!yes.empty()) text += "Beside the offsets these files hold:\n" + yes;
   if (!no.empty()) {
-    text +=
-        "They cannot hold the following; load extended_model.yaml in bodyschemad or bodyschema replay\n"
-        "(--extended-model), with the original URDF and cameras, or do as said. Beside corrected.urdf it would\n"
-        "apply twice what that holds:\n" +
-        no;
+    text += "They cannot hold the following:\n" + no;
+    if (extended) {
+      text +=
+          "For those of the extended model load extended_model.yaml in bodyschemad or bodyschema replay\n"
+          "(--extended-model), with the original URDF and cameras. Beside corrected.urdf it would apply twice what\n"
+          "that holds.\n";
+    }
   }
-  return text.empty() ? "The extended model holds joint offsets alone; those of the replay are used.\n" : text;
+  return text.empty() ? "Only joint offsets; those of the replay are used.\n" : text;
 }
 
 }  // namespace
@@ -200,19 +206,19 @@ Correction read_correction(const std::filesystem::path& summary, bool anyway) {
     };
     read_joints("offset_deg", correction.offsets_rad);
     read_joints("stddev_deg", correction.sd_rad);
-    if (estimate.contains("head_offset_deg")) {
-      read_joints("head_offset_deg", correction.head_offsets_rad);
-      read_joints("head_stddev_deg", correction.head_sd_rad);
+    if (estimate.contains("nuisance") || !estimate.contains("told")) {
+      throw FileError(summary.string() + ": the estimate is that of an older version; replay the log again");
     }
-    if (estimate.contains("nuisance")) {
-      if (!estimate.contains("nuisance_stddev")) {
-        throw FileError(summary.string() +
-                        ": estimate.nuisance is that of an older version, which does not say how well the head's "
-                        "joints are known; expected head_offset_deg and head_stddev_deg: replay the log again");
-      }
-      for (const auto& [name, value] : estimate.at("nuisance").items()) {
-        correction.nuisances.emplace_back(name, value.get<double>());
-      }
+    for (const auto& entry : estimate.value("effects", nlohmann::ordered_json::array())) {
+      EstimatedParameter p;
+      p.effect = entry.at("name").get<std::string>();
+      p.joint = entry.value("joint", "");
+      p.source = entry.value("source", "");
+      p.parameter = entry.at("parameter").get<std::string>();
+      p.unit = entry.at("unit").get<std::string>();
+      p.value = entry.at("value").get<double>();
+      p.sd = entry.at("stddev").get<double>();
+      correction.effects.push_back(std::move(p));
     }
   } catch (const nlohmann::json::exception& e) {
     throw FileError(summary.string() + ": not a replay's summary.json: " + e.what());
@@ -222,12 +228,14 @@ Correction read_correction(const std::filesystem::path& summary, bool anyway) {
     if (!anyway) throw DataError(summary.string() + ": " + ending + " (--anyway)");
     correction.warnings.push_back(ending);
   }
-  for (const auto* list : {&correction.sd_rad, &correction.head_sd_rad}) {
-    for (const auto& [joint, sd] : *list) {
-      if (degrees(sd) <= kHardlyKnown_deg) continue;
-      correction.warnings.push_back(
-          fmt::format("{}: known to {:.2f} deg only (one sigma); this motion hardly told it", joint, degrees(sd)));
-    }
+  const auto warn = [&](const std::string& joint, double sd_deg) {
+    if (sd_deg <= kHardlyKnown_deg) return;
+    correction.warnings.push_back(
+        fmt::format("{}: known to {:.2f} deg only (one sigma); this motion hardly told it", joint, sd_deg));
+  };
+  for (const auto& [joint, sd] : correction.sd_rad) warn(joint, degrees(sd));
+  for (const auto& p : correction.effects) {
+    if (p.effect == kHeadOffset) warn(p.joint, p.sd);
   }
   return correction;
 }
@@ -251,12 +259,12 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
   for (const auto& placement : correction.placements) {
     place_joint(document, joint_named(placement.joint), placement);
   }
-  for (const auto& [link, shift] : correction.camera_shifts_m) {
+  for (const auto& [link, moved] : correction.camera_motions) {
     XMLElement* joint = find_joint_of_child(robot, link);
     if (joint == nullptr) throw FileError(urdf.string() + ": no joint carries camera link '" + link + "'");
-    move_joint(document, joint, {shift, 0.0, 0.0});
+    move_joint(document, joint, moved);
   }
-  for (const auto* list : {&correction.offsets_rad, &correction.known_offsets_rad, &correction.head_offsets_rad}) {
+  for (const auto* list : {&correction.offsets_rad, &correction.known_offsets_rad}) {
     for (const auto& [name, offset] : *list) correct_joint(document, joint_named(name), offset);
   }
   for (auto warning = correction.warnings.rbegin(); warning != correction.warnings.rend(); ++warning) {
@@ -269,30 +277,51 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
   replace_file(out, text.CStr());
 }
 
+namespace {
+
+/// What is known beyond the URDF and beyond joint offsets: the extended model, with what the replay estimated.
+ErrorModel known_effects(const std::optional<ErrorModel>& model, const JointRoles& roles,
+                         const std::vector<EstimatedParameter>& estimated, const std::string& summary) {
+  ErrorModel all = model ? *model : ErrorModel(roles);
+  for (const auto& p : estimated) {
+    try {
+      auto& effect = all.add(p.effect, {p.joint, p.source});
+      const auto parameters = effect.parameters();
+      const auto at = std::find_if(parameters.begin(), parameters.end(), [&](const auto& q) { return q.name == p.parameter; });
+      if (at == parameters.end()) throw ConfigurationError("'" + p.effect + "' has no parameter '" + p.parameter + "'");
+      at->value = p.value * at->si_per_unit;
+    } catch (const ConfigurationError& e) {
+      throw FileError(summary + ": estimate.effects: " + e.what());
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
 std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup, const StereoRig& rig,
                               const std::filesystem::path& out, bool anyway) {
   Correction correction = read_correction(summary, anyway);
-  const auto robot = setup.load();
+  const auto robot = load_robot(setup, rig);
+  const auto roles = JointRoles::of(robot, setup, rig);
   std::optional<ErrorModel> model;
-  std::vector<AppliedEffect> applied;
-  if (!setup.extended_model.empty()) {
-    model = ErrorModel::load(setup.extended_model, JointRoles::of(robot, setup, rig));
-    applied = add_extended_model(*model, robot, setup, rig, correction);
-  }
+  if (!setup.extended_model.empty()) model = ErrorModel::load(setup.extended_model, roles);
   std::ifstream stream(summary);
   const auto json = nlohmann::ordered_json::parse(stream);
   check_same_extended_model(summary, json, setup, model);
   check_same_robot(summary, json, setup, model_hash_of(setup, *robot, model), anyway, correction.warnings);
+  const auto all = known_effects(model, roles, correction.effects, summary.string());
+  const auto applied = add_effects(all, robot, setup, rig, correction);
   make_folder(out);
   write_corrected_urdf(setup.model.urdf, correction, out / "corrected.urdf");
   std::string yaml = "# encoder = true + offset: subtract from every encoder reading. Degrees.\n";
   std::string delta =
       "# deg to add to each joint's calibrationDelta (the calibrator adds it to the zero, which lowers\n"
       "# the reading by as much)\n";
-  if (model) {
+  if (all.size() > 0) {
     const std::string note =
-        "# Estimated with an extended model; they hold together with it. Of it this file has nothing:\n"
-        "# what_was_applied.txt says where each of its effects went.\n";
+        "# Estimated together with other effects, and right together with them; what_was_applied.txt says where each\n"
+        "# of them went.\n";
     yaml += note;
     delta += note;
   }
@@ -305,33 +334,40 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
   yaml += "version: 1\noffset_deg:\n" + joints_yaml(correction.offsets_rad);
   yaml += "stddev_deg:\n" + joints_yaml(correction.sd_rad);
   delta += joints_delta(correction.offsets_rad);
-  if (!correction.head_offsets_rad.empty()) {
+  std::vector<std::pair<std::string, double>> head, head_sd;
+  std::string others;
+  for (const auto& p : correction.effects) {
+    if (p.effect == kHeadOffset) {
+      // Encoder = true + offset, and the effect is true minus encoder.
+      head.emplace_back(p.joint, radians(-p.value));
+      head_sd.emplace_back(p.joint, radians(p.sd));
+    } else {
+      const auto name = make_effect(p.effect, {p.joint, p.source}, roles)->description() + " " + p.parameter;
+      others += fmt::format("  {}: {{value: {:.6g}, stddev: {:.6g}, unit: \"{}\"}}\n", name, p.value, p.sd, p.unit);
+    }
+  }
+  if (!head.empty()) {
     yaml += "# Of the head's joints. Arm and head offsets hold together: apply both or neither.\n";
-    yaml += "head_offset_deg:\n" + joints_yaml(correction.head_offsets_rad);
-    yaml += "head_stddev_deg:\n" + joints_yaml(correction.head_sd_rad);
-    delta += "# head; holds together with the arm: apply both or neither\n";
-    delta += joints_delta(correction.head_offsets_rad);
+    yaml += "head_offset_deg:\n" + joints_yaml(head) + "head_stddev_deg:\n" + joints_yaml(head_sd);
+    delta += "# head; holds together with the arm: apply both or neither\n" + joints_delta(head);
   }
-  if (!correction.nuisances.empty()) {
-    yaml += "# Estimated beside the offsets; not to be applied.\nnuisance:\n";
-    for (const auto& [name, value] : correction.nuisances) yaml += fmt::format("  {}: {:.6g}\n", name, value);
-  }
+  if (!others.empty()) yaml += "# What else was estimated.\neffects:\n" + others;
   replace_file(out / "offsets.yaml", yaml);
   replace_file(out / "calibration_delta.txt", delta);
   std::string files =
       warnings + fmt::format("corrected URDF        {}\noffsets by joint      {}\niCub calibrationDelta {}\n",
                              (out / "corrected.urdf").string(), (out / "offsets.yaml").string(),
                              (out / "calibration_delta.txt").string());
-  if (!model) return files;
+  if (applied.empty()) return files;
   const bool cameras =
       std::any_of(applied.begin(), applied.end(), [](const auto& a) { return a.applied == "cameras.yaml"; });
   if (cameras) {
-    replace_file(out / "cameras.yaml", cameras_yaml(model->corrected(rig)));
+    replace_file(out / "cameras.yaml", cameras_yaml(all.corrected(rig)));
     files += fmt::format("camera intrinsics     {}\n", (out / "cameras.yaml").string());
   }
-  const std::string report = applied_text(applied);
+  const std::string report = applied_text(applied, model.has_value());
   replace_file(out / "what_was_applied.txt", report);
-  files += fmt::format("extended model        {}\n\n{}", (out / "what_was_applied.txt").string(), report);
+  files += fmt::format("where effects went    {}\n\n{}", (out / "what_was_applied.txt").string(), report);
   return files;
 }
 

@@ -1,36 +1,11 @@
 #include <algorithm>
-#include <map>
+#include <optional>
 
 #include "bodyschema/effects/corrected_kinematics.hpp"
 #include "bodyschema/pipeline/export_correction.hpp"
 
 namespace bodyschema {
 namespace {
-
-/// What a URDF or a list of intrinsics cannot hold, and what can be done instead.
-const std::map<std::string, std::string> kRemarks = {
-    {"compliance", "the joint gives way with gravity's torque, which depends on the posture"},
-    {"payload", "the arm sags under the load; take the load off, or correct in the controller"},
-    {"backlash", "depends on the direction of motion; approach targets from one side"},
-    {"encoder_gain", "scale the reading, offset taken off, by 1 + gain where the encoder is read"},
-    {"eccentricity", "add sine * sin q + cosine * cos q where the encoder is read"},
-    {"joint_coupling", "correct the coupling matrix where encoders are read"},
-    {"latency", "stamp the pictures earlier by the delay"},
-    {"camera_skew", "stamp the right camera's pictures later by the skew"},
-    {"silhouette_bias", "belongs to the segmentation, not to the robot"},
-    {"mesh_scale", "scale the visual meshes; collision meshes may be right"},
-    {"finger_posture", "the finger encoders' zero; recalibrate the hand"},
-    {"drift", "changes with time: the replay's offsets are those at its end; calibrate again"},
-    {"slip", "happened once: the replay's offsets are those after it"}};
-
-bool in_cameras(const std::string& name) {
-  return name == "focal_length" || name == "principal_point" || name == "distortion";
-}
-
-bool in_urdf(const std::string& name) {
-  return name == "head_offset" || name == "vergence" || name == "link_length" || name == "axis_tilt" ||
-         name == "axis_shift" || name == "baseline" || name == "base_shift";
-}
 
 Instant at_rest(Eigen::Index joints, std::size_t camera) {
   Instant at;
@@ -76,9 +51,27 @@ JointPlacement shifted_base(const std::shared_ptr<const RobotModel>& robot, cons
   return {joint.name, 0.0, X_WL.front().linear().transpose() * shift_W, Eigen::Vector3d::Zero()};
 }
 
+/// A camera's corrected frame in its own of the URDF; nothing where it stays.
+std::optional<Pose> camera_motion(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                                  const StereoRig& rig, std::size_t camera, const Corrections& change) {
+  std::vector<std::string> links;
+  for (const auto& c : rig.cameras) links.push_back(c.link);
+  CorrectedKinematics kinematics(robot, {setup.hand_link}, links);
+  const auto q = setup.default_joints(*robot);
+  Corrections cameras_alone(robot->joint_count(), change.shapes.size());
+  std::vector<Pose> X_CP(1);
+  kinematics.compute(q, cameras_alone, camera, X_CP);
+  const Pose X_WC = kinematics.X_WC();
+  cameras_alone.camera = change.camera;
+  kinematics.compute(q, cameras_alone, camera, X_CP);
+  const Pose X = X_WC.inverse(Eigen::Isometry) * kinematics.X_WC();
+  if (X.isApprox(Pose::Identity(), 1e-12)) return std::nullopt;
+  return X;
+}
+
 }  // namespace
 
-std::vector<AppliedEffect> add_extended_model(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
+std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
                                               const RobotSetup& setup, const StereoRig& rig, Correction& correction) {
   const auto joints = robot->joint_count();
   std::vector<AppliedEffect> list;
@@ -86,15 +79,16 @@ std::vector<AppliedEffect> add_extended_model(const ErrorModel& model, const std
     const Effect& effect = model[e];
     if (effect.name() == "joint_offset") continue;
     AppliedEffect entry{describe(effect), "", ""};
-    if (in_cameras(effect.name())) {
+    const EffectKind& kind = effect_kind(effect.name());
+    if (kind.home == EffectHome::kCameras) {
       entry.applied = "cameras.yaml";
-    } else if (in_urdf(effect.name())) {
+    } else if (kind.home == EffectHome::kUrdf) {
       entry.applied = "corrected.urdf";
       for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-        Corrections change(joints);
+        Corrections change = model.roles().no_corrections();
         effect.apply(at_rest(joints, c), change);
-        if (change.camera.shift_x_m != 0.0) {
-          correction.camera_shifts_m.emplace_back(rig.cameras[c].link, change.camera.shift_x_m);
+        if (auto moved = camera_motion(robot, setup, rig, c, change)) {
+          correction.camera_motions.emplace_back(rig.cameras[c].link, *moved);
         }
         if (c > 0) continue;  // the rest changes for all cameras alike
         if (change.base_shift_m.norm() > 0.0) {
@@ -108,8 +102,8 @@ std::vector<AppliedEffect> add_extended_model(const ErrorModel& model, const std
           if (!adjustment.is_zero()) correction.placements.push_back(placed(robot, setup, rig, j, adjustment));
         }
       }
-    } else if (const auto remark = kRemarks.find(effect.name()); remark != kRemarks.end()) {
-      entry.remark = remark->second;
+    } else {
+      entry.remark = kind.remark;
     }
     list.push_back(std::move(entry));
   }

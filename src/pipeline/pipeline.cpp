@@ -5,9 +5,8 @@
 #include <chrono>
 #include <stdexcept>
 
-#include "bodyschema/bus/yarp_import.hpp"
-#include "bodyschema/core/nearest_name.hpp"
-#include "bodyschema/effects/online_error_model.hpp"
+#include "bodyschema/imports/joint_mapping.hpp"
+#include "bodyschema/imports/yarp_import.hpp"
 #include "model_hash.hpp"
 
 namespace bodyschema {
@@ -23,22 +22,20 @@ StereoRig corrected(const StereoRig& rig, const std::optional<ErrorModel>& model
   return model ? model->corrected(rig) : rig;
 }
 
+/// What of an extended model is not in the rig already.
+ErrorModel without_intrinsics(const std::optional<ErrorModel>& model, const std::shared_ptr<const RobotModel>& robot,
+                              const RobotSetup& setup, const StereoRig& rig) {
+  ErrorModel rest(JointRoles::of(robot, setup, rig));
+  for (std::size_t e = 0; model && e < model->size(); ++e) {
+    if (effect_kind((*model)[e].name()).home != EffectHome::kCameras) rest.add((*model)[e].clone());
+  }
+  return rest;
+}
+
 std::vector<std::string> links_of(const StereoRig& rig) {
   std::vector<std::string> links;
   for (const auto& camera : rig.cameras) links.push_back(camera.link);
   return links;
-}
-
-/// The robot, with every camera on one of its links.
-std::shared_ptr<const RobotModel> load(const RobotSetup& setup, const Configuration& cameras) {
-  auto robot = setup.load();
-  for (const auto& camera : StereoRig::from(cameras).cameras) {
-    if (robot->has_link(camera.link)) continue;
-    cameras.section(camera.name)
-        .fail("link", fmt::format("a link of robot '{}'; did you mean '{}'?", robot->name(),
-                                  nearest_name(camera.link, robot->link_names())));
-  }
-  return robot;
 }
 
 VisionSetup by(std::optional<SegmentationMethod> method, VisionSetup vision) {
@@ -52,14 +49,17 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
     : setup_(RobotSetup::from(configuration.section("robot"))),
       vision_(by(method, VisionSetup::from(configuration.section("vision")))),
       bus_(BusOptions::from(configuration.section("bus"))), options_(EstimatorOptions::from(configuration)),
-      robot_(load(setup_, configuration.section("cameras"))),
+      robot_(load_robot(setup_, StereoRig::from(configuration.section("cameras")))),
       error_model_(load_error_model(setup_, robot_, StereoRig::from(configuration.section("cameras")))),
       rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
+      beliefs_(Beliefs::from(configuration, JointRoles::of(robot_, setup_, rig_), rig_, options_)),
       background_watch_(robot_, links_of(rig_)), background_turned_rad_(rig_.cameras.size(), 0.0),
-      estimator_(robot_, setup_, rig_, options_), configuration_hash_(configuration.hash()),
+      estimator_(robot_, setup_, rig_, beliefs_, options_, without_intrinsics(error_model_, robot_, setup_, rig_)),
+      configuration_hash_(configuration.hash()),
       model_hash_(model_hash_of(setup_, *robot_, error_model_)) {
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
+  if (configuration.has("import")) JointMapping::from(configuration.section("import"));
   for (const auto& camera : rig_.cameras) {
     if (vision_.method == SegmentationMethod::kBackgroundPicture &&
         !vision_.background_pictures.contains(camera.name)) {
@@ -70,19 +70,20 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
     Segmenter segmenter(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height,
                         undistorter ? &*undistorter : nullptr);
     BinaryMask seen = undistorter ? undistorter->valid() : BinaryMask();
-    eyes_.push_back({std::move(segmenter), std::move(undistorter), std::move(seen)});
+    eyes_.push_back({std::move(segmenter), GivenMask(vision_), std::move(undistorter), std::move(seen)});
   }
   changes_.resize(eyes_.size());
 }
 
 ObservationStream Pipeline::make_stream() const {
-  ObservationStream stream(robot_, setup_, rig_, bus_);
+  BusOptions bus = bus_;
+  bus.synchroniser.masks = vision_.method == SegmentationMethod::kGiven;
+  ObservationStream stream(robot_, setup_, rig_, bus);
   if (vision_.method == SegmentationMethod::kBackgroundPicture) {
     for (std::size_t c = 0; c < eyes_.size(); ++c) {
       stream.expect_channels(c, eyes_[c].segmenter.background().channels);
     }
   }
-  if (error_model_) stream.set_follower(std::make_unique<OnlineErrorModel>(robot_, setup_, *error_model_));
   return stream;
 }
 
@@ -156,6 +157,13 @@ Pipeline::Looks Pipeline::look(const Observation& observation) {
     look.change = eye.picture.look(seen.image, seen.joints.q);
     if (frozen(look.change)) continue;
     if (eye.undistorter) look.straightened = eye.undistorter->apply(seen.image);
+    if (vision_.method == SegmentationMethod::kGiven) {
+      if (seen.given_mask.empty()) continue;  // as if it had seen nothing
+      eye.given.read(seen.given_mask, eye.undistorter ? &*eye.undistorter : nullptr, look.mask, look.valid,
+                     look.coverage);
+      if (!eye.seen.empty()) look.leave_out_all_but(eye.seen);
+      continue;
+    }
     std::optional<BinaryMask> predicted;
     if (vision_.method == SegmentationMethod::kStatistics) {
       predicted = estimator_.predicted_silhouette(observation, c, true);

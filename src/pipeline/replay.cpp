@@ -67,9 +67,7 @@ Json error_json(const HandError& error) {
 /// What every frame was predicted from, to judge the final estimate over the whole log.
 struct SeenFrame {
   std::array<Microseconds, 2> utime{-1, -1};
-  std::array<Eigen::VectorXd, 2> q;
-  std::array<std::optional<Corrections>, 2> corrections;
-  [[nodiscard]] Exposure exposure(std::size_t c) const { return {q[c], corrections[c] ? &*corrections[c] : nullptr}; }
+  std::array<Exposure, 2> exposure;
 };
 
 void write_overlay(Pipeline& pipeline, const Observation& observation, const Estimate& estimate,
@@ -100,9 +98,7 @@ class Replay {
     if (pipeline_.error_model()) spdlog::info("extended model: {}", describe(*pipeline_.error_model()));
     std::size_t expected = count_frames();
     for_each("replay", [&](Observation& o, const Observation* next) { take(o, next, expected); });
-    if (frames_.empty()) {
-      throw DataError(options_.log.string() + ": no synchronised pictures and encoders in this log; " + complaint_);
-    }
+    if (frames_.empty()) throw DataError(options_.log.string() + ": " + why_nothing_was_seen());
     for (std::size_t c = 0; c < pipeline_.rig().cameras.size(); ++c) {
       const bool seen =
           std::any_of(frames_.begin(), frames_.end(), [&](const SeenFrame& frame) { return frame.utime[c] >= 0; });
@@ -157,6 +153,24 @@ class Replay {
     }
   }
 
+  /// Of a log without a single instant: which part is missing, or what is wrong with its pictures.
+  [[nodiscard]] std::string why_nothing_was_seen() const {
+    const std::string lost = statistics_.lost_pictures(0.0);
+    if (lost.empty()) return "no synchronised pictures and encoders in this log; " + complaint_;
+    std::string text = "no picture can be used: " + lost;
+    if (statistics_.faults[static_cast<std::size_t>(MessageFault::kWrongSize)] > 0) {
+      for (const auto& camera : pipeline_.rig().cameras) {
+        text += fmt::format("; camera '{}' is configured as {}x{} (cameras.{}.width, .height)", camera.name,
+                            camera.intrinsics.width, camera.intrinsics.height, camera.name);
+      }
+    }
+    if (statistics_.synchroniser.dropped(DropReason::kNoMask) > 0) {
+      text += fmt::format("; vision.method: given needs masks on {}, each with its picture's stamp: {} came",
+                          pipeline_.bus().channels().masks, statistics_.synchroniser.masks);
+    }
+    return text;
+  }
+
   std::size_t count_frames() {
     if (options_.overlays <= 0) return 0;
     LogReader log(options_.log);
@@ -174,8 +188,7 @@ class Replay {
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
       if (!observation.cameras[c]) continue;
       frame.utime[c] = observation.cameras[c]->utime;
-      frame.q[c] = observation.cameras[c]->joints.q;
-      frame.corrections[c] = observation.cameras[c]->corrections;
+      frame.exposure[c] = pipeline_.estimator().exposure(c);
       if (truth_ && c < estimate.X_CP.size()) {
         if (const TruthInstant* truth = truth_->at(frame.utime[c])) {
           json["error_" + pipeline_.rig().cameras[c].name] =
@@ -351,8 +364,8 @@ class Replay {
         const TruthInstant* truth = truth_->at(frame.utime[c]);
         if (truth == nullptr) continue;
         const auto& intrinsics = pipeline_.rig().cameras[c].intrinsics;
-        all.add(hand_error(pipeline_.estimator().hand_pose(frame.exposure(c), c, false), *truth, c, intrinsics),
-                hand_error(pipeline_.estimator().hand_pose(frame.exposure(c), c, last_), *truth, c, intrinsics));
+        all.add(hand_error(pipeline_.estimator().hand_pose(frame.exposure[c], false), *truth, c, intrinsics),
+                hand_error(pipeline_.estimator().hand_pose(frame.exposure[c], last_), *truth, c, intrinsics));
       }
       row(fmt::format("{} eye, last {} frames", name, tail), last_frames);
       row(fmt::format("{} eye, final offsets, all frames", name), all);

@@ -2,141 +2,34 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <fstream>
 #include <set>
 #include <spdlog/fmt/fmt.h>
-#include <tinyxml2.h>
+#include <spdlog/fmt/ranges.h>
 
+#include "bodyschema/camera/camera_info.hpp"
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/core/write_file.hpp"
+#include "bodyschema/imports/camera_pose_file.hpp"
+#include "bodyschema/imports/stills.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/robot/forward_kinematics.hpp"
 #include "bodyschema/robot/robot_model.hpp"
+#include "urdf_outline.hpp"
 
 namespace bodyschema {
 namespace {
 
 namespace fs = std::filesystem;
-using tinyxml2::XMLElement;
 
 constexpr double kGuessedFieldOfView_rad = 1.05;  // 60 deg across, a common camera
+constexpr double kPairSd_deg = 0.1, kPairSd_mm = 1.0;  // of a stereo pair that was calibrated as one
 
-struct Joint {
-  std::string name, parent, child;
-  bool movable = false;  ///< by itself: not fixed, no mimic
-  bool fixed = false;
-};
-
-std::string attribute(const XMLElement* element, const char* name) {
-  const char* text = element != nullptr ? element->Attribute(name) : nullptr;
-  return text != nullptr ? text : "";
+bool among(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
 }
-
-/// NAME of package://NAME/...; empty: another kind of name.
-std::string package_of(const std::string& mesh) {
-  static const std::string kScheme = "package://";
-  if (mesh.rfind(kScheme, 0) != 0) return "";
-  return mesh.substr(kScheme.size(), mesh.find('/', kScheme.size()) - kScheme.size());
-}
-
-constexpr const char* kNotAUrdf = "not a URDF (xacro files are converted first: xacro arm.urdf.xacro > arm.urdf)";
-
-/// Throws where the service could not load it: too large, nested too deep, no tree, and the like.
-void check(const fs::path& urdf) {
-  try {
-    (void)RobotModel::load({urdf, {}, {}});
-  } catch (const FileError& error) {
-    const std::string why = error.what(), start = urdf.string() + ": not a usable URDF: ";
-    if (!why.starts_with(start)) throw;
-    throw FileError(urdf.string() + ": " + kNotAUrdf + ": " + why.substr(start.size()));
-  }
-}
-
-/// Which link hangs on which, and which have a shape.
-class Tree {
- public:
-  explicit Tree(const fs::path& urdf) : urdf_(urdf) {
-    check(urdf);
-    tinyxml2::XMLDocument document;
-    const auto error = document.LoadFile(urdf.c_str());
-    const XMLElement* robot = document.FirstChildElement("robot");
-    if (error != tinyxml2::XML_SUCCESS || robot == nullptr) {
-      throw FileError(urdf.string() + ": " + kNotAUrdf);
-    }
-    for (auto* link = robot->FirstChildElement("link"); link != nullptr; link = link->NextSiblingElement("link")) {
-      names_.push_back(attribute(link, "name"));
-      for (auto* visual = link->FirstChildElement("visual"); visual != nullptr;
-           visual = visual->NextSiblingElement("visual")) {
-        with_shape_.insert(names_.back());
-        const auto* geometry = visual->FirstChildElement("geometry");
-        const auto* mesh = geometry != nullptr ? geometry->FirstChildElement("mesh") : nullptr;
-        if (const auto package = package_of(attribute(mesh, "filename")); !package.empty()) packages_.insert(package);
-      }
-    }
-    for (auto* element = robot->FirstChildElement("joint"); element != nullptr;
-         element = element->NextSiblingElement("joint")) {
-      Joint joint{attribute(element, "name"), attribute(element->FirstChildElement("parent"), "link"),
-                  attribute(element->FirstChildElement("child"), "link"), false, attribute(element, "type") == "fixed"};
-      joint.movable = !joint.fixed && element->FirstChildElement("mimic") == nullptr;
-      if (attribute(element, "type") == "prismatic") sliding_.insert(joint.name);
-      above_[joint.child] = joint;
-      below_[joint.parent].push_back(joint);
-    }
-  }
-
-  void require(const std::string& link, const std::string& option) const {
-    if (std::find(names_.begin(), names_.end(), link) != names_.end()) return;
-    throw ConfigurationError(fmt::format("{} '{}': no such link in {}; did you mean '{}'?", option, link,
-                                         urdf_.string(), nearest_name(link, names_)));
-  }
-  /// From the root down to a link.
-  [[nodiscard]] std::vector<Joint> chain(std::string link) const {
-    std::vector<Joint> joints;
-    for (auto at = above_.find(link); at != above_.end(); at = above_.find(link)) {
-      if (joints.size() > above_.size()) throw FileError(urdf_.string() + ": link '" + link + "' hangs on itself");
-      joints.insert(joints.begin(), at->second);
-      link = at->second.parent;
-    }
-    return joints;
-  }
-  /// The link and what hangs on it, through fixed joints only or through all.
-  void collect(const std::string& link, bool only_fixed, std::vector<std::string>& links,
-               std::vector<std::string>& joints) const {
-    if (std::find(links.begin(), links.end(), link) != links.end()) return;
-    links.push_back(link);
-    const auto at = below_.find(link);
-    if (at == below_.end()) return;
-    for (const auto& joint : at->second) {
-      if (only_fixed && !joint.fixed) continue;
-      if (joint.movable) joints.push_back(joint.name);
-      collect(joint.child, only_fixed, links, joints);
-    }
-  }
-  [[nodiscard]] bool slides(const std::string& joint) const { return sliding_.contains(joint); }
-  [[nodiscard]] bool has_shape(const std::string& link) const { return with_shape_.contains(link); }
-  /// Folders above the URDF that hold the packages its meshes are in, as in a ROS workspace.
-  [[nodiscard]] std::vector<fs::path> mesh_roots() const {
-    std::vector<fs::path> roots;
-    for (const auto& package : packages_) {
-      fs::path folder = fs::absolute(urdf_).lexically_normal().parent_path();
-      std::error_code ignored;
-      while (folder.has_relative_path() && !fs::is_directory(folder / package, ignored)) folder = folder.parent_path();
-      if (!fs::is_directory(folder / package, ignored)) continue;
-      if (std::find(roots.begin(), roots.end(), folder) == roots.end()) roots.push_back(folder);
-    }
-    return roots;
-  }
-
- private:
-  fs::path urdf_;
-  std::vector<std::string> names_;
-  std::set<std::string> with_shape_;
-  std::set<std::string> sliding_;                    ///< joints
-  std::set<std::string> packages_;                   ///< named by the meshes
-  std::map<std::string, Joint> above_;               ///< by child
-  std::map<std::string, std::vector<Joint>> below_;  ///< by parent
-};
 
 std::string yaml(const std::string& name) {
   static constexpr const char* kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-";
@@ -166,39 +59,36 @@ struct Parts {
   std::vector<std::string> others_m;  ///< those of the others that slide
 };
 
-Parts parts_of(const Tree& tree, const StarterOptions& options) {
+Parts parts_of(const UrdfOutline& urdf, const std::string& hand_link, const std::vector<std::string>& camera_links) {
   std::vector<std::string> camera_joints;
-  for (const auto& camera : options.camera_links) {
-    for (const auto& joint : tree.chain(camera)) {
+  for (const auto& camera : camera_links) {
+    for (const auto& joint : urdf.chain(camera)) {
       if (joint.movable) camera_joints.push_back(joint.name);
     }
   }
-  const auto in = [](const std::vector<std::string>& names, const std::string& name) {
-    return std::find(names.begin(), names.end(), name) != names.end();
-  };
   Parts parts;
   std::vector<std::string> links;
   std::vector<std::string> shared;
-  const auto arm = tree.chain(options.hand_link);
+  const auto arm = urdf.chain(hand_link);
   for (const auto& joint : arm) {
-    if (joint.movable) (in(camera_joints, joint.name) ? shared : parts.arm).push_back(joint.name);
+    if (joint.movable) (among(camera_joints, joint.name) ? shared : parts.arm).push_back(joint.name);
     std::vector<std::string> none;
-    if (!parts.arm.empty()) tree.collect(joint.child, true, links, none);
+    if (!parts.arm.empty()) urdf.collect(joint.child, true, links, none);
   }
   // What hangs on the hand comes last, whether it is fixed there or moves.
   std::vector<std::string> hand;
-  tree.collect(options.hand_link, false, hand, parts.others);
-  std::erase_if(links, [&](const auto& link) { return in(hand, link); });
+  urdf.collect(hand_link, false, hand, parts.others);
+  std::erase_if(links, [&](const auto& link) { return among(hand, link); });
   links.insert(links.end(), hand.begin(), hand.end());
   std::set<std::string> seen;
   for (const auto& link : links) {
-    if (tree.has_shape(link) && seen.insert(link).second) parts.rendered.push_back(link);
+    if (urdf.has_shape(link) && seen.insert(link).second) parts.rendered.push_back(link);
   }
   for (const auto& joint : camera_joints) {
-    if (!in(shared, joint) && !in(parts.head, joint)) parts.head.push_back(joint);
+    if (!among(shared, joint) && !among(parts.head, joint)) parts.head.push_back(joint);
   }
   parts.others.insert(parts.others.begin(), shared.begin(), shared.end());
-  const auto slides = [&](const std::string& joint) { return tree.slides(joint); };
+  const auto slides = [&](const std::string& joint) { return urdf.slides(joint); };
   // Published like any other, but no offset of them is estimated.
   std::erase_if(parts.arm, slides);
   std::erase_if(parts.head, slides);
@@ -207,122 +97,426 @@ Parts parts_of(const Tree& tree, const StarterOptions& options) {
   return parts;
 }
 
-std::string robot_yaml(const StarterOptions& options, const Parts& parts, const std::vector<fs::path>& mesh_roots,
-                       double focal_px) {
-  const auto from_here = [&](const fs::path& path) {
-    return fs::proximate(fs::absolute(path), fs::absolute(options.out)).string();
-  };
-  std::vector<std::string> roots;
-  for (const auto& root : mesh_roots) roots.push_back(from_here(root));
-  std::string text = fmt::format(
-      "# Written from {}; every key is explained in config/icub_right/robot.yaml.\n"
-      "version: 1\n\nrobot:\n  urdf: {}\n"
-      "  mesh_search_roots: {}             # folders in which package://... is looked for\n"
-      "  # What the cameras see moving; leave out what is always hidden.\n"
-      "  rendered_links: {}\n  hand_link: {}\n"
-      "  fingertip_links: []               # links at the fingertips, for errors there\n"
-      "  estimated_joints: {}\n",
-      yaml(options.urdf.filename().string()), yaml(from_here(options.urdf)), list(roots), list(parts.rendered),
-      yaml(options.hand_link), list(parts.arm));
-  if (!parts.head.empty()) text += fmt::format("  head_joints: {}\n", list(parts.head));
-  const auto fix = [&](const char* unit, const std::vector<std::string>& joints) {
-    if (joints.empty()) return;
-    text += fmt::format("  # {0}; take out the joints that the robot publishes.\n  fixed_joints_{0}:\n", unit);
-    for (const auto& joint : joints) text += fmt::format("    {}: 0\n", yaml(joint));
-  };
-  fix("deg", parts.others);
-  fix("m", parts.others_m);
-  text +=
-      "  gravity_m_s2: [0, 0, -9.81]       # root frame\n\n"
-      "# Focal lengths fx, fy and principal point cx, cy in px; distortion k1 k2 p1 p2 k3: "
-      "OpenCV's calibration.\n"
-      "cameras:\n";
-  static constexpr const char* kNames[] = {"left", "right"};
-  for (std::size_t c = 0; c < options.camera_links.size(); ++c) {
-    text += fmt::format(
-        "  {}:\n    link: {}\n    width: {}\n    height: {}\n    fx: {:.6g}\n    fy: {:.6g}\n    "
-        "cx: {}\n    cy: {}\n"
-        "    distortion: [0, 0, 0, 0, 0]\n",
-        kNames[c], yaml(options.camera_links[c]), options.width, options.height, focal_px, focal_px,
-        0.5 * (options.width - 1), 0.5 * (options.height - 1));
+/// One camera as it will stand in the configuration.
+struct StarterCamera {
+  std::string name;
+  std::string link;        ///< with OpenCV axes; empty: none is known
+  std::optional<Pose> X_base;  ///< on `link`, where it was given
+  PinholeIntrinsics k;
+  std::array<double, 5> distortion{};
+  std::string source;      ///< of the intrinsics; empty: guessed
+  std::optional<Pose> X_first;  ///< in the first camera, where a calibration of the pair says so
+  [[nodiscard]] bool unknown() const { return link.empty(); }
+};
+
+class Starter {
+ public:
+  explicit Starter(const StarterOptions& options) : o_(options), urdf_(options.urdf) {
+    if (!o_.stills.empty()) {
+      stills_ = StillsFolder::list(o_.stills);
+      columns_ = StillsColumns::read(o_.stills);
+    }
+    find_hand();
+    find_cameras();
+    std::vector<std::string> links;
+    for (const auto& camera : cameras_) links.push_back(camera.link.empty() ? urdf_.root() : camera.link);
+    parts_ = parts_of(urdf_, hand_, links);
+    if (parts_.arm.empty()) {
+      throw ConfigurationError(fmt::format("--hand '{}': no joint moves it against the cameras", hand_));
+    }
+    if (parts_.rendered.empty()) throw FileError(o_.urdf.string() + ": no link of the arm has a <visual> shape");
+    add_base(links);
+    masks_ = o_.masks.value_or(stills_ && !stills_->masks.empty());
+    look_at_columns();
   }
-  return text;
-}
 
-std::string estimator_yaml(const StarterOptions& options) {
-  return fmt::format(
-      "# The included files of config/ are the installed ones and explain every key.\n"
-      "include: [config/estimator.yaml, config/bus.yaml, config/vision.yaml, "
-      "robot.yaml]\n"
-      "vision:\n"
-      "  method: statistics                # or single_colour, learned_background: "
-      "docs/calibrate_my_robot.md\n"
-      "bus:\n"
-      "  channel_prefix: {}\n",
-      yaml(options.channel_prefix));
-}
+  StarterReport write() {
+    make_folder(o_.out);
+    write_new(o_.out / "robot.yaml", robot_yaml());
+    write_new(o_.out / "estimator.yaml", estimator_yaml());
+    const bool simulator = std::none_of(cameras_.begin(), cameras_.end(), [](const auto& c) { return c.unknown(); });
+    if (simulator) write_new(o_.out / "simulator.yaml", simulator_yaml());
+    StarterReport report{told(simulator), true};
+    try {
+      const Configuration configuration = Configuration::load(o_.out / "estimator.yaml");
+      const Pipeline pipeline(configuration);
+      report.text += "robot and meshes load\n";
+    } catch (const Error& e) {
+      report.text += fmt::format("to be put right: {}\n", e.what());
+      report.usable = false;
+    }
+    for (const auto& wrong : wrong_) {
+      report.text += fmt::format("to be put right: {}\n", wrong);
+      report.usable = false;
+    }
+    return report;
+  }
 
-/// The distances of the motion are left out: the simulator finds them.
-std::string simulator_yaml(const StarterOptions& options) {
-  return fmt::format(
-      "# A stand-in for the robot, played by bodyschema-sim; every key is explained in\n"
-      "# config/icub_right/simulator.yaml.\n"
-      "include: [config/bus.yaml, robot.yaml]\n"
-      "bus:\n"
-      "  channel_prefix: {}\n"
-      "simulator:\n"
-      "  cameras:\n"
-      "    rate_hz: 30\n"
-      "  motion:\n"
-      "    posture_deg: {{}}                 # of head and fingers; left out: robot.fixed_joints_deg, else 0\n"
-      "    hand_radius_m: 0.1              # m; kept inside the pictures around the hand\n",
-      yaml(options.channel_prefix));
-}
+ private:
+  void find_hand() {
+    hand_ = o_.hand_link;
+    if (!hand_.empty()) return urdf_.require(hand_, "--hand");
+    const auto guess = urdf_.guess_hand();
+    hand_ = guess.link;
+    notes_.push_back(fmt::format("hand: a guess, {}{}", hand_,
+                                 guess.others.empty()
+                                     ? ""
+                                     : fmt::format("; it could be {} as well (--hand)", fmt::join(guess.others, " or "))));
+  }
 
-void write_new(const fs::path& file, const std::string& text) {
-  std::error_code ignored;
-  if (fs::exists(file, ignored)) throw FileError(file.string() + ": is there already and is not replaced");
-  replace_file(file, text);  // on a full disk nothing half done stands in the way of the next try
-}
+  void find_cameras() {
+    std::vector<std::string> names;
+    if (stills_) {
+      for (const auto& [name, pictures] : stills_->images) names.push_back(name);
+      if (names.size() > 2) {
+        // Those that are named are meant.
+        std::erase_if(names, [&](const std::string& name) {
+          return std::none_of(o_.camera_links.begin(), o_.camera_links.end(),
+                              [&](const std::string& camera) { return camera.starts_with(name + "="); });
+        });
+        if (names.empty()) {
+          throw ConfigurationError(fmt::format(
+              "{}/images: {} cameras, one or two can be used; name them with the links they are (--camera NAME=LINK), "
+              "or move the others away",
+              o_.stills.string(), stills_->images.size()));
+        }
+      }
+    }
+    std::size_t unnamed = 0;
+    for (const std::string& given : o_.camera_links) {
+      const auto equals = given.find('=');
+      StarterCamera camera;
+      camera.link = given.substr(equals == std::string::npos ? 0 : equals + 1);
+      if (equals != std::string::npos) {
+        camera.name = given.substr(0, equals);
+      } else if (!names.empty()) {
+        camera.name = unnamed < names.size() ? names[unnamed] : "";
+      } else {
+        camera.name = unnamed == 0 ? "left" : "right";
+      }
+      ++unnamed;
+      urdf_.require(camera.link, "--camera");
+      if (stills_ && !stills_->images.contains(camera.name)) {
+        throw ConfigurationError(fmt::format("--camera {}: {}/images has no folder of that camera; it has {}", given,
+                                             o_.stills.string(), fmt::join(names, ", ")));
+      }
+      cameras_.push_back(camera);
+    }
+    if (cameras_.empty()) {
+      if (names.empty()) names.push_back("camera");
+      for (const auto& name : names) cameras_.emplace_back().name = name;
+    }
+    if (o_.camera_infos.size() > cameras_.size()) {
+      throw ConfigurationError(fmt::format("--camera-info: {} files for {} cameras", o_.camera_infos.size(),
+                                           cameras_.size()));
+    }
+    std::vector<std::optional<CameraInfo>> infos;
+    for (std::size_t c = 0; c < cameras_.size(); ++c) infos.push_back(find_intrinsics(c));
+    find_poses();
+    if (cameras_.size() == 2 && cameras_[1].unknown() && infos[0] && infos[1]) {
+      const Pose X = stereo_pose(*infos[0], *infos[1], o_.rectified);
+      constexpr double kApart_m = 1e-3;
+      if (X.translation().norm() > kApart_m) cameras_[1].X_first = X;
+    }
+    for (const auto& camera : cameras_) {
+      if (camera.unknown()) {
+        notes_.push_back(fmt::format("camera {}: its pose is to be found (robot.yaml: pose: unknown)", camera.name));
+      }
+    }
+  }
+
+  std::optional<CameraInfo> find_intrinsics(std::size_t c) {
+    StarterCamera& camera = cameras_[c];
+    const auto picture = picture_size_of(camera.name);
+    fs::path file = c < o_.camera_infos.size() ? o_.camera_infos[c] : fs::path();
+    if (file.empty() && stills_) {
+      const auto found = stills_->camera_infos.find(camera.name);
+      if (found != stills_->camera_infos.end()) file = found->second;
+    }
+    if (file.empty()) {
+      camera.k.width = picture ? picture->width : o_.width;
+      camera.k.height = picture ? picture->height : o_.height;
+      camera.k.fx = camera.k.fy =
+          o_.focal_px > 0.0 ? o_.focal_px : 0.5 * camera.k.width / std::tan(0.5 * kGuessedFieldOfView_rad);
+      camera.k.cx = 0.5 * (camera.k.width - 1);
+      camera.k.cy = 0.5 * (camera.k.height - 1);
+      if (o_.focal_px <= 0.0) {
+        notes_.push_back(fmt::format("camera {}: focal length: a guess, {:.0f} px; fill in your cameras' in robot.yaml, "
+                                     "or give --camera-info",
+                                     camera.name, camera.k.fx));
+      }
+      notes_.push_back(fmt::format("camera {}: principal point: a guess, the picture's middle", camera.name));
+      return std::nullopt;
+    }
+    const CameraInfo info = CameraInfo::read(file);
+    camera.source = file.filename().string();
+    camera.k = o_.rectified ? info.rectified : info.intrinsics;
+    if (!o_.rectified) camera.distortion = info.distortion;
+    if (!o_.rectified && !info.is_rectified()) {
+      notes_.push_back(fmt::format("camera {}: its pictures are taken for those that the lens makes, not for rectified "
+                                   "ones (--rectified)",
+                                   camera.name));
+    }
+    if (picture && *picture != PictureSize{camera.k.width, camera.k.height}) {
+      wrong_.push_back(fmt::format("{} is of pictures of {}x{} px, those of camera {} are {}x{}: calibrate at this size, "
+                                   "or scale the numbers in robot.yaml",
+                                   file.string(), camera.k.width, camera.k.height, camera.name, picture->width,
+                                   picture->height));
+    }
+    return info;
+  }
+
+  [[nodiscard]] std::optional<PictureSize> picture_size_of(const std::string& camera) const {
+    if (!stills_) return std::nullopt;
+    const auto pictures = stills_->images.find(camera);
+    if (pictures == stills_->images.end()) return std::nullopt;
+    return picture_size_in(pictures->second.begin()->second);
+  }
+
+  void find_poses() {
+    if (o_.camera_pose.empty()) return;
+    const CameraPoses poses = CameraPoses::from_argument(o_.camera_pose);
+    urdf_.require(poses.base_link, o_.camera_pose + ": base_link");
+    for (StarterCamera& camera : cameras_) {
+      const auto pose = poses.X_base_optical.find(camera.name);
+      if (pose == poses.X_base_optical.end()) {
+        throw FileError(fmt::format("{}: no pose of camera '{}'", o_.camera_pose, camera.name));
+      }
+      camera.link = poses.base_link;
+      camera.X_base = pose->second;
+    }
+  }
+
+  /// What does not move against the cameras but has a shape: seen, where it stands in their view.
+  void add_base(const std::vector<std::string>& camera_links) {
+    for (const auto& link : camera_links) {
+      const auto joints = urdf_.chain(link);
+      if (std::any_of(joints.begin(), joints.end(), [](const auto& joint) { return !joint.fixed; })) return;
+    }
+    std::vector<std::string> base, unused;
+    urdf_.collect(urdf_.root(), true, base, unused);
+    std::erase_if(base, [&](const auto& link) { return !urdf_.has_shape(link) || among(parts_.rendered, link); });
+    if (base.empty() || !in_view(base)) return;
+    parts_.rendered.insert(parts_.rendered.begin(), base.begin(), base.end());
+    base_ = base;
+  }
+
+  /// Whether any vertex of these links is in any picture; of a camera whose pose is not known it may be.
+  [[nodiscard]] bool in_view(const std::vector<std::string>& links) const {
+    if (std::any_of(cameras_.begin(), cameras_.end(), [](const auto& c) { return c.unknown(); })) return true;
+    try {
+      const auto robot = RobotModel::load({o_.urdf, urdf_.mesh_roots(links), links});
+      std::vector<std::string> frames = links;
+      for (const auto& camera : cameras_) frames.push_back(camera.link);
+      ForwardKinematics kinematics(robot, frames);
+      std::vector<Pose> X_WB(frames.size());
+      kinematics.compute(Eigen::VectorXd::Zero(robot->joint_count()), X_WB);
+      for (std::size_t c = 0; c < cameras_.size(); ++c) {
+        const Pose X_CW = (X_WB[links.size() + c] * cameras_[c].X_base.value_or(Pose::Identity())).inverse();
+        for (std::size_t l = 0; l < links.size(); ++l) {
+          for (const auto& vertex : robot->meshes()[l].mesh.vertices) {
+            const Eigen::Vector3d p_C = X_CW * (X_WB[l] * vertex.cast<double>());
+            if (p_C.z() <= 0.0) continue;
+            const Eigen::Vector2d px = cameras_[c].k.project(p_C);
+            if (px.x() >= 0.0 && px.y() >= 0.0 && px.x() < cameras_[c].k.width && px.y() < cameras_[c].k.height) {
+              return true;
+            }
+          }
+        }
+      }
+      return false;
+    } catch (const Error&) {
+      return false;  // what is wrong with its meshes is said where they are needed
+    }
+  }
+
+  /// Joints that joints.csv has need no fixed value; columns that are no joints are what must be said.
+  void look_at_columns() {
+    if (!columns_) return;
+    const auto recorded = [&](const std::string& joint) { return among(columns_->names, joint); };
+    std::erase_if(parts_.others, recorded);
+    std::erase_if(parts_.others_m, recorded);
+    const auto joints = urdf_.movable_joints();
+    for (const auto& name : columns_->names) {
+      if (!among(joints, name)) strangers_.push_back(name);
+    }
+    std::vector<std::string> missing;
+    for (const auto* some : {&parts_.arm, &parts_.head}) {
+      for (const auto& joint : *some) {
+        if (!recorded(joint)) missing.push_back(joint);
+      }
+    }
+    if (!missing.empty()) {
+      wrong_.push_back(fmt::format(
+          "joints.csv has no column of {}; {}", fmt::join(missing, ", "),
+          strangers_.empty() ? "a joint that was not recorded needs a value under robot.fixed_joints_deg"
+                             : fmt::format("say which of {} is which in estimator.yaml, import.joints",
+                                           fmt::join(strangers_, ", "))));
+    } else if (!strangers_.empty()) {
+      notes_.push_back(fmt::format("columns of joints.csv that are no joints: {}", fmt::join(strangers_, ", ")));
+    }
+    constexpr double kMostRadians = 7.0;
+    double largest = 0.0;
+    for (std::size_t i = 0; i < columns_->names.size(); ++i) {
+      if (!urdf_.slides(columns_->names[i])) largest = std::max(largest, columns_->largest[i]);
+    }
+    in_degrees_ = largest > kMostRadians;
+    if (in_degrees_) {
+      notes_.push_back(fmt::format("joints.csv goes up to {:.4g} and is taken for deg (estimator.yaml: import.unit)",
+                                   largest));
+    }
+  }
+
+  [[nodiscard]] std::string from_here(const fs::path& path) const {
+    return fs::proximate(fs::absolute(path), fs::absolute(o_.out)).string();
+  }
+
+  [[nodiscard]] std::string robot_yaml() const {
+    std::vector<std::string> roots;
+    for (const auto& root : urdf_.mesh_roots(parts_.rendered)) roots.push_back(from_here(root));
+    std::string text = fmt::format(
+        "# Written from {}; every key is explained in config/icub_right/robot.yaml.\n"
+        "version: 1\n\nrobot:\n  urdf: {}\n"
+        "  mesh_search_roots: {}             # folders in which package://... is looked for\n"
+        "  # What the cameras see of the robot; leave out what is always hidden.\n",
+        yaml(o_.urdf.filename().string()), yaml(from_here(o_.urdf)), list(roots));
+    if (!base_.empty()) {
+      text += fmt::format(
+          "  # {} and the cameras do not move against each other: with vision.method learned_background or\n"
+          "  # background_picture it belongs to the background and must be taken out.\n",
+          fmt::join(base_, ", "));
+    }
+    text += fmt::format(
+        "  rendered_links: {}\n  hand_link: {}\n"
+        "  fingertip_links: []               # links at the fingertips, for errors there\n"
+        "  estimated_joints: {}\n",
+        list(parts_.rendered), yaml(hand_), list(parts_.arm));
+    if (!parts_.head.empty()) text += fmt::format("  head_joints: {}\n", list(parts_.head));
+    const auto fix = [&](const char* unit, const std::vector<std::string>& joints) {
+      if (joints.empty()) return;
+      text += fmt::format("  # {0}; take out the joints that the robot publishes.\n  fixed_joints_{0}:\n", unit);
+      for (const auto& joint : joints) text += fmt::format("    {}: 0\n", yaml(joint));
+    };
+    fix("deg", parts_.others);
+    fix("m", parts_.others_m);
+    text +=
+        "  gravity_m_s2: [0, 0, -9.81]       # root frame\n\n"
+        "# Focal lengths fx, fy and principal point cx, cy in px; distortion k1 k2 p1 p2 k3: "
+        "OpenCV's calibration.\n"
+        "cameras:\n";
+    for (std::size_t c = 0; c < cameras_.size(); ++c) text += camera_yaml(c);
+    return text;
+  }
+
+  [[nodiscard]] std::string camera_yaml(std::size_t c) const {
+    const StarterCamera& camera = cameras_[c];
+    std::string text = fmt::format("  {}:\n", yaml(camera.name));
+    if (camera.X_base) {
+      text += fmt::format("    link: {}\n    pose: known                     # or roughly, with pose_sd_deg and "
+                          "pose_sd_mm, or unknown\n    X_link_optical: {}\n",
+                          yaml(camera.link), pose_yaml(*camera.X_base));
+    } else if (!camera.unknown()) {
+      text += fmt::format("    link: {}\n", yaml(camera.link));
+    } else if (camera.X_first) {
+      text += fmt::format(
+          "    beside: {}                    # as their calibration says; x right, y down, z forward\n"
+          "    X_beside_optical: {}\n    pose: roughly\n    pose_sd_deg: {}\n    pose_sd_mm: {}\n",
+          yaml(cameras_.front().name), pose_yaml(*camera.X_first), kPairSd_deg, kPairSd_mm);
+    } else {
+      text += fmt::format(
+          "    link: {}                    # what carries the camera; where on it, is to be found:\n"
+          "    pose: unknown                   # or known, or roughly: X_link_optical, pose_sd_deg, pose_sd_mm\n",
+          yaml(urdf_.root()));
+    }
+    const auto& k = camera.k;
+    text += fmt::format(
+        "    width: {}\n    height: {}\n    fx: {:.8g}{}\n    fy: {:.8g}\n    cx: {:.8g}\n    cy: {:.8g}\n"
+        "    distortion: [{:.8g}]\n",
+        k.width, k.height, k.fx,
+        camera.source.empty() ? o_.focal_px > 0.0 ? "" : "                   # a guess" : "  # " + camera.source, k.fy,
+        k.cx, k.cy, fmt::join(camera.distortion, ", "));
+    return text;
+  }
+
+  [[nodiscard]] std::string estimator_yaml() const {
+    std::string text = fmt::format(
+        "# The included files of config/ are the installed ones and explain every key.\n"
+        "include: [config/estimator.yaml, config/bus.yaml, config/vision.yaml, "
+        "robot.yaml]\n"
+        "vision:\n"
+        "  method: {}                # or {}: "
+        "docs/calibrate_my_robot.md\n"
+        "bus:\n"
+        "  channel_prefix: {}\n",
+        masks_ ? "given" : "statistics", masks_ ? "statistics, without masks" : "single_colour, learned_background",
+        yaml(o_.channel_prefix));
+    if (!in_degrees_ && strangers_.empty()) return text;
+    text += "# Which column of a recording is which joint; docs/import_recordings.md.\nimport:\n";
+    if (in_degrees_) text += "  unit: deg\n";
+    if (strangers_.empty()) return text;
+    text += "  joints:\n";
+    for (const auto& name : strangers_) {
+      text += fmt::format("    {}: \"-\"   # a joint of {}; \"-\": left out\n", yaml(name),
+                          o_.urdf.filename().string());
+    }
+    return text;
+  }
+
+  /// The distances of the motion are left out: the simulator finds them.
+  [[nodiscard]] std::string simulator_yaml() const {
+    return fmt::format(
+        "# A stand-in for the robot, played by bodyschema-sim; every key is explained in\n"
+        "# config/icub_right/simulator.yaml.\n"
+        "include: [config/bus.yaml, robot.yaml]\n"
+        "bus:\n"
+        "  channel_prefix: {}\n"
+        "simulator:\n"
+        "  cameras:\n"
+        "    rate_hz: 30\n"
+        "  motion:\n"
+        "    posture_deg: {{}}                 # of head and fingers; left out: robot.fixed_joints_deg, else 0\n"
+        "    hand_radius_m: 0.1              # m; kept inside the pictures around the hand\n",
+        yaml(o_.channel_prefix));
+  }
+
+  static void write_new(const fs::path& file, const std::string& text) {
+    std::error_code ignored;
+    if (fs::exists(file, ignored)) throw FileError(file.string() + ": is there already and is not replaced");
+    replace_file(file, text);  // on a full disk nothing half done stands in the way of the next try
+  }
+
+  [[nodiscard]] std::string told(bool simulator) const {
+    std::string text = fmt::format("arm: {}\n", fmt::join(parts_.arm, ", "));
+    if (!parts_.head.empty()) text += fmt::format("head: {}\n", fmt::join(parts_.head, ", "));
+    auto fixed = parts_.others;
+    fixed.insert(fixed.end(), parts_.others_m.begin(), parts_.others_m.end());
+    if (!fixed.empty()) {
+      text += fmt::format("taken as fixed at 0 unless you take them out: {}\n", fmt::join(fixed, ", "));
+    }
+    text += fmt::format("seen: {}\n", fmt::join(parts_.rendered, ", "));
+    for (const auto& note : notes_) text += note + '\n';
+    return text + fmt::format("wrote robot.yaml{} estimator.yaml{} in {}\n", simulator ? "," : " and",
+                              simulator ? " and simulator.yaml" : "", o_.out.string());
+  }
+
+  const StarterOptions& o_;
+  UrdfOutline urdf_;
+  std::optional<StillsFolder> stills_;
+  std::optional<StillsColumns> columns_;
+  std::string hand_;
+  std::vector<StarterCamera> cameras_;
+  Parts parts_;
+  std::vector<std::string> base_;       ///< links without motion against the cameras that may be seen
+  std::vector<std::string> strangers_;  ///< columns of joints.csv that are no joints
+  bool masks_ = false, in_degrees_ = false;
+  std::vector<std::string> notes_;  ///< what was guessed
+  std::vector<std::string> wrong_;  ///< what must be put right
+};
 
 }  // namespace
 
-std::string write_starter_configuration(const StarterOptions& options) {
-  const Tree tree(options.urdf);
-  tree.require(options.hand_link, "--hand");
-  for (const auto& camera : options.camera_links) tree.require(camera, "--camera");
-  const Parts parts = parts_of(tree, options);
-  if (parts.arm.empty()) {
-    throw ConfigurationError(fmt::format("--hand '{}': no joint moves it against the cameras", options.hand_link));
-  }
-  if (parts.rendered.empty()) throw FileError(options.urdf.string() + ": no link of the arm has a <visual> shape");
-
-  const double focal_px =
-      options.focal_px > 0.0 ? options.focal_px : 0.5 * options.width / std::tan(0.5 * kGuessedFieldOfView_rad);
-  make_folder(options.out);
-  write_new(options.out / "robot.yaml", robot_yaml(options, parts, tree.mesh_roots(), focal_px));
-  write_new(options.out / "estimator.yaml", estimator_yaml(options));
-  write_new(options.out / "simulator.yaml", simulator_yaml(options));
-
-  std::string told = fmt::format("arm: {}\n", fmt::join(parts.arm, ", "));
-  if (!parts.head.empty()) told += fmt::format("head: {}\n", fmt::join(parts.head, ", "));
-  auto fixed = parts.others;
-  fixed.insert(fixed.end(), parts.others_m.begin(), parts.others_m.end());
-  if (!fixed.empty()) {
-    told += fmt::format("taken as fixed at 0 unless you take them out: {}\n", fmt::join(fixed, ", "));
-  }
-  told += fmt::format("seen: {}\n", fmt::join(parts.rendered, ", "));
-  if (options.focal_px <= 0.0) {
-    told += fmt::format("focal length: a guess, {:.0f} px; fill in your cameras' in robot.yaml\n", focal_px);
-  }
-  told += fmt::format("wrote robot.yaml, estimator.yaml and simulator.yaml in {}\n", options.out.string());
-  try {
-    const Pipeline pipeline(Configuration::load(options.out / "estimator.yaml"));
-    told += "robot and meshes load\n";
-  } catch (const Error& e) {
-    told += fmt::format("to be put right: {}\n", e.what());
-  }
-  return told;
+StarterReport write_starter_configuration(const StarterOptions& options) {
+  return Starter(options).write();
 }
 
 }  // namespace bodyschema

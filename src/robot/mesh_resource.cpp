@@ -50,10 +50,13 @@ fs::path resolve_mesh(const std::string& filename, const std::string& where, con
 
   std::string tried;
   bool escaped = false;
+  std::string outside;  // the folder of a mesh that is there
   for (const auto& base : bases) {
     const fs::path candidate = real(base / rest);  // an absolute `rest` replaces base
     if (std::none_of(roots.begin(), roots.end(), [&](const fs::path& root) { return lies_in(candidate, root); })) {
       escaped = true;
+      std::error_code unreadable;
+      if (fs::is_regular_file(candidate, unreadable)) outside = candidate.parent_path().string();
       continue;
     }
     std::error_code error;
@@ -61,7 +64,8 @@ fs::path resolve_mesh(const std::string& filename, const std::string& where, con
     tried += (tried.empty() ? "" : ", ") + candidate.string();
   }
   if (tried.empty() && escaped) {
-    throw FileError(where + ": mesh '" + filename + "' leads outside the URDF's folder and mesh_search_roots");
+    throw FileError(where + ": mesh '" + filename + "' leads outside the URDF's folder and mesh_search_roots" +
+                    (outside.empty() ? "" : "; allow its place with robot.mesh_search_roots: [" + outside + "]"));
   }
   throw FileError(where + ": mesh '" + filename + "' not found; tried " + tried);
 }

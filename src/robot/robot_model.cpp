@@ -27,6 +27,12 @@ KDL::Frame to_kdl(const urdf::Pose& X) {
   return {KDL::Rotation::Quaternion(r.x, r.y, r.z, r.w), to_kdl(X.position)};
 }
 
+KDL::Frame to_kdl(const Pose& X) {
+  const Eigen::Matrix3d R = X.linear();
+  return {KDL::Rotation(R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2)),
+          KDL::Vector(X.translation().x(), X.translation().y(), X.translation().z())};
+}
+
 Pose to_eigen(const urdf::Pose& X) {
   Pose pose = Pose::Identity();
   const auto& r = X.rotation;
@@ -139,6 +145,20 @@ void build_tree(const UrdfTree& urdf_tree, const std::string& file, RobotModel::
     tree.nodes[i].multiplier = mimic.multiplier;
     tree.nodes[i].offset = mimic.offset;
   }
+}
+
+void add_frame(const AddedFrame& frame, KinematicTree& tree) {
+  const auto parent = tree.node_of_link.find(frame.parent);
+  if (parent == tree.node_of_link.end()) {
+    throw ConfigurationError("frame '" + frame.name + "' cannot be added: there is no link '" + frame.parent + "'");
+  }
+  if (!tree.node_of_link.emplace(frame.name, static_cast<int>(tree.nodes.size())).second) {
+    throw ConfigurationError("frame '" + frame.name + "' cannot be added: there is a link of that name");
+  }
+  TreeNode node;
+  node.segment = KDL::Segment(frame.name, KDL::Joint(KDL::Joint::Fixed), to_kdl(frame.X_PF));
+  node.parent = parent->second;
+  tree.nodes.push_back(std::move(node));
 }
 
 constexpr std::size_t kMaxTriangles = 4'000'000;  // of all rendered links together
@@ -266,6 +286,7 @@ std::shared_ptr<const RobotModel> RobotModel::load(const RobotModelOptions& opti
   impl.name = urdf_tree.model->name_;
   impl.root_link = urdf_tree.model->root_link_->name;
   build_tree(urdf_tree, options.urdf.string(), impl);
+  for (const AddedFrame& frame : options.added_frames) add_frame(frame, impl.tree);
 
   std::set<std::string> rendered;
   std::size_t budget = kMaxTriangles;

@@ -276,6 +276,7 @@ class Daemon {
             pipeline.configuration_hash(),
             channels().cameras,
             channels().joint_state,
+            channels().masks,
             static_cast<int>(pipeline.options().filter.particles),
             pipeline.rig().cameras.size()};
   }

@@ -51,6 +51,7 @@ const char* explain(MessageFault fault) {
     case MessageFault::kUnsupportedFormat: return "the pixel format is not gray, RGB or JPEG";
     case MessageFault::kBrokenPicture: return "a JPEG picture is broken";
     case MessageFault::kOtherKind: return "a picture is gray where colour is expected, or in colour where gray is";
+    case MessageFault::kBadMask: return "a mask has another size than its pictures, or is not gray with 0, 128 and 255";
     case MessageFault::kNone: break;
   }
   return "unknown";
@@ -80,6 +81,15 @@ std::optional<std::string> failed(const HealthFacts& f) {
   return fmt::format("{} frames of the last second could not be worked on: {}", f.failed_since_last, f.frame_failure);
 }
 
+std::string without_masks(const HealthFacts& f) {
+  const auto& s = f.since_last.synchroniser;
+  if (s.masks_late > 0) {
+    return fmt::format("masks on {} come too late, {} of them (bus.mask_wait_ms)", f.masks_channel, s.masks_late);
+  }
+  return s.masks == 0 ? fmt::format("no masks come on {}: does the segmentation run?", f.masks_channel)
+                      : fmt::format("masks on {} do not carry the stamps of pictures", f.masks_channel);
+}
+
 /// Why pictures of the last second did not become estimates.
 std::optional<std::string> dropped(const HealthFacts& f) {
   const auto& drops = f.since_last.synchroniser.images_dropped;
@@ -107,6 +117,7 @@ std::optional<std::string> dropped(const HealthFacts& f) {
       return fmt::format(
           "{} pictures came twice or out of order in the last second: is there a second publisher on {}?", *most,
           f.cameras_channel);
+    case DropReason::kNoMask: return pictures + without_masks(f);
   }
   return std::nullopt;
 }

@@ -38,11 +38,30 @@ joint_offsets_t to_message(const Estimate& estimate, const StereoRig& rig) {
     m.hand_pose_in_camera.push_back(pose);
   }
 
-  m.num_parameters = static_cast<std::int32_t>(estimate.nuisance_names.size());
-  m.parameter_name = estimate.nuisance_names;
-  m.parameter_unit = estimate.nuisance_units;
-  m.parameter_value.assign(estimate.nuisance.data(), estimate.nuisance.data() + estimate.nuisance.size());
-  m.parameter_stddev.assign(estimate.nuisance_sd.data(), estimate.nuisance_sd.data() + estimate.nuisance_sd.size());
+  for (std::size_t k = 0; k < estimate.joint_names.size(); ++k) m.told.push_back(estimate.told(k) ? 1 : 0);
+  m.num_parameters = static_cast<std::int32_t>(estimate.effects.size());
+  for (const auto& parameter : estimate.effects) {
+    m.parameter_name.push_back(parameter.name);
+    m.parameter_unit.push_back(parameter.unit);
+    m.parameter_value.push_back(parameter.value / parameter.si_per_unit);
+    m.parameter_stddev.push_back(parameter.sd / parameter.si_per_unit);
+    m.parameter_prior_stddev.push_back(parameter.prior_sd / parameter.si_per_unit);
+  }
+
+  m.hand_stddev_m = estimate.hand_sd_m;
+  m.verdict = to_string(estimate.verdict);
+  m.innovation = estimate.innovation;
+  m.innovation_dof = estimate.innovation_dof;
+  m.innovation_usual = estimate.innovation_usual;
+  m.postures = static_cast<std::int32_t>(estimate.postures);
+  m.posture_stddev_rad = estimate.posture_sd_rad;
+  m.outline_stddev_px = estimate.outline_sd_px;
+  m.outline_points_alike = estimate.outline_alike;
+  m.changed = estimate.changed;
+  m.misfit = estimate.misfit;
+  m.stalled_joint = estimate.stalled_joint;
+  m.stalled_motion_rad = estimate.stalled_motion_rad;
+  m.cameras_swapped = estimate.cameras_swapped ? 1 : 0;
   return m;
 }
 

@@ -24,6 +24,7 @@ Receiver::Receiver(LcmLink& link, ObservationStream stream, ObservationQueue& qu
   };
   link_.subscribe(stream_.channels().joint_state, kWaitingJoints, handler);
   link_.subscribe(stream_.channels().cameras, kWaitingPictures, handler);
+  if (stream_.expects_masks()) link_.subscribe(stream_.channels().masks, kWaitingPictures, handler);
   facts_.missing_joints = stream_.synchroniser().joints().missing_joints();
 }
 
@@ -76,7 +77,8 @@ void Receiver::receive(const std::string& channel, Bytes message, std::int64_t a
   newest_arrival_us_ = arrived;
 
   const std::lock_guard lock(mutex_);
-  (channel == stream_.channels().cameras ? facts_.pictures_arrived_us : facts_.joints_arrived_us) = arrived;
+  if (channel == stream_.channels().cameras) facts_.pictures_arrived_us = arrived;
+  if (channel == stream_.channels().joint_state) facts_.joints_arrived_us = arrived;
   facts_.bus = stream_.statistics();
   const JointHistory& joints = stream_.synchroniser().joints();
   if (!facts_.missing_joints.empty()) facts_.missing_joints = joints.missing_joints();

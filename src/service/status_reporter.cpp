@@ -48,6 +48,9 @@ void combine(BusStatistics& into, const BusStatistics& other, Operation op) {
   s.joint_messages_without_known_joint = op(s.joint_messages_without_known_joint, t.joint_messages_without_known_joint);
   s.images = op(s.images, t.images);
   s.images_used = op(s.images_used, t.images_used);
+  s.masks = op(s.masks, t.masks);
+  s.masks_late = op(s.masks_late, t.masks_late);
+  s.masks_unused = op(s.masks_unused, t.masks_unused);
   s.observations = op(s.observations, t.observations);
   s.mono_observations = op(s.mono_observations, t.mono_observations);
   s.gaps = op(s.gaps, t.gaps);
@@ -74,6 +77,7 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
   HealthFacts facts;
   facts.cameras_channel = identity_.cameras_channel;
   facts.joints_channel = identity_.joints_channel;
+  facts.masks_channel = identity_.masks_channel;
   facts.picture_age_ms = age_ms(now, received.pictures_arrived_us);
   facts.joints_age_ms = age_ms(now, received.joints_arrived_us);
   facts.estimate_age_ms = age_ms(now, progress.last_estimate_us);

@@ -45,6 +45,7 @@ struct Identity {
   std::string config_hash;
   std::string cameras_channel;
   std::string joints_channel;
+  std::string masks_channel;
   int particles = 0;
   std::size_t camera_count = 1;
 };

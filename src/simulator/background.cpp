@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "bodyschema/simulator/random.hpp"
+#include "texture.hpp"
 
 namespace bodyschema::simulator {
 namespace {
@@ -28,29 +29,6 @@ const std::array<FaceAxes, 6>& face_axes() {
     return result;
   }();
   return axes;
-}
-
-/// Repeatable noise of a lattice point, 0 to 1.
-float lattice(std::int32_t x, std::int32_t y, std::uint32_t salt) {
-  std::uint32_t h = static_cast<std::uint32_t>(x) * 0x85ebca6bu ^ static_cast<std::uint32_t>(y) * 0xc2b2ae35u ^ salt;
-  h ^= h >> 15;
-  h *= 0x2c1b3c6du;
-  h ^= h >> 12;
-  h *= 0x297a2d39u;
-  h ^= h >> 15;
-  return static_cast<float>(h) * 0x1.0p-32f;
-}
-
-float value_noise(float x, float y, std::uint32_t salt) {
-  const float fx = std::floor(x);
-  const float fy = std::floor(y);
-  const auto ix = static_cast<std::int32_t>(fx);
-  const auto iy = static_cast<std::int32_t>(fy);
-  const float ax = x - fx;
-  const float ay = y - fy;
-  const float top = lattice(ix, iy, salt) * (1 - ax) + lattice(ix + 1, iy, salt) * ax;
-  const float bottom = lattice(ix, iy + 1, salt) * (1 - ax) + lattice(ix + 1, iy + 1, salt) * ax;
-  return top * (1 - ay) + bottom * ay;
 }
 
 enum class Fill { kPlain, kStripes, kChecks, kSpeckle, kGradient };
@@ -229,34 +207,17 @@ Eigen::Vector3f Background::look_up(const Eigen::Vector3f& direction) const {
          ay * ((1 - ax) * Colour(texel + 3 * kFaceSize) + ax * Colour(texel + 3 * kFaceSize + 3));
 }
 
-void Background::paint(const CameraModel& camera, const Pose& X_WC, std::vector<float>& picture) const {
-  const auto& k = camera.intrinsics;
+void Background::paint(const Lens& lens, const Pose& X_WC, int v0, int v1, std::vector<float>& picture) const {
+  const auto& k = lens.camera().intrinsics;
   picture.resize(static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height) * 3);
   const Eigen::Matrix3f R_WC = X_WC.linear().cast<float>();
   const Eigen::Vector3f p_WC = X_WC.translation().cast<float>();
   const float free = kRoomRadius_m * kRoomRadius_m - p_WC.squaredNorm();
   const bool inside = free > 0.0f;
-  float* out = picture.data();
-  for (int v = 0; v < k.height; ++v) {
+  float* out = picture.data() + static_cast<std::size_t>(v0) * static_cast<std::size_t>(k.width) * 3;
+  for (int v = v0; v < v1; ++v) {
     for (int u = 0; u < k.width; ++u, out += 3) {
-      Eigen::Vector3d ray = k.ray({u, v});
-      if (camera.has_distortion()) {
-        // Invert the lens by fixed-point iteration; the background needs no more than that.
-        const auto& d = camera.distortion;
-        double x = ray.x();
-        double y = ray.y();
-        for (int i = 0; i < 8; ++i) {
-          const double r2 = std::min(1.2, x * x + y * y);
-          const double radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
-          const double dx = 2.0 * d[2] * x * y + d[3] * (r2 + 2.0 * x * x);
-          const double dy = d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * x * y;
-          x = (ray.x() - dx) / radial;
-          y = (ray.y() - dy) / radial;
-        }
-        ray.x() = x;
-        ray.y() = y;
-      }
-      Eigen::Vector3f direction = R_WC * ray.cast<float>().normalized();
+      Eigen::Vector3f direction = R_WC * lens.ray(u, v);
       if (inside) {
         // Where the ray meets the sphere around the root.
         const float along = p_WC.dot(direction);
@@ -266,6 +227,10 @@ void Background::paint(const CameraModel& camera, const Pose& X_WC, std::vector<
       std::copy_n(colour.data(), 3, out);
     }
   }
+}
+
+void Background::paint(const CameraModel& camera, const Pose& X_WC, std::vector<float>& picture) const {
+  paint(Lens(camera), X_WC, 0, camera.intrinsics.height, picture);
 }
 
 }  // namespace bodyschema::simulator

@@ -128,15 +128,67 @@ std::string FaultArguments::choice_or(const std::string& key, const std::string&
   return found->second;
 }
 
+std::vector<std::size_t> FaultArguments::covers() const {
+  const auto found = spec_.arguments.find("part");
+  const std::string part = found == spec_.arguments.end() ? "all" : found->second;
+  auto covers = site_.covers_of(part);
+  if (covers.empty()) {
+    std::vector<std::string> names = {"all", "hand", "palm", "fingers", "forearm", "upper_arm"};
+    for (const auto& mesh : site_.model->meshes()) names.push_back(mesh.link);
+    fail("part",
+         "all, hand, palm, fingers, forearm, upper_arm as far as this robot has them, or rendered links "
+         "joined by '+'" +
+             did_you_mean(part, names));
+  }
+  return covers;
+}
+
+std::vector<double> FaultArguments::camera_shares() const {
+  const auto source = choice_or("source", "common", {"left", "right", "common", "difference"});
+  const auto& names = site_.camera_names;
+  if ((source == "left" || source == "right") && std::find(names.begin(), names.end(), source) == names.end()) {
+    fail("source", "a camera of this rig (" + list_of(names) + ") or common");
+  }
+  if (source == "difference" && names.size() < 2) fail("source", "common: this rig has one camera");
+  std::vector<double> shares(site_.cameras, 1.0);
+  for (std::size_t c = 0; c < shares.size(); ++c) {
+    if (source == "left" || source == "right") shares[c] = names[c] == source ? 1.0 : 0.0;
+    if (source == "difference") shares[c] = c == 0 ? 0.5 : -0.5;
+  }
+  return shares;
+}
+
+Eigen::Vector3d FaultArguments::axis() const {
+  return Eigen::Vector3d::Unit(choice_or("axis", "x", {"x", "y", "z"})[0] - 'x');
+}
+
 FaultSite::FaultSite(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig)
     : model(std::move(robot)), hand_link(setup.hand_link), gravity_W(setup.gravity_W), cameras(rig.cameras.size()) {
   std::vector<std::string> links = {setup.hand_link};
   links.insert(links.end(), setup.fingertip_links.begin(), setup.fingertip_links.end());
   const std::size_t first_camera = links.size();
-  for (const auto& camera : rig.cameras) links.push_back(camera.link);
+  for (const auto& camera : rig.cameras) {
+    links.push_back(camera.link);
+    camera_names.push_back(camera.name);
+  }
   ForwardKinematics kinematics(model, links);
   std::vector<Pose> poses(links.size());
   kinematics.compute(setup.default_joints(*model), poses);
+
+  mount_link = model->root_link();
+  for (Eigen::Index joint = 0; joint < model->joint_count(); ++joint) {  // breadth first: the last one is the nearest
+    bool all = cameras > 0;
+    for (std::size_t c = 0; c < cameras; ++c) all &= kinematics.moves(joint, first_camera + c);
+    if (all) mount_link = model->joints()[static_cast<std::size_t>(joint)].child_link;
+  }
+  if (cameras > 0) {
+    Pose X_WK = poses[first_camera];
+    for (std::size_t c = 1; c < cameras; ++c) X_WK.translation() += poses[first_camera + c].translation();
+    X_WK.translation() /= static_cast<double>(cameras);
+    Pose X_WM;
+    ForwardKinematics(model, {mount_link}).compute(setup.default_joints(*model), {&X_WM, 1});
+    X_MK = X_WM.inverse(Eigen::Isometry) * X_WK;
+  }
 
   for (const auto& name : setup.estimated_joints) arm.push_back(model->joint_index(name));
   // An eye may also tilt by itself: its pan is the joint that turns its gaze the furthest sideways.
@@ -176,6 +228,51 @@ FaultSite::FaultSite(std::shared_ptr<const RobotModel> robot, const RobotSetup& 
   std::sort(fingers.begin(), fingers.end());
 }
 
+std::vector<std::size_t> FaultSite::covers_of(const std::string& part) const {
+  std::vector<std::size_t> covers;
+  const auto meshes = model->meshes();
+  if (part == "all") {
+    for (std::size_t i = 0; i < meshes.size(); ++i) covers.push_back(i);
+    return covers;
+  }
+  const bool known = part == "hand" || part == "palm" || part == "fingers" || part == "forearm" || part == "upper_arm";
+  if (!known) {
+    for (std::size_t begin = 0; begin <= part.size();) {
+      const std::size_t end = std::min(part.find('+', begin), part.size());
+      const auto found = std::find_if(meshes.begin(), meshes.end(),
+                                      [&](const auto& mesh) { return mesh.link == part.substr(begin, end - begin); });
+      if (found == meshes.end()) return {};
+      covers.push_back(static_cast<std::size_t>(found - meshes.begin()));
+      begin = end + 1;
+    }
+    return covers;
+  }
+  std::vector<std::string> links;
+  for (const auto& mesh : meshes) links.push_back(mesh.link);
+  links.push_back(hand_link);
+  const ForwardKinematics kinematics(model, links);
+  const std::size_t n = arm.size();
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    std::size_t moved_by = 0;
+    for (const auto joint : arm) moved_by += kinematics.moves(joint, i) ? 1 : 0;
+    bool rigid_with_hand = true;
+    for (Eigen::Index joint = 0; joint < model->joint_count(); ++joint) {
+      rigid_with_hand &= kinematics.moves(joint, i) == kinematics.moves(joint, meshes.size());
+    }
+    // The wrist is the last two joints; the joint before them turns the forearm, and the one before that is the
+    // elbow.
+    const bool hand = moved_by == n;
+    const bool forearm = !hand && moved_by + 3 >= n && moved_by + 2 <= n;
+    const bool wanted = part == "hand"      ? hand
+                        : part == "palm"    ? hand && rigid_with_hand
+                        : part == "fingers" ? hand && !rigid_with_hand
+                        : part == "forearm" ? forearm
+                                            : !hand && moved_by > 0 && moved_by + 3 < n;
+    if (wanted) covers.push_back(i);
+  }
+  return covers;
+}
+
 const std::vector<FaultKind>& fault_kinds() {
   static const std::vector<FaultKind> kinds = {faults::joint_offset(),
                                                faults::compliance(),
@@ -204,7 +301,14 @@ const std::vector<FaultKind>& fault_kinds() {
                                                faults::velocity_lag(),
                                                faults::acceleration_lag(),
                                                faults::local_kink(),
-                                               faults::random_walk()};
+                                               faults::random_walk(),
+                                               faults::camera_rotation(),
+                                               faults::camera_position(),
+                                               faults::cover_dilation(),
+                                               faults::held(),
+                                               faults::stalled_encoder(),
+                                               faults::exposure_time(),
+                                               faults::readout_time()};
   return kinds;
 }
 

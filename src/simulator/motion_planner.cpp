@@ -18,10 +18,10 @@ constexpr int kPathSamples = 16;
 }  // namespace
 
 MotionPlanner::MotionPlanner(std::shared_ptr<const RobotModel> model, const RobotSetup& setup, const StereoRig& rig,
-                             MotionSettings settings, std::uint64_t seed, bool head_moves,
+                             MotionSettings settings, std::uint64_t seed, Head head,
                              const std::vector<std::string>& frozen)
-    : model_(std::move(model)), rig_(rig), settings_(std::move(settings)), random_(seed, "motion"),
-      head_moves_(head_moves), tips_(setup.fingertip_links.size()) {
+    : model_(std::move(model)), rig_(rig), settings_(std::move(settings)), random_(seed, "motion"), head_mode_(head),
+      tips_(setup.fingertip_links.size()) {
   base_ = setup.default_joints(*model_);
   for (const auto& [name, value] : settings_.posture_deg) base_[model_->joint_index(name)] = radians(value);
   std::vector<std::string> links = {setup.hand_link};
@@ -61,6 +61,19 @@ MotionPlanner::MotionPlanner(std::shared_ptr<const RobotModel> model, const Robo
       all &= kinematics_->moves(joint, X_W_.size() - rig_.cameras.size() + c);
     }
     if (all) head_.push_back(joint);
+  }
+  if (head_mode_ == Head::kGaze) {
+    compute(base_);
+    const Eigen::Vector3d look_W = X_W_[X_W_.size() - rig_.cameras.size()].linear().col(2);
+    for (const auto joint : head_) {
+      constexpr double kMostlyRoll = 0.8;
+      if (std::abs(kinematics_->joint_axis(joint).direction_W.dot(look_W)) < kMostlyRoll) gaze_.push_back(joint);
+    }
+    if (gaze_.empty()) {
+      throw ConfigurationError(
+          "simulator.motion.head is 'gaze', but no joint of robot.head_joints turns the cameras; expected still "
+          "(--set simulator.motion.head=still)");
+    }
   }
   if (settings_.distance_min_m > 0.0 && settings_.distance_max_m > 0.0) return;
   const auto seen = seen_distances();
@@ -137,10 +150,19 @@ MotionPlanner::View MotionPlanner::view(const Eigen::VectorXd& q) {
   }
   eyes /= static_cast<double>(cameras);
   result.distance_m = (centre - eyes).norm();
+  result.centre_W = centre;
   return result;
 }
 
 bool MotionPlanner::good(const View& view) const {
+  if (head_mode_ == Head::kGaze) {
+    constexpr double kMiddle = 0.26;  // share of the picture to either side
+    for (std::size_t c = 0; c < view.centre_px.size(); ++c) {
+      const auto& k = rig_.cameras[c].intrinsics;
+      if (std::abs(view.centre_px[c].x() / k.width - 0.5) > kMiddle) return false;
+      if (std::abs(view.centre_px[c].y() / k.height - 0.5) > kMiddle) return false;
+    }
+  }
   return view.whole_hand && view.distance_m >= settings_.distance_min_m && view.distance_m <= settings_.distance_max_m;
 }
 
@@ -205,10 +227,11 @@ Eigen::VectorXd MotionPlanner::random_arm(const Eigen::VectorXd& like, double sh
 Eigen::VectorXd MotionPlanner::move_head(Eigen::VectorXd q) {
   for (const auto joint : head_) {
     q[joint] = base_[joint];
-    if (!head_moves_) continue;
+    if (head_mode_ == Head::kStill) continue;
     const auto& info = model_->joints()[static_cast<std::size_t>(joint)];
-    q[joint] = std::clamp(q[joint] + radians(settings_.head_motion_deg) * random_.uniform(-1.0, 1.0), info.lower_rad,
-                          info.upper_rad);
+    const bool gazes = std::find(gaze_.begin(), gaze_.end(), joint) != gaze_.end();
+    const double range_deg = gazes ? settings_.gaze_range_deg : settings_.head_motion_deg;
+    q[joint] = std::clamp(q[joint] + radians(range_deg) * random_.uniform(-1.0, 1.0), info.lower_rad, info.upper_rad);
   }
   return q;
 }
@@ -230,6 +253,10 @@ double MotionPlanner::share_in_view(const Eigen::VectorXd& from, const Eigen::Ve
 Eigen::Vector3d MotionPlanner::random_target(const Eigen::VectorXd& q, double u_low, double u_high, double v_low,
                                              double v_high) {
   const auto& k = rig_.cameras.front().intrinsics;
+  if (head_mode_ == Head::kGaze) {  // the head looks at the hand
+    u_low = v_low = 0.40;
+    u_high = v_high = 0.60;
+  }
   const double span = settings_.distance_max_m - settings_.distance_min_m;
   const double distance = settings_.distance_min_m + span * random_.uniform(0.08, 0.95);
   compute(q);
@@ -251,9 +278,15 @@ Trajectory MotionPlanner::reach(double duration_s) {
     for (int second = 0; second < 6; ++second) {
       Eigen::VectorXd end = move_head(random_arm(start, 0.12));
       if (!solve(random_target(end, -0.1, 0.2, -0.1, 0.25), end) || !good(view(end))) continue;
-      const auto from = view(start).centre_px.front();
-      const auto to = view(end).centre_px.front();
-      if (!(to.x() < from.x() - 40.0 && to.y() < from.y() - 25.0)) continue;
+      const View from = view(start), to = view(end);
+      if (head_mode_ == Head::kGaze) {
+        constexpr double kFar_m = 0.10;
+        if ((to.centre_W - from.centre_W).norm() < kFar_m) continue;
+      } else {
+        const auto& k = rig_.cameras.front().intrinsics;
+        const Eigen::Vector2d way = from.centre_px.front() - to.centre_px.front();
+        if (!(way.x() > 0.125 * k.width && way.y() > (25.0 / 240.0) * k.height)) continue;
+      }
       double forearm = 0.0;
       if (share_in_view(start, end, &forearm) < 0.97 || forearm < 0.7) continue;
       Trajectory trajectory(start);
@@ -300,7 +333,52 @@ double MotionPlanner::travel_time(const Eigen::VectorXd& from, const Eigen::Vect
   return std::max(0.5, degrees((to - from).cwiseAbs().maxCoeff()) / speed_deg_s);
 }
 
+Trajectory MotionPlanner::held_babble(double duration_s) {
+  constexpr double kHeld_s = 1.0, kDistinct_rad = 0.2;
+  std::vector<Eigen::VectorXd> postures = {visible_posture()};
+  std::vector<double> times;  // of the moves between them
+  double moving_s = 0.0;
+  const auto add = [&] {
+    Eigen::VectorXd to = next_posture(postures.back());
+    const auto like_another = [&](const Eigen::VectorXd& q) {
+      return std::any_of(postures.begin(), postures.end(), [&](const Eigen::VectorXd& other) {
+        double most = 0.0;
+        for (const auto joint : arm_) most = std::max(most, std::abs(q[joint] - other[joint]));
+        return most < kDistinct_rad;
+      });
+    };
+    for (int attempt = 0; attempt < 50 && like_another(to); ++attempt) to = next_posture(postures.back());
+    const double speed =
+        (times.size() % 2 == 0 ? settings_.fast_deg_s : settings_.slow_deg_s) * random_.uniform(0.75, 1.3);
+    times.push_back(travel_time(postures.back(), to, speed));
+    moving_s += times.back();
+    postures.push_back(std::move(to));
+  };
+  while (static_cast<int>(postures.size()) < settings_.postures ||
+         moving_s + kHeld_s * static_cast<double>(postures.size()) < duration_s) {
+    add();
+  }
+  // More than there is time for: the last one is not reached, or all are hurried to and held for less.
+  while (static_cast<int>(postures.size()) > std::max(1, settings_.postures) &&
+         moving_s + kHeld_s * static_cast<double>(postures.size()) > duration_s) {
+    moving_s -= times.back();
+    times.pop_back();
+    postures.pop_back();
+  }
+  const double needed_s = moving_s + kHeld_s * static_cast<double>(postures.size());
+  const double hurry = std::min(1.0, duration_s / needed_s);
+  const double held_s = (duration_s - hurry * moving_s) / static_cast<double>(postures.size());
+  Trajectory motion(postures.front());
+  motion.hold(held_s);
+  for (std::size_t i = 1; i < postures.size(); ++i) {
+    motion.move_to(postures[i], hurry * times[i - 1]);
+    motion.hold(held_s);
+  }
+  return motion;
+}
+
 Trajectory MotionPlanner::babble(double duration_s) {
+  if (settings_.postures > 0) return held_babble(duration_s);
   const Eigen::VectorXd first = visible_posture();
   Trajectory motion(first);
   const auto go = [&](const Eigen::VectorXd& to, double speed_deg_s, double dwell_s) {

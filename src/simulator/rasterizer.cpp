@@ -50,44 +50,73 @@ Rasterizer::Rasterizer(std::vector<PaintedPart> parts, int width, int height, in
   }
   if (parts_.size() > 255) throw std::invalid_argument("Rasterizer: at most 255 parts");
   std::size_t most_vertices = 0;
-  for (const auto& part : parts_) {
+  for (auto& part : parts_) {
     corner_normals_.push_back(smooth_corner_normals(part.mesh));
     most_vertices = std::max(most_vertices, part.mesh.vertices.size());
+    Eigen::Vector3f low = Eigen::Vector3f::Zero(), high = low;
+    if (!part.mesh.vertices.empty()) low = high = part.mesh.vertices.front();
+    for (const auto& p : part.mesh.vertices) {
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+    balls_.push_back({0.5f * (low + high), 0.5f * (high - low).norm()});
+    if (part.paints.empty()) {
+      part.paints = {Paint{.albedo = part.albedo}};
+      part.paint_of_triangle.assign(part.mesh.triangles.size(), 0);
+    }
+    if (part.paint_of_triangle.size() != part.mesh.triangles.size()) {
+      throw std::invalid_argument("Rasterizer: every triangle needs a paint");
+    }
+    first_paint_.push_back(paints_.size());
+    for (const auto& paint : part.paints) {
+      paints_.push_back(paint);
+      part_of_paint_.push_back(static_cast<std::uint8_t>(corner_normals_.size() - 1));
+      any_gloss_ |= paint.gloss > 0.0f;
+    }
   }
+  if (paints_.size() > 65535) throw std::invalid_argument("Rasterizer: at most 65535 paints");
   const auto samples = static_cast<std::size_t>(sample_width_) * static_cast<std::size_t>(sample_height_);
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   inverse_depth_.assign(samples, 0.0f);
-  part_.assign(samples, 0);
+  paint_.assign(samples, 0);
   shade_.assign(samples, 0.0f);
+  if (any_gloss_) shine_.assign(samples, 0.0f);
   points_C_.resize(most_vertices);
   projected_.resize(most_vertices);
   coverage_.assign(pixels, 0.0f);
   colour_.assign(3 * pixels, 0.0f);
 }
 
-Rasterizer::Corner Rasterizer::project(const Eigen::Vector3f& p_C, float shade, const CameraModel& camera) const {
-  // Brown-Conrady on the normalised coordinates, then pixels, then samples: sample s of a row sits
-  // at pixel coordinate (s + 0.5) / samples - 0.5.
+Rasterizer::Corner Rasterizer::project(const Eigen::Vector3f& p_C, const CameraModel& camera) const {
+  // The lens on the normalised coordinates, then pixels, then samples: sample s of a row sits at pixel coordinate
+  // (s + 0.5) / samples - 0.5.
   const float w = 1.0f / p_C.z();
   float x = p_C.x() * w;
   float y = p_C.y() * w;
   if (camera.has_distortion()) {
-    const auto& d = camera.distortion;
-    // Beyond the picture the polynomial folds back; hold its argument to what the lens can see.
-    const double r2 = std::min(1.2, static_cast<double>(x) * x + static_cast<double>(y) * y);
-    const double radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
-    const double dx = 2.0 * d[2] * x * y + d[3] * (r2 + 2.0 * x * x);
-    const double dy = d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * x * y;
-    x = static_cast<float>(x * radial + dx);
-    y = static_cast<float>(y * radial + dy);
+    const Eigen::Vector2d bent = bend(camera.distortion, x, y);
+    x = static_cast<float>(bent.x());
+    y = static_cast<float>(bent.y());
   }
   const auto& k = camera.intrinsics;
   const auto n = static_cast<float>(samples_);
   return {(static_cast<float>(k.fx) * x + static_cast<float>(k.cx) + 0.5f) * n - 0.5f,
-          (static_cast<float>(k.fy) * y + static_cast<float>(k.cy) + 0.5f) * n - 0.5f, w, shade};
+          (static_cast<float>(k.fy) * y + static_cast<float>(k.cy) + 0.5f) * n - 0.5f, w};
 }
 
-void Rasterizer::draw_triangle(const Corner& a, const Corner& b, const Corner& c, bool cull, std::uint32_t part) {
+bool Rasterizer::out_of_sight(std::size_t part, const Eigen::Isometry3f& X_CB, const Lens::Extent& e) const {
+  const Eigen::Vector3f c = X_CB * balls_[part].centre_B;
+  const float r = balls_[part].radius;
+  if (c.z() + r < kNear_m) return true;
+  const auto beyond = [&](float across, float bound) {  // of the plane across = bound * z, on its far side
+    return across - bound * c.z() > r * std::sqrt(1.0f + bound * bound);
+  };
+  return beyond(c.x(), e.x_max) || beyond(-c.x(), -e.x_min) || beyond(c.y(), e.y_max) || beyond(-c.y(), -e.y_min);
+}
+
+template <class Light>
+void Rasterizer::draw_triangle(const Corner& a, const Corner& b, const Corner& c, bool cull, std::uint16_t paint,
+                               bool glossy, const Light& light) {
   // Image y runs down, so counter-clockwise outside faces have negative area here.
   const float area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
   if (!(std::abs(area) > 1e-9f) || !std::isfinite(area)) return;
@@ -95,19 +124,30 @@ void Rasterizer::draw_triangle(const Corner& a, const Corner& b, const Corner& c
 
   const float y_min = std::min({a.y, b.y, c.y});
   const float y_max = std::max({a.y, b.y, c.y});
-  if (!(y_max >= 0.0f && y_min <= static_cast<float>(sample_height_ - 1))) return;
-  const int row0 = static_cast<int>(std::ceil(std::max(y_min, 0.0f)));
-  const int row1 = static_cast<int>(std::floor(std::min(y_max, static_cast<float>(sample_height_ - 1))));
+  const auto first_row = static_cast<float>(band_t0_);
+  const auto last_row = static_cast<float>(band_t1_ - 1);
+  if (!(y_max >= first_row && y_min <= last_row)) return;
+  const int row0 = static_cast<int>(std::ceil(std::max(y_min, first_row)));
+  const int row1 = static_cast<int>(std::floor(std::min(y_max, last_row)));
 
-  // Attributes are affine in the picture: 1 / depth exactly, the shade near enough.
-  const float inverse_area = 1.0f / area;
-  const auto gradient = [&](float va, float vb, float vc) {
-    const float gx = ((vb - va) * (c.y - a.y) - (vc - va) * (b.y - a.y)) * inverse_area;
-    const float gy = ((vc - va) * (b.x - a.x) - (vb - va) * (c.x - a.x)) * inverse_area;
-    return std::array<float, 3>{gx, gy, va - gx * a.x - gy * a.y};
+  // Attributes are affine in the picture: 1 / depth exactly, the shade near enough. Worked out when a sample is found
+  // within: small triangles mostly fall between samples.
+  using Plane = std::array<float, 3>;
+  Plane gw{}, gs{}, gh{};
+  bool ready = false;
+  const auto prepare = [&] {
+    ready = true;
+    const float inverse_area = 1.0f / area;
+    const auto gradient = [&](float va, float vb, float vc) {
+      const float gx = ((vb - va) * (c.y - a.y) - (vc - va) * (b.y - a.y)) * inverse_area;
+      const float gy = ((vc - va) * (b.x - a.x) - (vb - va) * (c.x - a.x)) * inverse_area;
+      return Plane{gx, gy, va - gx * a.x - gy * a.y};
+    };
+    const std::array<Lit, 3> lit = light();
+    gw = gradient(a.w, b.w, c.w);
+    gs = gradient(lit[0].shade, lit[1].shade, lit[2].shade);
+    if (glossy) gh = gradient(lit[0].shine, lit[1].shine, lit[2].shine);
   };
-  const auto gw = gradient(a.w, b.w, c.w);
-  const auto gs = gradient(a.shade, b.shade, c.shade);
 
   // Each edge bounds x on one side; both triangles of an edge find the same crossing, so no
   // sample falls between them.
@@ -142,10 +182,11 @@ void Rasterizer::draw_triangle(const Corner& a, const Corner& b, const Corner& c
     const int begin = static_cast<int>(std::ceil(std::max(left, 0.0f)));
     const int end = static_cast<int>(std::floor(std::min(right, last_column)));
     if (begin > end) continue;
+    if (!ready) prepare();
     const auto base = static_cast<std::size_t>(row) * static_cast<std::size_t>(sample_width_);
     float* depth = inverse_depth_.data() + base;
     float* shade = shade_.data() + base;
-    std::uint8_t* owner = part_.data() + base;
+    std::uint16_t* owner = paint_.data() + base;
     const float w_row = gw[1] * y + gw[2];
     const float s_row = gs[1] * y + gs[2];
     for (int s = begin; s <= end; ++s) {
@@ -153,7 +194,8 @@ void Rasterizer::draw_triangle(const Corner& a, const Corner& b, const Corner& c
       if (w > depth[s]) {
         depth[s] = w;
         shade[s] = gs[0] * static_cast<float>(s) + s_row;
-        owner[s] = static_cast<std::uint8_t>(part);
+        owner[s] = paint;
+        if (glossy) shine_[base + static_cast<std::size_t>(s)] = gh[0] * static_cast<float>(s) + gh[1] * y + gh[2];
       }
     }
     s0_ = std::min(s0_, begin);
@@ -187,10 +229,22 @@ void Rasterizer::clear() {
 
 void Rasterizer::draw(std::span<const Eigen::Isometry3f> X_CB, const CameraModel& camera, const Lighting& light,
                       float dilation_px) {
+  draw_samples(X_CB, camera, light, dilation_px, {0, height_, nullptr, {}});
+  if (s1_ > s0_) resolve();
+}
+
+void Rasterizer::draw_samples(std::span<const Eigen::Isometry3f> X_CB, const CameraModel& camera, const Lighting& light,
+                              float dilation_px, const Cut& cut) {
   if (X_CB.size() != parts_.size()) throw std::invalid_argument("Rasterizer: one pose per part");
   clear();
+  // A dilated outline comes from beside the rows asked for.
+  const int margin = dilation_px == 0.0f ? 0 : static_cast<int>(std::ceil(std::abs(dilation_px))) + 2;
+  band_t0_ = std::max(0, cut.v0 - margin) * samples_;
+  band_t1_ = std::min(height_, cut.v1 + margin) * samples_;
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     const PaintedPart& part = parts_[p];
+    if (!cut.hidden.empty() && cut.hidden[p] != 0) continue;
+    if (margin == 0 && cut.extent != nullptr && out_of_sight(p, X_CB[p], *cut.extent)) continue;
     const auto& vertices = part.mesh.vertices;
     bool any_in_front = false;
     bool all_in_front = true;
@@ -199,15 +253,26 @@ void Rasterizer::draw(std::span<const Eigen::Isometry3f> X_CB, const CameraModel
       const bool in_front = points_C_[i].z() >= kNear_m;
       any_in_front |= in_front;
       all_in_front &= in_front;
-      if (in_front) projected_[i] = project(points_C_[i], 0.0f, camera);
+      if (in_front) projected_[i] = project(points_C_[i], camera);
     }
     if (!any_in_front) continue;
     const Eigen::Vector3f to_lamp_B = X_CB[p].linear().transpose() * light.to_lamp_C;
+    const Eigen::Vector3f eye_B = X_CB[p].linear().transpose() * -X_CB[p].translation();
     const auto& normals = corner_normals_[p];
+    const std::size_t first_paint = first_paint_[p];
     for (std::size_t f = 0; f < part.mesh.triangles.size(); ++f) {
       const auto& t = part.mesh.triangles[f];
-      const auto shade = [&](std::size_t k) {
-        return light.ambient + light.diffuse * std::max(0.0f, normals[3 * f + k].dot(to_lamp_B));
+      const std::size_t paint = first_paint + part.paint_of_triangle[f];
+      const bool glossy = paints_[paint].gloss > 0.0f;
+      const auto lit = [&](std::size_t k) {
+        Lit result;
+        const Eigen::Vector3f& normal = normals[3 * f + k];
+        result.shade = light.ambient + light.diffuse * std::max(0.0f, normal.dot(to_lamp_B));
+        if (glossy) {
+          const Eigen::Vector3f to_eye_B = (eye_B - vertices[t[k]]).normalized();
+          result.shine = normal.dot((to_lamp_B + to_eye_B).normalized());
+        }
+        return result;
       };
       if (all_in_front ||
           (points_C_[t[0]].z() >= kNear_m && points_C_[t[1]].z() >= kNear_m && points_C_[t[2]].z() >= kNear_m)) {
@@ -220,8 +285,9 @@ void Rasterizer::draw(std::span<const Eigen::Isometry3f> X_CB, const CameraModel
             std::ceil(std::min({a.y, b.y, c.y})) > std::floor(std::max({a.y, b.y, c.y}))) {
           continue;
         }
-        draw_triangle({a.x, a.y, a.w, shade(0)}, {b.x, b.y, b.w, shade(1)}, {c.x, c.y, c.w, shade(2)}, part.cull_back,
-                      static_cast<std::uint32_t>(p));
+        draw_triangle(a, b, c, part.cull_back, static_cast<std::uint16_t>(paint), glossy, [&] {
+          return std::array<Lit, 3>{lit(0), lit(1), lit(2)};
+        });
         continue;
       }
       // Cut at the near plane (Sutherland-Hodgman): three or four corners remain.
@@ -233,22 +299,29 @@ void Rasterizer::draw(std::span<const Eigen::Isometry3f> X_CB, const CameraModel
         const Eigen::Vector3f& p1 = points_C_[t[next]];
         const bool in0 = p0.z() >= kNear_m;
         const bool in1 = p1.z() >= kNear_m;
-        if (in0) polygon[count++] = {p0, shade(k)};
+        const Lit lit0 = lit(k);
+        if (in0) polygon[count++] = {p0, lit0};
         if (in0 != in1) {
           const float x = (kNear_m - p0.z()) / (p1.z() - p0.z());
-          polygon[count++] = {p0 + x * (p1 - p0), shade(k) + x * (shade(next) - shade(k))};
+          const Lit lit1 = lit(next);
+          polygon[count++] = {p0 + x * (p1 - p0),
+                              {lit0.shade + x * (lit1.shade - lit0.shade), lit0.shine + x * (lit1.shine - lit0.shine)}};
         }
       }
       if (count < 3) continue;
       std::array<Corner, 4> corner;
-      for (std::size_t k = 0; k < count; ++k) corner[k] = project(polygon[k].p_C, polygon[k].shade, camera);
+      for (std::size_t k = 0; k < count; ++k) corner[k] = project(polygon[k].p_C, camera);
       for (std::size_t k = 2; k < count; ++k) {
-        draw_triangle(corner[0], corner[k - 1], corner[k], part.cull_back, static_cast<std::uint32_t>(p));
+        draw_triangle(corner[0], corner[k - 1], corner[k], part.cull_back, static_cast<std::uint16_t>(paint), glossy,
+                      [&] {
+                        return std::array<Lit, 3>{polygon[0].lit, polygon[k - 1].lit, polygon[k].lit};
+                      });
       }
     }
   }
   if (s1_ > s0_ && dilation_px != 0.0f) dilate(dilation_px);
-  if (s1_ > s0_) resolve();
+  if (s1_ > s0_)
+    box_ = {s0_ / samples_, t0_ / samples_, (s1_ + samples_ - 1) / samples_, (t1_ + samples_ - 1) / samples_};
 }
 
 /// Grows or shrinks the covered samples by an exact Euclidean distance (two passes of lower
@@ -328,7 +401,8 @@ void Rasterizer::dilate(float dilation_px) {
     if (!grow) continue;
     inverse_depth_[change.to] = inverse_depth_[change.from];
     shade_[change.to] = shade_[change.from];
-    part_[change.to] = part_[change.from];
+    paint_[change.to] = paint_[change.from];
+    if (any_gloss_) shine_[change.to] = shine_[change.from];
   }
   if (grow) {
     s0_ = x0;
@@ -339,11 +413,11 @@ void Rasterizer::dilate(float dilation_px) {
 }
 
 void Rasterizer::resolve() {
-  box_ = {s0_ / samples_, t0_ / samples_, (s1_ + samples_ - 1) / samples_, (t1_ + samples_ - 1) / samples_};
   const float share = 1.0f / static_cast<float>(samples_ * samples_);
   const bool dilated = !changes_.empty();
-  std::array<Eigen::Vector3f, 256> paint;
-  for (std::size_t p = 0; p < parts_.size(); ++p) paint[p] = 255.0f * share * parts_[p].albedo;
+  std::vector<Eigen::Vector3f>& paint = resolved_paint_;
+  paint.resize(paints_.size());
+  for (std::size_t p = 0; p < paints_.size(); ++p) paint[p] = 255.0f * share * paints_[p].albedo;
   for (int v = box_.v0; v < box_.v1; ++v) {
     for (int u = box_.u0; u < box_.u1; ++u) {
       float covered = 0.0f;
@@ -355,7 +429,7 @@ void Rasterizer::resolve() {
           if (inverse_depth_[i] > 0.0f) {
             const float weight = dilated ? weight_[i] : 1.0f;
             covered += weight;
-            sum += weight * shade_[i] * paint[part_[i]];
+            sum += weight * shade_[i] * paint[paint_[i]];
           }
         }
       }
@@ -389,7 +463,7 @@ int Rasterizer::part_at(int u, int v) const {
   const int t = v * samples_ + samples_ / 2;
   const auto i = static_cast<std::size_t>(t) * static_cast<std::size_t>(sample_width_) + static_cast<std::size_t>(s);
   const bool covered = inverse_depth_[i] > 0.0f && (changes_.empty() || weight_[i] >= 0.5f);
-  return covered ? static_cast<int>(part_[i]) : -1;
+  return covered ? static_cast<int>(part_of_paint_[paint_[i]]) : -1;
 }
 
 }  // namespace bodyschema::simulator

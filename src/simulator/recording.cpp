@@ -25,6 +25,27 @@ Image to_gray(const Image& rgb) {
   return gray;
 }
 
+/// White where the robot is, black elsewhere, gray where a pixel is shared.
+Image mask_picture(const CameraFrame& camera) {
+  Image gray(camera.silhouette.width(), camera.silhouette.height(), 1);
+  gray.data = camera.coverage;
+  return gray;
+}
+
+/// What the camera compressed, not to be compressed again.
+bot_core::image_t sent_jpeg(const CameraFrame& camera, Microseconds utime) {
+  bot_core::image_t message;
+  message.data = camera.jpeg;
+  message.utime = utime;
+  message.width = camera.image.width;
+  message.height = camera.image.height;
+  message.row_stride = 0;
+  message.pixelformat = bot_core::image_t::PIXEL_FORMAT_MJPEG;
+  message.size = static_cast<std::int32_t>(message.data.size());
+  message.nmetadata = 0;
+  return message;
+}
+
 double rounded(double value, double per_unit) {
   return std::round(value * per_unit) / per_unit;
 }
@@ -80,12 +101,16 @@ bool FramePublisher::publish(const SimulatedFrame& frame, MessageSink& sink, con
     const CameraFrame& camera = *frame.cameras[c];
     const Microseconds utime = camera.utime + options_.utime_shift;
     last_shutter = std::max(last_shutter, camera.utime);
-    images.image_types.push_back(camera.name == "right" ? bot_core::images_t::RIGHT : bot_core::images_t::LEFT);
+    images.image_types.push_back(static_cast<std::int16_t>(camera.number));
     switch (options_.format) {
-      case PictureFormat::kRgb: images.images.push_back(to_message(camera.image, utime)); break;
+      case PictureFormat::kMasks: images.images.push_back(to_message(mask_picture(camera), utime)); break;
+      case PictureFormat::kRgb:
+        images.images.push_back(camera.jpeg.empty() ? to_message(camera.image, utime) : sent_jpeg(camera, utime));
+        break;
       case PictureFormat::kGray: images.images.push_back(to_message(to_gray(camera.image), utime)); break;
       case PictureFormat::kJpeg:
-        images.images.push_back(to_jpeg_message(camera.image, utime, options_.jpeg_quality));
+        images.images.push_back(camera.jpeg.empty() ? to_jpeg_message(camera.image, utime, options_.jpeg_quality)
+                                                    : sent_jpeg(camera, utime));
         break;
     }
   }
@@ -120,7 +145,7 @@ bool FramePublisher::publish(const SimulatedFrame& frame, MessageSink& sink, con
 TruthWriter::TruthWriter(std::filesystem::path file, const Simulator& simulator, const RobotSetup& setup,
                          Microseconds utime_shift)
     : file_(std::move(file)), stream_(open_to_write(file_)), joint_names_(simulator.joint_names()),
-      utime_shift_(utime_shift) {
+      utime_shift_(utime_shift), hides_(simulator.has_things()) {
   const SimulationPlan& plan = simulator.plan();
   const TrueRobot& robot = simulator.robot();
   Json offsets = Json::object();
@@ -179,6 +204,7 @@ void TruthWriter::add(const SimulatedFrame& frame) {
   std::vector<Eigen::Vector3d> tips_P;
   for (const auto& tip_C : first.fingertips_C) tips_P.push_back(first.X_CP.inverse(Eigen::Isometry) * tip_C);
   line["fingertips_in_hand_m"] = list(tips_P);
+  if (hides_) line["holding"] = first.holding;
   for (std::size_t c = 0; c < frame.truth.size(); ++c) {
     const std::string& side = camera_names_[c];
     const CameraTruth& truth = frame.truth[c];
@@ -186,6 +212,7 @@ void TruthWriter::add(const SimulatedFrame& frame) {
     line["fingertips_in_" + side + "_camera_m"] = list(truth.fingertips_C);
     line["fingertips_px_" + side] = list(truth.fingertips_px);
     line["visible_share_" + side] = rounded(truth.visible_share, 1e6);
+    if (hides_) line["hidden_share_" + side] = rounded(truth.hidden_share, 1e6);
   }
   stream_ << (first_ ? "" : ",\n") << line.dump();
   first_ = false;

@@ -46,7 +46,12 @@ class TorquesOfGravity final : public JointTorques {
 
 TrueKinematics::TrueKinematics(std::shared_ptr<const RobotModel> model, const TrueBody& body,
                                std::vector<std::string> links)
-    : link_count_(links.size()), camera_shift_C_(body.camera_shift_C) {
+    : link_count_(links.size()), tracked_count_(links.size()), X_CT_(body.X_CT), X_MK_(body.X_MK), X_KT_(body.X_KT) {
+  mount_moved_ = !X_KT_.matrix().isIdentity(0.0);
+  if (mount_moved_) {
+    links.push_back(body.mount_link);
+    ++tracked_count_;
+  }
   for (const auto& change : body.misplacements) {
     Misplacement m;
     m.change = change;
@@ -93,12 +98,12 @@ TrueKinematics::TrueKinematics(std::shared_ptr<const RobotModel> model, const Tr
 }
 
 void TrueKinematics::compute(const Eigen::VectorXd& q, std::span<Pose> X_WB) {
-  if (misplacements_.empty()) {
+  if (misplacements_.empty() && !mount_moved_) {
     nominal_->compute(q, X_WB);
     return;
   }
   nominal_->compute(q, X_W_);
-  std::copy_n(X_W_.begin(), link_count_, X_WB.begin());
+  tracked_.assign(X_W_.begin(), X_W_.begin() + static_cast<std::ptrdiff_t>(tracked_count_));
   // Each D is made of nominal frames, so the product grows from the tip.
   for (auto m = misplacements_.rbegin(); m != misplacements_.rend(); ++m) {
     const auto axis = nominal_->joint_axis(m->change.joint);
@@ -111,25 +116,34 @@ void TrueKinematics::compute(const Eigen::VectorXd& q, std::span<Pose> X_WB) {
       const Eigen::Vector3d tilted = tilt * axis.direction_W;
       D.linear() = (Eigen::AngleAxisd(turn, tilted) * Eigen::AngleAxisd(-turn, axis.direction_W)).toRotationMatrix();
     }
-    D.translation() = axis.point_W - D.linear() * axis.point_W +
-                      m->outwards * m->change.lengthening_m * axis.direction_W +
-                      R_WP * (m->change.shift_1_m * m->tilt_1_P + m->change.shift_2_m * m->tilt_2_P);
-    for (std::size_t l = 0; l < link_count_; ++l) {
-      if (nominal_->moves(m->change.joint, l)) X_WB[l] = D * X_WB[l];
+    D.translation() =
+        axis.point_W - D.linear() * axis.point_W + m->outwards * m->change.lengthening_m * axis.direction_W +
+        R_WP * (m->change.shift_1_m * m->tilt_1_P + m->change.shift_2_m * m->tilt_2_P + m->change.shift_P);
+    for (std::size_t l = 0; l < tracked_count_; ++l) {
+      if (nominal_->moves(m->change.joint, l)) tracked_[l] = D * tracked_[l];
     }
   }
+  std::copy_n(tracked_.begin(), link_count_, X_WB.begin());
+  if (mount_moved_) X_WM_ = tracked_.back();
 }
 
 Pose TrueKinematics::camera(std::size_t index, const Pose& X_WLink) const {
   Pose X_WC = X_WLink;
-  if (index < camera_shift_C_.size()) X_WC.translate(camera_shift_C_[index]);
+  if (mount_moved_) {
+    const Pose X_WK = X_WM_ * X_MK_;
+    X_WC = X_WK * X_KT_ * X_WK.inverse(Eigen::Isometry) * X_WC;
+  }
+  if (index < X_CT_.size()) X_WC = X_WC * X_CT_[index];
   return X_WC;
 }
 
 TrueRobot::TrueRobot(FaultSite site, const StereoRig& rig, Trajectory trajectory, const std::vector<FaultSpec>& specs)
     : site_(std::move(site)), trajectory_(std::move(trajectory)) {
   body_.cameras = rig.cameras;
-  body_.camera_shift_C.assign(rig.cameras.size(), Eigen::Vector3d::Zero());
+  body_.X_CT.assign(rig.cameras.size(), Pose::Identity());
+  body_.mount_link = site_.mount_link;
+  body_.X_MK = site_.X_MK;
+  body_.covers.resize(site_.model->meshes().size());
   site_.trajectory = &trajectory_;
   std::vector<std::size_t> order(specs.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -140,6 +154,7 @@ TrueRobot::TrueRobot(FaultSite site, const StereoRig& rig, Trajectory trajectory
   for (auto& fault : readers_) {
     fault->build(body_);
     fault->expose(timing_);
+    fault->stall(stalls_);
   }
   offsets_.setZero(site_.model->joint_count());
   for (const auto& spec : specs) {
@@ -193,6 +208,22 @@ void TrueRobot::encoders(double t_s, Eigen::VectorXd& encoder) const {
   encoder.resize(site_.model->joint_count());
   trajectory_.position(t_s, encoder);
   for (const auto& fault : readers_) fault->read(encoder);
+  for (const auto& stall : stalls_) {
+    if (stalled_since(stall.joint, t_s) != stall.begin_s) continue;
+    Eigen::VectorXd then(encoder.size());
+    trajectory_.position(stall.begin_s, then);
+    for (const auto& fault : readers_) fault->read(then);
+    encoder[stall.joint] = then[stall.joint];
+  }
+}
+
+std::optional<double> TrueRobot::stalled_since(Eigen::Index joint, double t_s) const {
+  std::optional<double> since;
+  for (const auto& stall : stalls_) {
+    if (stall.joint != joint || t_s < stall.begin_s || t_s >= stall.end_s) continue;
+    since = std::min(since.value_or(stall.begin_s), stall.begin_s);
+  }
+  return since;
 }
 
 }  // namespace bodyschema::simulator

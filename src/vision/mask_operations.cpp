@@ -158,6 +158,15 @@ void ComponentFilter::remove_small(BinaryMask& mask, int min_px) {
   }
 }
 
+int ComponentFilter::largest_piece(const BinaryMask& mask) {
+  label(mask, true, true);
+  int largest = 0;
+  for (std::size_t i = 0; i < runs_.size(); ++i) {
+    largest = std::max(largest, runs_[static_cast<std::size_t>(root(static_cast<int>(i)))].area);
+  }
+  return largest;
+}
+
 void ComponentFilter::fill_small_holes(BinaryMask& mask, int max_px) {
   if (max_px <= 0) return;
   label(mask, false, false);

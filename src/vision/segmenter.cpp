@@ -152,6 +152,7 @@ const BackgroundModel& Segmenter::Impl::background() const {
     case SegmentationMethod::kSingleColour: return single_colour.model();
     case SegmentationMethod::kBackgroundPicture: return given;
     case SegmentationMethod::kStatistics: return local;
+    case SegmentationMethod::kGiven:
     case SegmentationMethod::kLearnedBackground: break;
   }
   return learned.model();

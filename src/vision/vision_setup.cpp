@@ -7,11 +7,12 @@ namespace bodyschema {
 VisionSetup VisionSetup::from(const Configuration& vision) {
   VisionSetup setup;
   const auto method = vision.choice_or("method", "learned_background",
-                                       {"single_colour", "background_picture", "learned_background", "statistics"});
+                                       {"single_colour", "background_picture", "learned_background", "statistics", "given"});
   if (method == "single_colour") setup.method = SegmentationMethod::kSingleColour;
   if (method == "background_picture") setup.method = SegmentationMethod::kBackgroundPicture;
   if (method == "learned_background") setup.method = SegmentationMethod::kLearnedBackground;
   if (method == "statistics") setup.method = SegmentationMethod::kStatistics;
+  if (method == "given") setup.method = SegmentationMethod::kGiven;
   setup.edges =
       vision.choice_or("edges", "blurred", {"blurred", "hard"}) == "hard" ? EdgeKind::kHard : EdgeKind::kBlurred;
 
@@ -44,6 +45,7 @@ VisionSetup VisionSetup::from(const Configuration& vision) {
   setup.learning_frames = static_cast<int>(vision.integer_or("learning_frames", setup.learning_frames, 2, 10'000));
   setup.min_sightings = static_cast<int>(vision.integer_or("min_sightings", setup.min_sightings, 1, 64));
   setup.search_px = static_cast<int>(vision.integer_or("search_px", setup.search_px, 2, 64));
+  setup.min_piece_share = vision.number_or("min_piece_share", setup.min_piece_share, 0.0, 1.0);
   return setup;
 }
 

@@ -47,6 +47,20 @@ bot_core::images_t pictures(Microseconds utime, Image left = Image(8, 6, 3), Ima
   return m;
 }
 
+TEST(LostPictures, AreSaidWithTheReasonsMostFrequentFirst) {
+  BusStatistics bus;
+  bus.synchroniser.images = 95;
+  bus.images_malformed = 5;
+  EXPECT_EQ(bus.lost_pictures(0.05), "") << "5 of 100";
+  bus.faults[static_cast<std::size_t>(MessageFault::kWrongSize)] = 4;
+  bus.faults[static_cast<std::size_t>(MessageFault::kNotFinite)] = 40;  // of encoders
+  bus.synchroniser.images_dropped[static_cast<std::size_t>(DropReason::kNoEncoders)] = 20;
+  EXPECT_EQ(bus.lost_pictures(0.05),
+            "25 of 100 pictures are not used: 20 without encoder readings before and after, 4 of another size "
+            "than configured, 1 malformed");
+  EXPECT_EQ(BusStatistics{}.lost_pictures(0.05), "");
+}
+
 TEST(ObservationStream, TurnsMessagesIntoObservations) {
   ObservationStream stream({"arm"}, {}, rig(), {});
   EXPECT_FALSE(stream.receive("ICUB_JOINT_OFFSETS", {}));
@@ -60,6 +74,74 @@ TEST(ObservationStream, TurnsMessagesIntoObservations) {
   EXPECT_EQ(arrived->observation.cameras[1]->image.channels, 1);
   EXPECT_EQ(stream.statistics().messages, 11u);
   for (const auto& [name, count] : stream.statistics().counters()) EXPECT_EQ(count, 0u) << name;
+}
+
+TEST(ObservationStream, TakesMasksOfOthersWhereTheyAreAskedFor) {
+  BusOptions options;
+  {
+    ObservationStream stream({"arm"}, {}, rig(), options);
+    EXPECT_FALSE(stream.receive("ICUB_MASKS", encode(pictures(45 * kMs)))) << "not asked for";
+  }
+  options.synchroniser.masks = true;
+  ObservationStream stream({"arm"}, {}, rig(), options);
+  for (int i = 0; i < 10; ++i) EXPECT_TRUE(stream.receive("ICUB_JOINT_STATE", encode(arm(10 * i * kMs, 0.5F))));
+  EXPECT_TRUE(stream.receive("ICUB_CAMERAS", encode(pictures(45 * kMs))));
+  Image left(8, 6, 1), right(8, 6, 3);
+  left.data[0] = 250;
+  left.data[1] = 130;
+  right.data[0] = right.data[1] = right.data[2] = 255;  // gray, told three times
+  EXPECT_TRUE(stream.receive("ICUB_MASKS", encode(pictures(45 * kMs, left, right)), 99));
+  const auto arrived = stream.next();
+  ASSERT_TRUE(arrived);
+  EXPECT_EQ(arrived->arrival_us, 99);
+  const auto& mask = arrived->observation.cameras[0]->given_mask;
+  EXPECT_EQ(mask.channels, 1);
+  EXPECT_EQ(mask.data[0], kMaskRobot);
+  EXPECT_EQ(mask.data[1], kMaskUnknown);
+  EXPECT_EQ(mask.data[2], kMaskBackground);
+  EXPECT_EQ(arrived->observation.cameras[1]->given_mask.data[0], kMaskRobot);
+}
+
+TEST(ObservationStream, RefusesWhatIsNoMask) {
+  BusOptions options;
+  options.synchroniser.masks = true;
+  const auto refused = [&](const bot_core::images_t& message) {
+    ObservationStream stream({"arm"}, {}, rig(), options);
+    stream.receive("ICUB_MASKS", encode(message));
+    return stream.statistics().faults[static_cast<std::size_t>(MessageFault::kBadMask)];
+  };
+  Image good(8, 6, 1);
+  EXPECT_EQ(refused(pictures(0, good, good)), 0u) << "a robot that is out of the picture";
+  Image ones = good;
+  ones.data[5] = 1;
+  EXPECT_EQ(refused(pictures(0, ones, good)), 1u) << "0 and 1, as of a Boolean array";
+  Image colour(8, 6, 3);
+  colour.data[0] = 255;
+  EXPECT_EQ(refused(pictures(0, good, colour)), 1u);
+  EXPECT_EQ(refused(pictures(0, Image(9, 6, 1), good)), 1u);
+  auto jpeg = pictures(0, good, good);
+  jpeg.images[1] = to_jpeg_message(good, 0, 90);
+  EXPECT_EQ(refused(jpeg), 1u);
+}
+
+TEST(ObservationStream, PicturesBelongToTheCameraOfTheirNumberWhateverItsName) {
+  auto cameras = rig();
+  cameras[0].name = "head";
+  cameras[0].image_type = 2;
+  cameras[0].intrinsics.width = 100;
+  cameras[0].intrinsics.height = 1;
+  cameras[1].name = "wrist";
+  cameras[1].image_type = 5;
+  ObservationStream stream({"arm"}, {}, cameras, {});
+  for (int i = 0; i < 40; ++i) stream.receive("ICUB_JOINT_STATE", encode(arm(10 * i * kMs, 0.5F)));
+  stream.receive("ICUB_CAMERAS", encode(pictures(45 * kMs)));
+  stream.finish();
+  const auto arrived = stream.next();
+  ASSERT_TRUE(arrived);
+  EXPECT_TRUE(arrived->observation.cameras[0]);
+  EXPECT_FALSE(arrived->observation.cameras[1]);
+  std::swap(cameras[0], cameras[1]);
+  EXPECT_THROW(ObservationStream({"arm"}, {}, cameras, {}), ConfigurationError);
 }
 
 /// What the extended model, a backlash of the elbow that is known, says of four exposures: two cameras, on the

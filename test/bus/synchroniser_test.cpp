@@ -598,5 +598,143 @@ TEST_F(SynchroniserTest, SurvivesAnything) {
   }
 }
 
+/// With masks asked for, as of a segmentation network beside the robot.
+class MaskTest : public SynchroniserTest {
+ protected:
+  void make_with_masks(int cameras = 2, bool allow_mono = true) {
+    SynchroniserOptions options;
+    options.masks = true;
+    options.mask_wait = 300 * kMs;
+    options.allow_mono = allow_mono;
+    make(cameras, options);
+  }
+  void mask(int camera, Microseconds utime, std::uint8_t level = kMaskRobot) {
+    StampedImage stamped = image(camera, utime);
+    stamped.image.data.assign(4, level);
+    stamped.arrival_us = utime + 150 * kMs;
+    sync_->add_mask(std::move(stamped));
+  }
+};
+
+TEST_F(MaskTest, APictureWaitsForItsMask) {
+  make_with_masks();
+  encoders(0, 100 * kMs);
+  pair(30 * kMs, 35 * kMs);
+  EXPECT_TRUE(out().empty());
+  mask(0, 30 * kMs, 200);
+  EXPECT_TRUE(out().empty()) << "the other camera's is still to come";
+  mask(1, 35 * kMs, 100);
+  const auto arrived = sync_->next();
+  ASSERT_TRUE(arrived);
+  EXPECT_EQ(arrived->observation.cameras[0]->given_mask.data[0], 200);
+  EXPECT_EQ(arrived->observation.cameras[1]->given_mask.data[0], 100);
+  EXPECT_EQ(arrived->arrival_us, 185 * kMs) << "when all of it had come";
+  EXPECT_EQ(sync_->statistics().masks, 2u);
+}
+
+TEST_F(MaskTest, MasksMayComeBeforeTheirPicturesAndBetweenThem) {
+  make_with_masks();
+  encoders(0, 300 * kMs);
+  mask(1, 30 * kMs);
+  mask(0, 30 * kMs);
+  pair(30 * kMs, 30 * kMs);
+  pair(60 * kMs, 60 * kMs);
+  pair(90 * kMs, 90 * kMs);
+  mask(0, 90 * kMs);
+  mask(1, 90 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{30, 30})) << "in order: the second still waits";
+  mask(1, 60 * kMs);
+  mask(0, 60 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{60, 60}, std::pair{90, 90}));
+}
+
+TEST_F(MaskTest, APictureWithoutMaskIsLeftOutAndTheOtherCamerasIsUsed) {
+  make_with_masks();
+  encoders(0, 100 * kMs);
+  pair(30 * kMs, 30 * kMs);
+  mask(1, 30 * kMs);
+  EXPECT_TRUE(out().empty());
+  encoders(110 * kMs, 330 * kMs);
+  EXPECT_TRUE(out().empty()) << "not yet later than the wait";
+  encoders(340 * kMs, 340 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{-1, 30}));
+  EXPECT_EQ(dropped(DropReason::kNoMask), 1u);
+  mask(0, 30 * kMs);
+  EXPECT_EQ(sync_->statistics().masks_late, 1u);
+}
+
+TEST_F(MaskTest, WithoutMonoBothAreLeftOut) {
+  make_with_masks(2, false);
+  encoders(0, 100 * kMs);
+  pair(30 * kMs, 30 * kMs);
+  mask(1, 30 * kMs);
+  encoders(110 * kMs, 400 * kMs);
+  EXPECT_TRUE(out().empty());
+  EXPECT_EQ(dropped(DropReason::kNoMask), 1u);
+  EXPECT_EQ(dropped(DropReason::kUnpaired), 1u);
+  EXPECT_EQ(sync_->statistics().masks_unused, 1u);
+}
+
+TEST_F(MaskTest, PicturesGoOnWhereNoMaskEverComes) {
+  make_with_masks(1);
+  for (Microseconds t = 0; t <= 1000 * kMs; t += 10 * kMs) {
+    encoders(t, t);
+    if (t % (100 * kMs) == 0) picture(0, t);
+  }
+  EXPECT_TRUE(out().empty());
+  EXPECT_EQ(dropped(DropReason::kNoMask), 7u) << "four are within the wait";
+  sync_->finish();
+  EXPECT_TRUE(out().empty());
+  EXPECT_EQ(dropped(DropReason::kNoMask), 11u);
+  EXPECT_EQ(dropped(DropReason::kOverload), 0u);
+}
+
+TEST_F(MaskTest, OneEncoderStampFarInTheFutureCostsNoMoreThanThePicturesThatWait) {
+  make_with_masks(1);
+  encoders(0, 100 * kMs);
+  picture(0, 50 * kMs);
+  encoders(90'000 * kMs, 90'000 * kMs);
+  EXPECT_EQ(dropped(DropReason::kNoMask), 1u);
+  sync_->add(joints(110 * kMs, {{"arm", 0.11F}, {"neck", -0.055F}}));
+  sync_->add(joints(120 * kMs, {{"arm", 0.12F}, {"neck", -0.06F}}));
+  encoders(130 * kMs, 200 * kMs);
+  picture(0, 170 * kMs);
+  EXPECT_EQ(dropped(DropReason::kNoMask), 1u);
+  mask(0, 170 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{170, -1}));
+}
+
+TEST_F(MaskTest, MasksOfNoPictureAreBoundedAndCounted) {
+  make_with_masks(1);
+  encoders(0, 100 * kMs);
+  for (int i = 0; i < 100; ++i) mask(0, (1000 + i) * kMs);
+  EXPECT_EQ(sync_->statistics().masks_unused, 36u) << "64 may wait";
+  mask(5, 0);
+  sync_->finish();
+  EXPECT_EQ(sync_->statistics().masks_unused, 100u);
+  EXPECT_EQ(sync_->statistics().masks, 100u);
+}
+
+TEST_F(MaskTest, NotAskedForTheyAreNotLookedAt) {
+  make(1);
+  encoders(0, 100 * kMs);
+  mask(0, 30 * kMs);
+  picture(0, 30 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{30, -1}));
+  EXPECT_EQ(sync_->statistics().masks, 0u);
+}
+
+TEST_F(MaskTest, AfterAClockStepMasksBelongToTheNewTime) {
+  make_with_masks(1);
+  encoders(10'000 * kMs, 10'100 * kMs);
+  picture(0, 10'050 * kMs);
+  mask(0, 10'050 * kMs);
+  EXPECT_EQ(out().size(), 1u);
+  encoders(0, 200 * kMs);
+  picture(0, 150 * kMs);
+  mask(0, 150 * kMs);
+  EXPECT_THAT(out(), ElementsAre(std::pair{150, -1}));
+}
+
 }  // namespace
 }  // namespace bodyschema

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/robot/forward_kinematics.hpp"
 
 namespace bodyschema {
 namespace {
@@ -75,6 +76,113 @@ TEST(StereoRig, SaysWhatIsWrong) {
               HasSubstr("cameras.left.fx"));
   EXPECT_THAT(message("cameras:\n  left: {link: l, width: 320, height: 240, fx: .nan, fy: 258, cx: 1, cy: 1}\n"),
               HasSubstr("cameras.left.fx"));
+}
+
+const std::string kLens = "width: 64, height: 48, fx: 50, fy: 50, cx: 31.5, cy: 23.5";
+
+TEST(StereoRig, TakesCamerasOfAnyNameInTheOrderOfTheirNumbers) {
+  const StereoRig one = parse("cameras:\n  cam_high: {link: l, " + kLens + "}\n");
+  ASSERT_EQ(one.cameras.size(), 1u);
+  EXPECT_EQ(one.cameras[0].name, "cam_high");
+  EXPECT_EQ(one.cameras[0].number(), 0);
+
+  const StereoRig two = parse("cameras:\n  wrist: {link: w, " + kLens + "}\n  head-2: {link: h, " + kLens + "}\n");
+  EXPECT_EQ(two.cameras[0].name, "wrist");
+  EXPECT_EQ(two.cameras[1].number(), 1);
+
+  const StereoRig mixed = parse("cameras:\n  right: {link: r, " + kLens + "}\n  top: {link: t, " + kLens + "}\n");
+  EXPECT_EQ(mixed.cameras[0].name, "top");
+  EXPECT_EQ(mixed.cameras[1].number(), 1);
+
+  const StereoRig given =
+      parse("cameras:\n  a: {image_type: 7, link: a, " + kLens + "}\n  b: {image_type: 3, link: b, " + kLens + "}\n");
+  EXPECT_EQ(given.cameras[0].name, "b");
+  EXPECT_EQ(given.cameras[1].number(), 7);
+
+  EXPECT_EQ(parse("cameras:\n  right: {link: r, " + kLens + "}\n").cameras[0].number(), 1);
+  EXPECT_EQ(parse("cameras:\n  left: null\n  top: {link: r, " + kLens + "}\n").cameras.size(), 1u);
+  EXPECT_THAT(message("cameras:\n  a: {image_type: 1, link: a, " + kLens + "}\n  right: {link: b, " + kLens + "}\n"),
+              HasSubstr("cameras.right.image_type"));
+  EXPECT_THAT(message("cameras:\n  a/b: {link: a, " + kLens + "}\n"), HasSubstr("letters, digits"));
+  EXPECT_THAT(message("cameras:\n  a: {link: a, " + kLens + "}\n  b: {link: a, " + kLens + "}\n  c: {link: a, " +
+                      kLens + "}\n"),
+              HasSubstr("one camera or two"));
+}
+
+TEST(StereoRig, ReadsWhereACameraIsFixedAndHowWellThatIsKnown) {
+  const CameraModel known = parse("cameras:\n  a: {link: base, X_link_optical: {xyz_m: [1, 2, 3], rpy_rad: "
+                                  "[-1.5707963267948966, 0, -1.5707963267948966]}, " +
+                                  kLens + "}\n")
+                                .cameras[0];
+  EXPECT_EQ(known.mount.parent, "base");
+  EXPECT_EQ(known.link, "camera:a");
+  EXPECT_EQ(known.mount.knowledge, PlaceKnowledge::kKnown);
+  // As a URDF has it: the optical frame of a camera that looks along x.
+  EXPECT_TRUE((known.mount.X_PC * Eigen::Vector3d(0, 0, 1)).isApprox(Eigen::Vector3d(2, 2, 3), 1e-12));
+  EXPECT_TRUE((known.mount.X_PC * Eigen::Vector3d(1, 0, 0)).isApprox(Eigen::Vector3d(1, 1, 3), 1e-12));
+
+  const CameraModel roughly = parse("cameras:\n  a: {link: base, X_link_optical: [[0, 0, 1, 1], [-1, 0, 0, 2], [0, "
+                                    "-1, 0, 3], [0, 0, 0, 1]], pose: roughly, pose_sd_deg: 5, pose_sd_mm: 50, " +
+                                    kLens + "}\n")
+                                  .cameras[0];
+  EXPECT_EQ(roughly.mount.knowledge, PlaceKnowledge::kRoughly);
+  EXPECT_TRUE(roughly.mount.X_PC.isApprox(known.mount.X_PC, 1e-12));
+  EXPECT_DOUBLE_EQ(roughly.mount.sd_rad, radians(5.0));
+  EXPECT_DOUBLE_EQ(roughly.mount.sd_m, 0.05);
+
+  const CameraModel unknown = parse("cameras:\n  a: {link: base, pose: unknown, " + kLens + "}\n").cameras[0];
+  EXPECT_EQ(unknown.mount.knowledge, PlaceKnowledge::kUnknown);
+  EXPECT_EQ(unknown.link, "camera:a") << "a frame of its own, whose place can be given once it is found";
+  EXPECT_TRUE(unknown.mount.X_PC.isApprox(Pose::Identity()));
+
+  const StereoRig pair = parse("cameras:\n  a: {link: base, pose: unknown, " + kLens +
+                               "}\n  b: {beside: a, X_beside_optical: {xyz_m: [0.12, 0, 0]}, pose: roughly, "
+                               "pose_sd_deg: 0.1, pose_sd_mm: 1, " +
+                               kLens + "}\n");
+  EXPECT_TRUE(pair.cameras[1].mount.relative);
+  EXPECT_EQ(pair.cameras[1].mount.parent, pair.cameras[0].link);
+}
+
+TEST(StereoRig, SaysWhatIsWrongWithACamerasPlace) {
+  const auto with = [](const std::string& keys) { return message("cameras:\n  a: {" + keys + ", " + kLens + "}\n"); };
+  EXPECT_THAT(with("link: l, pose: perhaps"), HasSubstr("known, roughly or unknown"));
+  EXPECT_THAT(with("link: l, pose: roughly"), HasSubstr("cameras.a.pose_sd_deg"));
+  EXPECT_THAT(with("link: l, pose_sd_mm: 4"), HasSubstr("only with 'pose: roughly'"));
+  EXPECT_THAT(with("link: l, X_link_optical: [1, 2]"), HasSubstr("lists of numbers"));
+  EXPECT_THAT(with("link: l, X_link_optical: [[1, 2]]"), HasSubstr("four rows of four numbers"));
+  EXPECT_THAT(with("link: l, X_link_optical: [[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]"), HasSubstr("a rotation"));
+  EXPECT_THAT(with("link: l, X_link_optical: [[2,0,0,0],[0,2,0,0],[0,0,2,0],[0,0,0,1]]"), HasSubstr("a rotation"));
+  EXPECT_THAT(with("link: l, X_link_optical: {rpy_rad: [0, 0, 0]}"), HasSubstr("xyz_m"));
+  EXPECT_THAT(with("link: l, X_link_optical: {xyz_m: [0, 0]}"), HasSubstr("three numbers"));
+  EXPECT_THAT(with("beside: a, X_beside_optical: {xyz_m: [0, 0, 0]}"), HasSubstr("the name of the other camera"));
+  EXPECT_THAT(with("beside: b"), HasSubstr("X_beside_optical"));
+  EXPECT_THAT(with("link: l, beside: b, pose: unknown"), HasSubstr("either 'link' or 'beside'"));
+}
+
+TEST(LoadRobot, GivesEveryCameraItsFrame) {
+  const std::filesystem::path source = BODYSCHEMA_SOURCE_DIR;
+  RobotSetup setup;
+  setup.model.urdf = source / "meshes/arm7/arm7.urdf";
+  setup.hand_link = "hand";
+  const StereoRig rig = parse("cameras:\n  a: {link: link3, X_link_optical: {xyz_m: [0, 0, 0.5]}, " + kLens +
+                              "}\n  b: {beside: a, X_beside_optical: {xyz_m: [0.1, 0, 0]}, " + kLens + "}\n");
+  const auto robot = load_robot(setup, rig);
+  ForwardKinematics kinematics(robot, {"link3", rig.cameras[0].link, rig.cameras[1].link});
+  std::vector<Pose> X_WL(3);
+  kinematics.compute(Eigen::VectorXd::Constant(robot->joint_count(), 0.3), X_WL);
+  EXPECT_TRUE((X_WL[0].inverse() * X_WL[1]).translation().isApprox(Eigen::Vector3d(0, 0, 0.5), 1e-9));
+  EXPECT_TRUE((X_WL[0].inverse() * X_WL[2]).translation().isApprox(Eigen::Vector3d(0.1, 0, 0.5), 1e-9));
+  EXPECT_TRUE(kinematics.moves(robot->joint_index("joint2"), 2));
+  EXPECT_FALSE(kinematics.moves(robot->joint_index("joint5"), 2));
+
+  StereoRig astray = parse("cameras:\n  a: {link: lnk3, pose: unknown, " + kLens + "}\n");
+  try {
+    (void)load_robot(setup, astray);
+    ADD_FAILURE() << "nothing was thrown";
+  } catch (const ConfigurationError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("cameras.a.link' is 'lnk3'; expected a link of robot 'arm7'"));
+    EXPECT_THAT(error.what(), HasSubstr("did you mean 'link3'?"));
+  }
 }
 
 }  // namespace

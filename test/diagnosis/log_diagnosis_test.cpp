@@ -18,20 +18,6 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-TEST(LostPictures, AreSaidWithTheReasonsMostFrequentFirst) {
-  BusStatistics bus;
-  bus.synchroniser.images = 95;
-  bus.images_malformed = 5;
-  EXPECT_EQ(lost_pictures(bus, 0.05), "") << "5 of 100";
-  bus.faults[static_cast<std::size_t>(MessageFault::kWrongSize)] = 4;
-  bus.faults[static_cast<std::size_t>(MessageFault::kNotFinite)] = 40;  // of encoders
-  bus.synchroniser.images_dropped[static_cast<std::size_t>(DropReason::kNoEncoders)] = 20;
-  EXPECT_EQ(lost_pictures(bus, 0.05),
-            "25 of 100 pictures are not used: 20 without encoder readings before and after, 4 another size than "
-            "configured, 1 malformed");
-  EXPECT_EQ(lost_pictures({}, 0.05), "");
-}
-
 constexpr double kBackground_s = 10.0;  ///< 40 pictures at 4 Hz before the arm moves
 
 /// A log of 25 s whose head looks about in a room, with `missing_share` of its encoder readings missing, or with

@@ -1,6 +1,6 @@
 // A configuration file, through every reader of its sections.
 #include "bodyschema/bus/bus_options.hpp"
-#include "bodyschema/bus/yarp_import.hpp"
+#include "bodyschema/imports/yarp_import.hpp"
 #include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/estimator/estimator_options.hpp"

@@ -2,7 +2,7 @@
 // (PPM, PGM, PNG or JPEG).
 #include <array>
 
-#include "bodyschema/bus/yarp_import.hpp"
+#include "bodyschema/imports/yarp_import.hpp"
 #include "fuzz.hpp"
 
 using namespace bodyschema;

@@ -13,7 +13,7 @@ set_tests_properties(install.consumer PROPERTIES LABELS install TIMEOUT ${timeou
 find_package(Python3 COMPONENTS Interpreter QUIET)
 if(TARGET lcmtypes_python AND Python3_FOUND)
   # Skipped where PyPI's lcm cannot be installed or there is no route for multicast.
-  foreach(example IN ITEMS listen publish)
+  foreach(example IN ITEMS listen publish masks)
     add_test(NAME install.python_example_${example}
       COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/install/python_example.py
         ${PROJECT_SOURCE_DIR}/docs/examples/${example}.py

@@ -8,6 +8,9 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/imports/joint_mapping.hpp"
+#include "imports/stills_folder.hpp"
+#include "test_data.hpp"
 
 namespace bodyschema {
 namespace {
@@ -42,14 +45,16 @@ TEST_F(StarterConfiguration, FindsTheArmBetweenRootAndHand) {
   o.width = 320;
   o.height = 240;
   o.focal_px = 420.0;
-  const std::string told = write_starter_configuration(o);
+  const std::string told = write_starter_configuration(o).text;
   EXPECT_THAT(told, HasSubstr("arm: joint1, joint2, joint3, joint4, joint5, joint6, joint7\n"));
   EXPECT_THAT(told, HasSubstr("robot and meshes load"));
   Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
   EXPECT_THAT(pipeline.setup().estimated_joints,
               ElementsAre("joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "joint7"));
-  EXPECT_THAT(pipeline.setup().model.rendered_links, ElementsAre("link1", "link2", "link3", "link4", "link5", "link6",
-                                                                 "link7", "hand", "left_finger", "right_finger"));
+  EXPECT_THAT(pipeline.setup().model.rendered_links, ElementsAre("base", "link1", "link2", "link3", "link4", "link5",
+                                                                 "link6", "link7", "hand", "left_finger",
+                                                                 "right_finger"))
+      << "the base stands in the view of cameras that stand too";
   EXPECT_TRUE(pipeline.setup().head_joints.empty());
   ASSERT_EQ(pipeline.rig().cameras.size(), 2u);
   EXPECT_EQ(pipeline.rig().cameras[1].intrinsics, (PinholeIntrinsics{320, 240, 420.0, 420.0, 159.5, 119.5}));
@@ -85,12 +90,12 @@ TEST_F(StarterConfiguration, FindsTheFolderOfThePackageThatHoldsTheMeshes) {
   o.hand_link = "tip";
   o.camera_links = {"eye"};
   o.out = folder_ / "mine";
-  EXPECT_THAT(write_starter_configuration(o), HasSubstr("robot and meshes load"));
+  EXPECT_THAT(write_starter_configuration(o).text, HasSubstr("robot and meshes load"));
 
   fs::rename(package, folder_ / "elsewhere");
   o.urdf = folder_ / "elsewhere/urdf/pointer.urdf";
   o.out = folder_ / "astray";
-  EXPECT_THAT(write_starter_configuration(o), HasSubstr("the folder that holds 'pointer_description/'"));
+  EXPECT_THAT(write_starter_configuration(o).text, HasSubstr("the folder that holds 'pointer_description/'"));
 }
 
 TEST_F(StarterConfiguration, AHumanoidsTorsoIsSharedAndItsHeadIsNoArm) {
@@ -98,7 +103,7 @@ TEST_F(StarterConfiguration, AHumanoidsTorsoIsSharedAndItsHeadIsNoArm) {
   o.urdf = kSource / "meshes/icub_right/icub_right.urdf";
   o.hand_link = "r_hand";
   o.camera_links = {"l_eye_optical", "r_eye_optical"};
-  const std::string told = write_starter_configuration(o);
+  const std::string told = write_starter_configuration(o).text;
   EXPECT_THAT(told, HasSubstr("focal length: a guess, 55"));
   Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
   const Configuration ours = Configuration::load(kSource / "config/icub_right/robot.yaml");
@@ -126,7 +131,7 @@ TEST_F(StarterConfiguration, JointsThatSlideAreGivenInMetresAndNotEstimated) {
   fs::copy(o.urdf.parent_path(), folder_ / "sliding", fs::copy_options::recursive);
   o.urdf = folder_ / "sliding/arm7.urdf";
   std::ofstream(o.urdf) << urdf;
-  EXPECT_THAT(write_starter_configuration(o), HasSubstr("robot and meshes load"));
+  EXPECT_THAT(write_starter_configuration(o).text, HasSubstr("robot and meshes load"));
   const Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
   EXPECT_THAT(pipeline.setup().fixed_joints_m, testing::Contains(testing::Key("left_finger_joint")));
   EXPECT_THAT(pipeline.setup().estimated_joints, testing::Not(testing::Contains("joint1")));
@@ -146,7 +151,7 @@ TEST_F(StarterConfiguration, AHeadThatSlidesIsLeftOutOfItsJoints) {
   std::ofstream(o.urdf) << urdf;
   o.hand_link = "r_hand";
   o.camera_links = {"l_eye_optical", "r_eye_optical"};
-  EXPECT_THAT(write_starter_configuration(o), HasSubstr("robot and meshes load"));
+  EXPECT_THAT(write_starter_configuration(o).text, HasSubstr("robot and meshes load"));
   const auto setup = RobotSetup::from(Configuration::load(o.out / "robot.yaml").section("robot"));
   EXPECT_THAT(setup.head_joints,
               testing::UnorderedElementsAre("neck_pitch", "neck_roll", "eyes_tilt", "l_eye_pan", "r_eye_pan"));
@@ -184,11 +189,229 @@ TEST_F(StarterConfiguration, NamesOfAnyLettersComeBackAsTheyAre) {
   fs::copy(o.urdf.parent_path(), folder_ / "arm", fs::copy_options::recursive);
   o.urdf = folder_ / "arm/it's.urdf";
   std::ofstream(o.urdf) << text;
-  EXPECT_THAT(write_starter_configuration(o), HasSubstr("robot and meshes load"));
+  EXPECT_THAT(write_starter_configuration(o).text, HasSubstr("robot and meshes load"));
   const auto setup = RobotSetup::from(Configuration::load(o.out / "robot.yaml").section("robot"));
   ASSERT_EQ(setup.estimated_joints.size(), 7u);
   for (std::size_t i = 0; i < names.size(); ++i) EXPECT_EQ(setup.estimated_joints[i], names[i]);
   EXPECT_THAT(setup.fixed_joints_rad, testing::Contains(testing::Key(finger)));
+}
+
+constexpr const char* kWedge =
+    "solid wedge\n"
+    "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 100 0 0\nvertex 0 100 0\nendloop\nendfacet\n"
+    "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0 100 0\nvertex 0 0 100\nendloop\nendfacet\n"
+    "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0 0 100\nvertex 100 0 0\nendloop\nendfacet\n"
+    "facet normal 0 0 1\nouter loop\nvertex 100 0 0\nvertex 0 0 100\nvertex 0 100 0\nendloop\nendfacet\n"
+    "endsolid wedge\n";
+
+/// One joint, one link with a mesh of this name.
+std::string pointer(const std::string& mesh) {
+  return R"(<robot name="pointer"><link name="base"/>
+  <link name="tip"><visual><geometry><mesh filename=")" +
+         mesh + R"(" scale="0.001 0.001 0.001"/></geometry></visual></link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>)";
+}
+
+void put(const fs::path& file, const std::string& text) {
+  fs::create_directories(file.parent_path());
+  std::ofstream(file) << text;
+}
+
+/// As `colcon build --symlink-install` leaves it: the installed package is made of links to the sources.
+TEST_F(StarterConfiguration, FollowsTheLinksOfAWorkspaceThatWasInstalledBySymlinks) {
+  const fs::path source = folder_ / "src/pointer_description";
+  const fs::path installed = folder_ / "install/pointer_description/share/pointer_description";
+  put(source / "package.xml", "<package/>");
+  put(source / "meshes/visual/wedge.stl", kWedge);
+  put(source / "urdf/pointer.urdf", pointer("package://pointer_description/meshes/visual/wedge.stl"));
+  for (const char* file : {"meshes/visual/wedge.stl", "urdf/pointer.urdf"}) {
+    fs::create_directories((installed / file).parent_path());
+    fs::create_symlink(source / file, installed / file);
+  }
+  StarterOptions o;
+  o.urdf = installed / "urdf/pointer.urdf";
+  o.out = folder_ / "mine";
+  const StarterReport report = write_starter_configuration(o);
+  EXPECT_THAT(report.text, HasSubstr("robot and meshes load"));
+  EXPECT_TRUE(report.usable);
+}
+
+TEST_F(StarterConfiguration, FindsMeshesBesideTheFolderOfTheUrdf) {
+  put(folder_ / "robot/meshes/wedge.stl", kWedge);
+  put(folder_ / "robot/urdf/pointer.urdf", pointer("../meshes/wedge.stl"));
+  put(folder_ / "bringup/urdf/pointer.urdf", pointer("../../robot/meshes/wedge.stl"));
+  for (const char* urdf : {"robot/urdf/pointer.urdf", "bringup/urdf/pointer.urdf"}) {
+    StarterOptions o;
+    o.urdf = folder_ / urdf;
+    o.out = folder_ / "mine" / urdf;
+    EXPECT_TRUE(write_starter_configuration(o).usable) << urdf;
+  }
+  // A configuration that does not name the place says which key would.
+  try {
+    (void)RobotModel::load({folder_ / "robot/urdf/pointer.urdf", {}, {"tip"}});
+    ADD_FAILURE();
+  } catch (const FileError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("allow its place with robot.mesh_search_roots: [" +
+                                    fs::canonical(folder_ / "robot/meshes").string() + "]"));
+  }
+}
+
+TEST_F(StarterConfiguration, FindsPackagesWhereRosLooksForThem) {
+  put(folder_ / "opt/share/pointer_description/meshes/wedge.stl", kWedge);
+  put(folder_ / "elsewhere/pointer.urdf", pointer("package://pointer_description/meshes/wedge.stl"));
+  StarterOptions o;
+  o.urdf = folder_ / "elsewhere/pointer.urdf";
+  o.out = folder_ / "without";
+  const StarterReport report = write_starter_configuration(o);
+  EXPECT_FALSE(report.usable) << "the command's exit status says so";
+  EXPECT_THAT(report.text, HasSubstr("to be put right: "));
+  setenv("AMENT_PREFIX_PATH", (folder_ / "opt").c_str(), 1);
+  o.out = folder_ / "with";
+  EXPECT_TRUE(write_starter_configuration(o).usable);
+  unsetenv("AMENT_PREFIX_PATH");
+}
+
+TEST_F(StarterConfiguration, WithoutCamerasTheirPosesAreToBeFound) {
+  auto o = options();
+  o.hand_link.clear();
+  o.camera_links.clear();
+  const StarterReport report = write_starter_configuration(o);
+  EXPECT_TRUE(report.usable);
+  EXPECT_THAT(report.text, HasSubstr("hand: a guess, hand\n"));
+  EXPECT_THAT(report.text, HasSubstr("camera camera: its pose is to be found"));
+  EXPECT_THAT(report.text, HasSubstr("focal length: a guess"));
+  EXPECT_THAT(report.text, HasSubstr("principal point: a guess, the picture's middle"));
+  EXPECT_FALSE(fs::exists(o.out / "simulator.yaml")) << "which camera should it play?";
+  const Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
+  ASSERT_EQ(pipeline.rig().cameras.size(), 1u);
+  EXPECT_EQ(pipeline.rig().cameras[0].mount.knowledge, PlaceKnowledge::kUnknown);
+  EXPECT_EQ(pipeline.rig().cameras[0].mount.parent, "base");
+  EXPECT_THAT(pipeline.setup().model.rendered_links, testing::Contains("base"));
+}
+
+TEST_F(StarterConfiguration, FromStillsNothingElseIsAsked) {
+  const SmallStills stills;
+  for (const std::string camera : {"left", "right"}) {
+    stills.mask(camera + "/00.png", 255);
+    stills.write("camera_info/" + camera + ".yaml",
+                 "width: 8\nheight: 6\nd: []\nk: [8, 0, 3.6, 0, 8.1, 2.4, 0, 0, 1]\nr: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+                 "p: [8, 0, 3.6, " +
+                     std::string(camera == "right" ? "-0.96" : "0") + ", 0, 8.1, 2.4, 0, 0, 0, 1, 0]\n");
+  }
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.stills = stills.path();
+  o.out = folder_ / "mine";
+  const StarterReport report = write_starter_configuration(o);
+  EXPECT_TRUE(report.usable) << report.text;
+  EXPECT_THAT(report.text, testing::Not(HasSubstr("focal length")));
+  const Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
+  const auto& cameras = pipeline.rig().cameras;
+  ASSERT_EQ(cameras.size(), 2u);
+  EXPECT_EQ(cameras[0].name, "left");
+  EXPECT_EQ(cameras[0].intrinsics, (PinholeIntrinsics{8, 6, 8, 8.1, 3.6, 2.4}));
+  EXPECT_EQ(cameras[0].mount.knowledge, PlaceKnowledge::kUnknown);
+  EXPECT_TRUE(cameras[1].mount.relative) << "the pair's calibration says where the right one is";
+  EXPECT_TRUE(cameras[1].mount.X_PC.translation().isApprox(Eigen::Vector3d(0.12, 0, 0), 1e-6));
+  EXPECT_TRUE(pipeline.make_stream().expects_masks()) << "the folder has masks";
+  EXPECT_TRUE(pipeline.setup().fixed_joints_rad.empty()) << "all that moves is recorded";
+
+  o.masks = false;
+  o.out = folder_ / "bare";
+  EXPECT_TRUE(write_starter_configuration(o).usable);
+  EXPECT_FALSE(Pipeline(Configuration::load(o.out / "estimator.yaml")).make_stream().expects_masks());
+}
+
+TEST_F(StarterConfiguration, StillsOfACameraOfAnyNameOnALinkOfTheRobot) {
+  const SmallStills stills;
+  fs::rename(stills.path() / "images/left", stills.path() / "images/cam_high");
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.stills = stills.path();
+  o.camera_links = {"cam_high=camera_left_optical"};
+  o.out = folder_ / "mine";
+  EXPECT_TRUE(write_starter_configuration(o).usable);
+  const Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
+  ASSERT_EQ(pipeline.rig().cameras.size(), 1u);
+  EXPECT_EQ(pipeline.rig().cameras[0].name, "cam_high");
+  EXPECT_EQ(pipeline.rig().cameras[0].link, "camera_left_optical");
+  EXPECT_EQ(pipeline.rig().cameras[0].intrinsics.width, 8) << "as the picture says";
+  o.camera_links = {"cam_low=camera_left_optical"};
+  o.out = folder_ / "wrong";
+  EXPECT_THROW((void)write_starter_configuration(o), ConfigurationError);
+}
+
+TEST_F(StarterConfiguration, StillsWhoseColumnsAreNoJointsAreToBePutRight) {
+  const SmallStills stills;
+  stills.write("joints.csv", "posture,j1,joint2,joint3,joint4,joint5,joint6,joint7\n0,90,2,3,4,5,6,7\n");
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.stills = stills.path();
+  o.out = folder_ / "mine";
+  const StarterReport report = write_starter_configuration(o);
+  EXPECT_FALSE(report.usable);
+  EXPECT_THAT(report.text, HasSubstr("to be put right: joints.csv has no column of joint1; say which of j1 is which"));
+  EXPECT_THAT(report.text, HasSubstr("is taken for deg"));
+  const auto configuration = Configuration::load(o.out / "estimator.yaml");
+  EXPECT_TRUE(JointMapping::from(configuration.section("import")).in_degrees);
+  EXPECT_TRUE(JointMapping::from(configuration.section("import")).joints.contains("j1"));
+}
+
+TEST_F(StarterConfiguration, PicturesOfAnotherSizeThanTheirCalibrationAreToBePutRight) {
+  const SmallStills stills;
+  stills.write("camera_info/left.yaml", "width: 16\nheight: 12\nd: []\nk: [16, 0, 7, 0, 16, 5, 0, 0, 1]\n");
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.stills = stills.path();
+  o.out = folder_ / "mine";
+  const StarterReport report = write_starter_configuration(o);
+  EXPECT_FALSE(report.usable);
+  EXPECT_THAT(report.text, HasSubstr("left.yaml is of pictures of 16x12 px, those of camera left are 8x6"));
+}
+
+TEST_F(StarterConfiguration, ACameraPoseIsReadWhereItIsNamedAndOnlyThere) {
+  const SmallStills stills;
+  const auto pose = [](double x) {
+    return "[[0, 0, 1, " + std::to_string(x) + "], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]]";
+  };
+  const auto file = stills.write("camera_pose.json", R"({"base_link": "base", "X_base_optical": {"a": {"left": )" +
+                                                         pose(1) + R"(, "right": )" + pose(2) + R"(}, "b": {"left": )" +
+                                                         pose(3) + "}}}");
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.stills = stills.path();
+  o.out = folder_ / "unknown";
+  (void)write_starter_configuration(o);
+  EXPECT_EQ(Pipeline(Configuration::load(o.out / "estimator.yaml")).rig().cameras[0].mount.knowledge,
+            PlaceKnowledge::kUnknown);
+  o.camera_pose = file.string() + ":a";
+  o.out = folder_ / "known";
+  EXPECT_TRUE(write_starter_configuration(o).usable);
+  const Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
+  EXPECT_EQ(pipeline.rig().cameras[1].mount.knowledge, PlaceKnowledge::kKnown);
+  EXPECT_EQ(pipeline.rig().cameras[1].mount.X_PC.translation().x(), 2.0);
+  o.out = folder_ / "none";
+  for (const char* method : {"", ":b", ":c"}) {
+    o.camera_pose = file.string() + method;
+    EXPECT_THROW((void)write_starter_configuration(o), FileError) << method;
+  }
+}
+
+/// Robots of others: an arm without a hand, a gripper whose fingers slide, and two arms with fingers that turn.
+TEST_F(StarterConfiguration, GuessesTheHandOfOtherPeoplesRobots) {
+  SKIP_WITHOUT("real");
+  const auto told = [&](const std::string& urdf) {
+    StarterOptions o;
+    o.urdf = data_folder() / "real/robots" / urdf;
+    o.out = folder_ / fs::path(urdf).stem();
+    return write_starter_configuration(o).text;
+  };
+  EXPECT_THAT(told("lbr_med7/lbr_med7.urdf"), HasSubstr("hand: a guess, lbr_link_7\n"));
+  EXPECT_THAT(told("panda/panda.urdf"), HasSubstr("hand: a guess, panda_hand\n"));
+  EXPECT_THAT(told("g1/g1_29dof_rev_1_0_with_inspire_hand_DFQ.urdf"),
+              HasSubstr("hand: a guess, L_hand_base_link; it could be R_hand_base_link as well (--hand)\n"));
 }
 
 TEST_F(StarterConfiguration, ReplacesNothing) {

@@ -110,7 +110,14 @@ constexpr Touches kCatalogue[] = {
     {"velocity_lag:joint=r_elbow,value=100", true, false, false, false, true},
     {"acceleration_lag:joint=r_elbow,value=2", true, false, false, false, true},
     {"local_kink:joint=r_elbow,value=3", true, false, false, false, true},
-    {"random_walk:joint=r_elbow,value=3", true, false, false, false, true}};
+    {"random_walk:joint=r_elbow,value=3", true, false, false, false, true},
+    {"camera_rotation:source=left,axis=y,value=2", false, false, true, false, true},
+    {"camera_position:axis=z,value=5", false, false, true, false, true},
+    {"cover_dilation:part=hand,value=2", false, false, false, false, true},
+    {"held:thing=box", false, false, false, false, true},
+    {"stalled_encoder:joint=r_elbow,at=0.2", false, true, false, false, false},
+    {"exposure_time:value=80", false, false, false, false, true},
+    {"readout_time:value=80", false, false, false, false, true}};
 
 class EveryFault : public ::testing::TestWithParam<Touches> {};
 
@@ -442,6 +449,213 @@ TEST(FaultSite, ThePanOfAnEyeThatTiltsByItselfTurnsItSideways) {
     EXPECT_EQ(model->joints()[static_cast<std::size_t>(*site.left_pan)].name, "l_pan");
     EXPECT_EQ(model->joints()[static_cast<std::size_t>(*site.right_pan)].name, "r_pan");
     EXPECT_EQ(site.head, std::vector<Eigen::Index>{model->joint_index("neck")});
+  }
+}
+
+/// The pose of the hand in a camera of a run with a fault, in that camera as it should be.
+TEST(Cameras, TurnAndMoveInTheirOwnFramesOrTogetherAboutTheirMiddle) {
+  const auto& stage = icub_right();
+  auto plan = joints_only();
+  plan.frames = 5;
+  const auto good = run(stage.simulator(plan));
+  const auto with_fault = [&](const std::string& fault) {
+    auto other = plan;
+    other.faults = {FaultSpec::parse(fault)};
+    return run(stage.simulator(other));
+  };
+  const auto check = [&](const std::string& fault, std::size_t c, const Pose& X_CT) {
+    const auto bad = with_fault(fault);
+    for (std::size_t i = 0; i < good.size(); ++i) {
+      const Pose expected = good[i].truth[c].X_WC * X_CT;
+      EXPECT_LT((bad[i].truth[c].X_WC.matrix() - expected.matrix()).norm(), 1e-9) << fault << " camera " << c;
+    }
+  };
+  const Eigen::AngleAxisd yaw(radians(1.5), Eigen::Vector3d::UnitY());
+  check("camera_rotation:source=left,axis=y,value=1.5", 0, Pose(yaw));
+  check("camera_rotation:source=left,axis=y,value=1.5", 1, Pose::Identity());
+  check("camera_rotation:source=difference,axis=y,value=3", 1, Pose(yaw.inverse()));
+  check("camera_position:source=right,axis=z,value=4", 1, Pose(Eigen::Translation3d(0, 0, 0.004)));
+  check("camera_position:source=right,axis=z,value=4", 0, Pose::Identity());
+  // Eyes that look ahead side by side: both are shifted alike, and turned about the middle between them.
+  check("camera_position:source=common,axis=x,value=6", 0, Pose(Eigen::Translation3d(0.006, 0, 0)));
+  check("camera_position:source=common,axis=x,value=6", 1, Pose(Eigen::Translation3d(0.006, 0, 0)));
+  const double half = 0.5 * (good[0].truth[1].X_WC.translation() - good[0].truth[0].X_WC.translation()).norm();
+  for (const std::size_t c : {0, 1}) {
+    const Eigen::Translation3d to_middle(c == 0 ? half : -half, 0, 0);
+    check("camera_rotation:axis=y,value=1.5", c, Pose(to_middle * yaw * to_middle.inverse()));
+  }
+  // They turn with the head: at other neck angles in the same way.
+  auto moving = stage;
+  moving.settings.head_moves = true;
+  moving.settings.motion.head_motion_deg = 10.0;
+  const auto straight = run(moving.simulator(plan));
+  plan.faults = {FaultSpec::parse("camera_rotation:axis=z,value=2")};
+  const auto turned = run(moving.simulator(plan));
+  for (std::size_t i = 0; i < straight.size(); ++i) {
+    const Eigen::Translation3d to_middle(half, 0, 0);
+    const Eigen::AngleAxisd roll(radians(2.0), Eigen::Vector3d::UnitZ());
+    const Pose expected = straight[i].truth[0].X_WC * Pose(to_middle * roll * to_middle.inverse());
+    EXPECT_LT((turned[i].truth[0].X_WC.matrix() - expected.matrix()).norm(), 1e-9);
+  }
+}
+
+TEST(Cameras, LensesOfOneCameraAlone) {
+  const auto& stage = icub_right();
+  const auto body = [&](const std::string& fault) { return stage.simulator(with(fault)).robot().body(); };
+  const auto nominal = stage.rig.cameras[0].intrinsics;
+  const auto longer = body("focal_length:source=right,value=2");
+  EXPECT_DOUBLE_EQ(longer.cameras[0].intrinsics.fx, nominal.fx);
+  EXPECT_DOUBLE_EQ(longer.cameras[1].intrinsics.fy, 1.02 * nominal.fy);
+  const auto apart = body("focal_length:source=difference,value=2");
+  EXPECT_DOUBLE_EQ(apart.cameras[0].intrinsics.fx, 1.01 * nominal.fx);
+  EXPECT_DOUBLE_EQ(apart.cameras[1].intrinsics.fx, 0.99 * nominal.fx);
+  const auto bent = body("distortion:source=left,coefficient=p2,value=0.01");
+  EXPECT_EQ(bent.cameras[0].distortion, (std::array<double, 5>{0, 0, 0, 0.01, 0}));
+  EXPECT_EQ(bent.cameras[1].distortion, (std::array<double, 5>{}));
+}
+
+/// How large each cover is, as the robot was built.
+TEST(Cameras, ARigWithoutThatCameraSaysSo) {
+  auto stage = icub_right();
+  stage.rig.cameras.resize(1);
+  for (const char* fault : {"focal_length:source=right,value=2", "camera_rotation:source=difference,value=2"}) {
+    EXPECT_THROW((void)stage.simulator(with(fault)), ConfigurationError) << fault;
+  }
+  EXPECT_NO_THROW((void)stage.simulator(with("camera_rotation:source=left,value=2")));
+}
+
+TEST(Covers, ScaleAndThicknessBefallOnePartAlone) {
+  const auto& stage = icub_right();
+  const auto covers = [&](const std::string& fault) { return stage.simulator(with(fault)).robot().body().covers; };
+  const auto scaled = [&](const std::string& part) {
+    std::set<std::string> links;
+    const auto list = covers("mesh_scale:value=3,part=" + part);
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      if (list[i].scale != 1.0) {
+        EXPECT_DOUBLE_EQ(list[i].scale, 1.03);
+        links.insert(stage.model->meshes()[i].link);
+      }
+    }
+    return links;
+  };
+  using Links = std::set<std::string>;
+  EXPECT_EQ(scaled("palm"), (Links{"r_hand", "r_wrist_2"}));  // rigid with it
+  EXPECT_EQ(scaled("fingers").size(), 16u);
+  EXPECT_EQ(scaled("fingers").count("r_thumb_4"), 1u);
+  EXPECT_EQ(scaled("hand").size(), 18u);
+  EXPECT_EQ(scaled("forearm"), (Links{"r_elbow_1", "r_forearm"}));
+  EXPECT_EQ(scaled("upper_arm"), (Links{"r_upper_arm"}));
+  EXPECT_EQ(scaled("r_forearm+r_wrist_1"), (Links{"r_forearm", "r_wrist_1"}));
+  EXPECT_EQ(scaled("all").size(), stage.model->meshes().size());
+  const auto thick = covers("cover_dilation:value=2.5,part=r_forearm");
+  for (std::size_t i = 0; i < thick.size(); ++i) {
+    EXPECT_DOUBLE_EQ(thick[i].dilation_m, stage.model->meshes()[i].link == "r_forearm" ? 0.0025 : 0.0);
+  }
+  try {
+    (void)covers("mesh_scale:value=3,part=r_forarm");
+    FAIL() << "a cover that is not there";
+  } catch (const ConfigurationError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("part is 'r_forarm'"));
+    EXPECT_THAT(e.what(), HasSubstr("did you mean 'r_forearm'"));
+  }
+}
+
+/// In pictures: of a forearm 2 mm thicker, its outline moves by that much, and no other.
+TEST(Covers, AThickerForearmMovesItsOwnOutlineOnly) {
+  const auto& stage = icub_right();
+  auto plan = with("cover_dilation:value=3,part=forearm");
+  plan.output = Output::kSilhouettes;
+  plan.frames = 8;
+  const Pair pair(plan);
+  const auto& k = stage.rig.cameras[0].intrinsics;
+  double near_tips = 0.0, more = 0.0;
+  for (std::size_t i = 0; i < pair.good.size(); ++i) {
+    const auto& before = *pair.good[i].cameras[0];
+    const auto& after = *pair.bad[i].cameras[0];
+    for (int v = 0; v < k.height; ++v) {
+      for (int u = 0; u < k.width; ++u) {
+        const auto p = static_cast<std::size_t>(v * k.width + u);
+        const double change = (after.coverage[p] - before.coverage[p]) / 255.0;
+        more += change;
+        for (const auto& tip : pair.good[i].truth[0].fingertips_px) {
+          if ((tip - Eigen::Vector2d(u, v)).norm() < 6.0) near_tips += std::abs(change);
+        }
+      }
+    }
+  }
+  EXPECT_GT(more, 50.0);
+  EXPECT_EQ(near_tips, 0.0);
+}
+
+TEST(StalledEncoder, RepeatsItselfToTheBitAndComesBack) {
+  const auto& stage = icub_right();
+  auto plan = with("stalled_encoder:joint=r_elbow,at=0.3,value=0.4");
+  plan.frames = 40;
+  const Pair pair(plan);
+  Simulator simulator = stage.simulator(plan);
+  const double begin = simulator.robot().site().begin_s;
+  const auto j = stage.joint("r_elbow");
+  std::set<double> readings;
+  int stalled = 0, others = 0;
+  for (std::size_t i = 0; i < pair.bad.size(); ++i) {
+    for (std::size_t k = 0; k < pair.bad[i].encoders.size(); ++k) {
+      const auto& good = pair.good[i].encoders[k];
+      const auto& bad = pair.bad[i].encoders[k];
+      const double t = seconds(good.utime - simulator.settings().start_utime) - begin;
+      // Other joints, and this one at other times, read the same noise as ever.
+      for (Eigen::Index other = 0; other < good.q.size(); ++other) {
+        if (other == j && t > 0.29 && t < 0.71) continue;
+        others += good.q[other] != bad.q[other] ? 1 : 0;
+      }
+      if (t < 0.301 || t > 0.699) continue;
+      readings.insert(bad.q[j]);
+      ++stalled;
+      if (t > 0.36) {
+        EXPECT_EQ(bad.qdot[j], 0.0);
+      }
+    }
+  }
+  EXPECT_GE(stalled, 38);
+  EXPECT_EQ(readings.size(), 1u);
+  EXPECT_EQ(others, 0);
+}
+
+TEST(AxisShift, AlongAnyDirectionOfTheLinkAndAlongItsBone) {
+  const auto& stage = icub_right();
+  const auto move = [&](const std::string& along) {
+    const Pair pair(with("axis_shift:joint=r_elbow,value=7,along=" + along));
+    ForwardKinematics nominal(stage.model, {"r_upper_arm", stage.rig.cameras[0].link});
+    std::vector<Pose> X_W(2);
+    nominal.compute(pair.good[4].truth[0].q, X_W);
+    const Eigen::Vector3d shift_W = pair.good[4].truth[0].X_WC.linear() * (pair.bad[4].truth[0].X_CP.translation() -
+                                                                           pair.good[4].truth[0].X_CP.translation());
+    return Eigen::Vector3d(X_W[0].linear().transpose() * shift_W);  // in the link that carries the elbow
+  };
+  EXPECT_LT((move("x") - Eigen::Vector3d(0.007, 0, 0)).norm(), 1e-9);
+  EXPECT_LT((move("y") - Eigen::Vector3d(0, 0.007, 0)).norm(), 1e-9);
+  EXPECT_LT((move("z") - Eigen::Vector3d(0, 0, 0.007)).norm(), 1e-9);
+  const Eigen::Vector3d bone = move("bone");
+  EXPECT_NEAR(bone.norm(), 0.007, 1e-9);
+  // Away from the shoulder: the distance between shoulder and elbow grows by all of it.
+  ForwardKinematics kinematics(stage.model, {"r_upper_arm", "r_elbow_1"});
+  std::vector<Pose> X_W(2);
+  kinematics.compute(Eigen::VectorXd::Zero(stage.model->joint_count()), X_W);
+  const Eigen::Vector3d shoulder = kinematics.joint_axis(stage.joint("r_shoulder_yaw")).point_W;
+  const Eigen::Vector3d elbow = kinematics.joint_axis(stage.joint("r_elbow")).point_W;
+  const Eigen::Vector3d longer = elbow + X_W[0].linear() * bone;
+  EXPECT_NEAR((longer - shoulder).norm() - (elbow - shoulder).norm(), 0.007, 1e-9);
+}
+
+TEST(Slip, SeveralJointsAndTimesAddUp) {
+  auto plan = with("slip:joint=r_elbow,value=3,at=0.2");
+  plan.faults.push_back(FaultSpec::parse("slip:joint=r_elbow,value=-1,at=0.6"));
+  plan.faults.push_back(FaultSpec::parse("slip:joint=r_wrist_yaw,value=4,at=0.4"));
+  const Pair pair(plan);
+  for (const auto& [t_s, elbow, wrist] :
+       {std::tuple{0.1, 0.0, 0.0}, std::tuple{0.3, 3.0, 0.0}, std::tuple{0.5, 3.0, 4.0}, std::tuple{0.8, 2.0, 4.0}}) {
+    const auto frame = static_cast<std::size_t>(t_s * 30.0);
+    EXPECT_NEAR(pair.dq_deg(frame, "r_elbow"), elbow, 1e-6) << t_s;
+    EXPECT_NEAR(pair.dq_deg(frame, "r_wrist_yaw"), wrist, 1e-6) << t_s;
   }
 }
 

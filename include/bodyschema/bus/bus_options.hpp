@@ -10,12 +10,13 @@
 
 namespace bodyschema {
 
-/// Names of the four channels, e.g. ICUB_JOINT_STATE.
+/// Names of the channels, e.g. ICUB_JOINT_STATE.
 struct Channels {
   std::string joint_state;     ///< bot_core::joint_state_t, in
   std::string cameras;         ///< bot_core::images_t, in
   std::string joint_offsets;   ///< bodyschema::joint_offsets_t, out
   std::string offsets_status;  ///< bodyschema::offsets_status_t, out
+  std::string masks;           ///< bot_core::images_t, in: silhouettes that others found in the pictures
   static Channels with_prefix(const std::string& prefix);
 };
 

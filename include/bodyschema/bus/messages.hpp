@@ -39,8 +39,9 @@ enum class MessageFault {
   kUnsupportedFormat,  ///< a pixel format this project does not read
   kBrokenPicture,      ///< a JPEG that does not decode
   kOtherKind,          ///< a gray picture of a camera whose pictures are in colour, or the reverse
+  kBadMask,            ///< a mask of another size than its pictures, in colour, or of other values than masks have
 };
-inline constexpr std::size_t kMessageFaultCount = 13;
+inline constexpr std::size_t kMessageFaultCount = 14;
 
 /// Lower-case words with underscores ("wrong_type"), as used in counters.
 [[nodiscard]] std::string_view name_of(MessageFault fault);
@@ -97,6 +98,10 @@ struct ImagesView {
 /// A received picture as 8-bit gray or RGB. A JPEG's own size is read and compared with the
 /// message's before it is decompressed.
 [[nodiscard]] DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limits = {});
+
+/// Turns a picture into a mask of exactly the values of geometry/image.hpp, in place: gray, or RGB that is gray; up to 63 is background,
+/// from 192 on robot, unknown between. A mask whose largest value is one of 1 to 63 is none (0 and 1, most likely).
+[[nodiscard]] DecodeResult to_mask(Image& picture);
 
 /// A raw gray or RGB picture as it goes into a message.
 [[nodiscard]] bot_core::image_t to_message(const Image& image, Microseconds utime);

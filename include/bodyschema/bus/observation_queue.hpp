@@ -20,6 +20,7 @@ class ObservationQueue {
     {
       const std::lock_guard lock(mutex_);
       if (waiting_.size() >= capacity_) {
+        keep_encoders(waiting_.front().observation, waiting_.size() > 1 ? waiting_[1].observation : observation.observation);
         waiting_.pop_front();
         ++shed_;
       }
@@ -50,6 +51,13 @@ class ObservationQueue {
   [[nodiscard]] std::size_t size() const {
     const std::lock_guard lock(mutex_);
     return waiting_.size();
+  }
+
+  /// Pictures may be left out, encoders may not: what has a memory lives on all of them.
+  static void keep_encoders(const Observation& shed, Observation& next) {
+    if (next.encoders_begin_anew) return;
+    next.encoders.insert(next.encoders.begin(), shed.encoders.begin(), shed.encoders.end());
+    next.encoders_begin_anew = shed.encoders_begin_anew;
   }
 
   /// Observations shed since construction.

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,7 +13,6 @@
 #include "bodyschema/bus/bus_options.hpp"
 #include "bodyschema/bus/joint_assembler.hpp"
 #include "bodyschema/camera/stereo_rig.hpp"
-#include "bodyschema/observation/encoder_follower.hpp"
 #include "bodyschema/robot/robot_model.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
 
@@ -24,14 +24,21 @@ struct BusStatistics {
   std::uint64_t images_malformed = 0;    ///< pictures of good messages that could not be used
   std::uint64_t lost_in_queue = 0;       ///< LostMessages, which the network's side fills in
   std::uint64_t lost_incomplete = 0;
-  /// Messages and pictures by what was wrong with them.
+  /// Messages, pictures and masks by what was wrong with them.
   std::array<std::uint64_t, kMessageFaultCount> faults{};
   SynchroniserStatistics synchroniser;
 
   /// Every counter of what was not used, e.g. {"malformed.truncated", 3}, {"dropped.overload", 0},
   /// {"joint_state.out_of_order", 1}; the order is fixed.
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> counters() const;
+  /// How many pictures were not used and why, in one sentence; empty where that is at most this share of all.
+  [[nodiscard]] std::string lost_pictures(double tolerable_share) const;
 };
+
+/// Joints that move nothing that is seen or sees, neither rendered links, hand and fingertips nor cameras: they need
+/// not be published.
+[[nodiscard]] std::set<std::string> idle_joints(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                                                const StereoRig& rig);
 
 /// From raw messages to observations: decodes, refuses what is malformed, synchronises. The live
 /// daemon, replay and diagnosis all enter here, so that the same messages in the same order give
@@ -43,17 +50,14 @@ class ObservationStream {
  public:
   /// @param joint_names  RobotModel order
   /// @param fixed_rad  values of joints the robot does not publish
-  /// @param cameras  the rig's: one named "left" or "right", or both, left first; pictures of
-  ///        another size are refused. Throws ConfigurationError for other names.
+  /// @param cameras  the rig's: one or two, by their numbers in messages; pictures of another size are
+  ///        refused. Throws ConfigurationError for more, or another order.
   ObservationStream(const std::vector<std::string>& joint_names, const std::map<std::string, double>& fixed_rad,
                     const std::vector<CameraModel>& cameras, const BusOptions& options);
   /// For a configured robot. A joint that moves a rendered link, the hand, a fingertip or a camera
   /// must be published or fixed; all others (the other arm, legs) rest at their default.
   ObservationStream(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup, const StereoRig& rig,
                     const BusOptions& options);
-
-  /// From now on the follower sees all encoder samples and annotates every observation.
-  void set_follower(std::unique_ptr<EncoderFollower> follower) { follower_ = std::move(follower); }
 
   /// Pictures of this camera are gray (1 channel) or in colour (3) for good: its background is given.
   /// Otherwise its first picture decides; another kind is refused, unless it comes for some ten seconds
@@ -63,7 +67,8 @@ class ObservationStream {
   /// @param arrival_us  the caller's clock, handed through to ArrivedObservation
   /// @return whether the channel is one of our inputs
   bool receive(std::string_view channel, Bytes message, std::int64_t arrival_us = 0);
-  /// The next observation, oldest first. Call until empty after each receive().
+  /// The next observation, oldest first, with the encoder samples since the one before. Call until empty after each
+  /// receive().
   std::optional<ArrivedObservation> next();
   /// End of the recording: settles what waits; next() yields the rest.
   void finish();
@@ -71,6 +76,8 @@ class ObservationStream {
   [[nodiscard]] BusStatistics statistics() const;
   [[nodiscard]] const Synchroniser& synchroniser() const { return synchroniser_; }
   [[nodiscard]] const Channels& channels() const { return channels_; }
+  /// Whether pictures are of use with their masks alone (SynchroniserOptions::masks), which come on channels().masks.
+  [[nodiscard]] bool expects_masks() const { return options_.synchroniser.masks; }
 
  private:
   struct CameraFormat {
@@ -90,9 +97,9 @@ class ObservationStream {
   ObservationStream(const RobotModel& robot, const RobotSetup& setup, const std::vector<CameraModel>& cameras,
                     const BusOptions& options);
   void receive_joints(Bytes message);
-  void show_follower();
-  void annotate(Observation& observation);
+  void keep_encoders();
   void receive_images(Bytes message, std::int64_t arrival_us);
+  void receive_masks(Bytes message, std::int64_t arrival_us);
   static DecodeResult admit_kind(CameraFormat& camera, int channels);
   void refuse(const std::string& source, const DecodeResult& result);
   void warn_of_missing_joints();
@@ -103,9 +110,10 @@ class ObservationStream {
   Channels channels_;
   Synchroniser synchroniser_;
   JointAssembler assembler_;
-  std::unique_ptr<EncoderFollower> follower_;
-  std::uint64_t clock_steps_ = 0;  ///< when the follower saw its last sample
-  Microseconds shown_ = -1;        ///< that sample's stamp
+  std::vector<JointSample> encoders_;  ///< since the last observation
+  bool encoders_begin_anew_ = false;
+  std::uint64_t clock_steps_ = 0;  ///< when the last sample was kept
+  Microseconds kept_ = -1;         ///< that sample's stamp
   BusStatistics statistics_;
   JointStateMessage joint_state_;
   ImagesView images_;

@@ -22,6 +22,10 @@ struct SynchroniserOptions {
   Microseconds camera_wait = 100'000;
   /// An instant without encoders is given up once the newest picture is this far ahead of it.
   Microseconds encoder_wait = 200'000;
+  /// Whether a picture is of use with its mask alone, as others find it, and comes by add_mask().
+  bool masks = false;
+  /// A picture without mask is given up once the newest stamp, of pictures and encoders, is this far ahead of it.
+  Microseconds mask_wait = 500'000;
   /// A camera silent for longer than this counts as a gap.
   Microseconds max_image_gap = 200'000;
   /// Whether an instant with one camera missing is passed on.
@@ -46,10 +50,13 @@ enum class DropReason {
   kOverload,      ///< shed because newer ones came faster than they were used
   kOutOfOrder,    ///< its stamp is not after that of an earlier picture of its camera
   kDuplicate,     ///< a picture of that camera with the same stamp came before
+  kNoMask,        ///< its mask did not come in time
 };
-inline constexpr std::size_t kDropReasonCount = 9;
+inline constexpr std::size_t kDropReasonCount = 10;
 /// Lower-case words with underscores ("no_encoders"), as used in counters.
 [[nodiscard]] std::string_view name_of(DropReason reason);
+/// For people, behind a number of pictures: "without encoder readings before and after".
+[[nodiscard]] std::string_view in_words(DropReason reason);
 
 struct SynchroniserStatistics {
   std::uint64_t joint_messages = 0;            ///< taken in
@@ -59,6 +66,9 @@ struct SynchroniserStatistics {
   std::uint64_t images = 0;  ///< offered; each ends up used, dropped or waiting
   std::uint64_t images_used = 0;
   std::array<std::uint64_t, kDropReasonCount> images_dropped{};
+  std::uint64_t masks = 0;              ///< offered; each ends up used, late, unused or waiting
+  std::uint64_t masks_late = 0;         ///< came when their picture had been used or given up
+  std::uint64_t masks_unused = 0;       ///< no picture of their camera and stamp came, or none that could be used
   std::uint64_t observations = 0;       ///< made, mono ones included
   std::uint64_t mono_observations = 0;  ///< of a rig with two cameras
   std::uint64_t gaps = 0;
@@ -96,6 +106,10 @@ struct ArrivedObservation {
 /// instant waits for the encoder reading after it. A picture alone is passed on alone, when that is
 /// allowed, once its partner cannot come any more.
 ///
+/// Where masks are asked for, each belongs to the picture of its camera with the same stamp, and may come before or
+/// after it. An instant waits for the masks of all its pictures; a picture whose mask does not come in time is left
+/// out of it.
+///
 /// Only stamps and the order of the calls count, never the time at which they are made: a recorded
 /// log gives the observations the live robot gave. Stamps of observations rise strictly, but for a
 /// counted clock step. Memory is bounded whatever arrives. Pure computation; one thread; throws
@@ -111,6 +125,8 @@ class Synchroniser {
   void add(const JointStateMessage& message);
   /// The pictures of one message; each camera at most once, others are ignored.
   void add(std::vector<StampedImage> images);
+  /// A mask of the values of to_mask() and its picture's stamp. Nothing where no masks are asked for.
+  void add_mask(StampedImage mask);
   /// The next observation, oldest first.
   std::optional<ArrivedObservation> next();
   /// Nothing more will come: pictures still without partner are settled, those without encoders
@@ -129,6 +145,8 @@ class Synchroniser {
   };
   struct Camera {
     std::deque<QueuedImage> queue;
+    std::deque<StampedImage> masks;  ///< whose picture may still come, or waits
+    Microseconds settled = -1;       ///< stamp of the last picture that was used or given up
     Microseconds last = -1;
     int older_in_a_row = 0;
     std::array<Microseconds, 8> intervals{};  ///< between its last pictures; 0: not known
@@ -146,6 +164,10 @@ class Synchroniser {
   void settle_alone(Camera& camera);
   void queue_instant(Instant instant);
   void resolve(bool finishing);
+  /// Whether all masks are there or cannot be waited for; pictures without one are then left out of the instant.
+  bool settle_masks(Instant& instant, bool finishing);
+  std::deque<StampedImage>::iterator mask_of(const StampedImage& picture);
+  void settle(const StampedImage& picture);
   void drop(const Instant& instant, DropReason reason);
   void count_dropped(DropReason reason, std::uint64_t images = 1);
   void start_anew();
@@ -155,7 +177,7 @@ class Synchroniser {
   std::vector<Camera> cameras_;
   std::deque<Instant> instants_;
   std::deque<ArrivedObservation> ready_;
-  Microseconds newest_image_ = -1;
+  Microseconds newest_image_ = -1, newest_joints_ = -1;  ///< of the last message of either
   Microseconds last_emitted_ = -1;
   int older_joints_in_a_row_ = 0;
   std::uint64_t group_ = 0;

@@ -40,6 +40,8 @@ class Configuration {
   /// The mapping under `key`; an absent key is an empty mapping (all defaults).
   [[nodiscard]] Configuration section(const std::string& key) const;
   [[nodiscard]] bool has(const std::string& key) const;
+  /// Whether the value is a mapping, for keys that may also hold a list or a word.
+  [[nodiscard]] bool is_mapping(const std::string& key) const;
   /// Keys of this mapping in document order; marks them all as known (for maps keyed by joint).
   [[nodiscard]] std::vector<std::string> keys() const;
 
@@ -51,6 +53,8 @@ class Configuration {
   /// One of `choices`; the error lists them.
   [[nodiscard]] std::string choice(const std::string& key, const std::vector<std::string>& choices) const;
   [[nodiscard]] std::vector<double> numbers(const std::string& key) const;
+  /// A table, given as a list of equally long lists.
+  [[nodiscard]] std::vector<std::vector<double>> rows(const std::string& key) const;
   [[nodiscard]] std::vector<std::string> texts(const std::string& key) const;
   /// A path; relative ones resolve against the file that holds the key.
   [[nodiscard]] std::filesystem::path path(const std::string& key) const;

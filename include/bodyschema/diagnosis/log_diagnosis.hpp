@@ -18,10 +18,6 @@ struct LogDiagnosisOptions {
   DiagnosisOptions diagnosis;  ///< `nuisances` empty: the usual ones
 };
 
-/// How many of a log's pictures were not used and why, in one sentence; empty where that is at most this
-/// share of all.
-[[nodiscard]] std::string lost_pictures(const BusStatistics& bus, double tolerable_share);
-
 /// Diagnoses a recorded log: encoders and pictures in, report.json, report.html and
 /// extended_model.yaml out.
 /// The background is learned from the whole log, the estimator gives the offsets to start from.

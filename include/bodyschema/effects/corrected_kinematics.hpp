@@ -29,12 +29,14 @@ class CorrectedKinematics {
   void compute(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera,
                std::span<Pose> X_CB);
 
-  /// Pose of the camera in the root frame at the last `compute`, with its and the base's shift.
+  /// Pose of the camera in the root frame at the last `compute`, with its own corrections and the base's shift.
   [[nodiscard]] const Pose& X_WC() const { return X_WC_; }
   /// Directions about which JointAdjustment::tilt_1_rad and tilt_2_rad turn and along which shift_1_m
   /// and shift_2_m move: unit, perpendicular to the joint's axis, fixed in its parent link; root frame,
   /// at the last `compute`. Zero for a joint that moves none of the links and cameras.
   [[nodiscard]] Eigen::Vector3d tilt_axis(Eigen::Index joint, int which) const;
+  /// Directions along which JointAdjustment::along_m (0), shift_1_m (1) and shift_2_m (2) move; as tilt_axis.
+  [[nodiscard]] Eigen::Vector3d shift_axis(Eigen::Index joint, int which) const;
   [[nodiscard]] std::size_t link_count() const { return link_count_; }
 
  private:

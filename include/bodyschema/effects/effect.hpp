@@ -1,16 +1,14 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "bodyschema/camera/stereo_rig.hpp"
-#include "bodyschema/observation/corrections.hpp"
 #include "bodyschema/effects/instant.hpp"
+#include "bodyschema/observation/corrections.hpp"
 #include "bodyschema/observation/observation.hpp"
-#include "bodyschema/robot/robot_setup.hpp"
 
 namespace bodyschema {
 
@@ -23,37 +21,19 @@ struct EffectParameter {
   double value = 0.0;        ///< SI
   bool fitted = true;        ///< false: a setting (a time, a reference), not estimated by least squares
   double typical = 0.0;      ///< SI; a plausible size, the step of secants and the scale of columns
+  /// SI; what lies below has no physical meaning.
+  double at_least = -std::numeric_limits<double>::infinity();
   [[nodiscard]] double in_unit() const { return value / si_per_unit; }
+  /// "width_deg", "compliance_deg_per_Nm", "gain_percent", "k1": as files and configurations name it.
+  [[nodiscard]] std::string key() const;
 };
 
-/// What an effect acts on: a joint for most; `source` is the second joint of a coupling or the
-/// camera of a principal point. Both empty for the whole robot.
+/// What an effect acts on: a joint for most; `source` is the second joint of a coupling, a camera or the
+/// segment of the body whose shape is meant. Both empty for the whole robot.
 struct EffectTarget {
   std::string joint;
   std::string source;
   friend bool operator==(const EffectTarget&, const EffectTarget&) = default;
-};
-
-/// Which joints play which part on this robot, by position in RobotModel order; in that order too, so from the
-/// root outwards, however a configuration lists them.
-struct JointRoles {
-  std::vector<std::string> names;  ///< every joint of the model
-  std::vector<Eigen::Index> arm;   ///< shoulder to wrist, the joints whose offsets are estimated
-  std::vector<Eigen::Index> head;  ///< every joint of neck and eyes
-  std::vector<Eigen::Index> neck;  ///< those of the head that move every camera (eyes' tilt too)
-  /// Moves the left camera alone; of several the one whose axis is nearest to the y axis of its picture at
-  /// RobotSetup::default_joints. -1: none.
-  Eigen::Index left_pan = -1;
-  Eigen::Index right_pan = -1;        ///< the same of the right camera
-  std::vector<Eigen::Index> fingers;  ///< joints that curl a finger when they grow
-  /// The roles that a configuration gives: arm and head as named there, neck and pans by what they move.
-  /// Fingers are the joints that turn a rendered link but not the hand's frame, about an axis within 45
-  /// deg of their finger's last one: joints that spread the fingers, oppose the thumb or slide are none.
-  /// Throws ConfigurationError naming the nearest joint.
-  static JointRoles of(std::shared_ptr<const RobotModel> model, const RobotSetup& setup, const StereoRig& rig);
-  [[nodiscard]] bool has_pans() const { return left_pan >= 0 && right_pan >= 0; }
-  /// Throws ConfigurationError naming the nearest joint.
-  [[nodiscard]] Eigen::Index index(const std::string& name) const;
 };
 
 /// One way in which a real robot departs from its URDF and configuration: a cause.
@@ -94,6 +74,16 @@ class Effect {
   std::string name_;
   EffectTarget target_;
   std::vector<EffectParameter> parameters_;
+};
+
+/// Gives an effect its `clone`.
+template <class Derived>
+class ClonableEffect : public Effect {
+ public:
+  using Effect::Effect;
+  [[nodiscard]] std::unique_ptr<Effect> clone() const override {
+    return std::make_unique<Derived>(static_cast<const Derived&>(*this));
+  }
 };
 
 }  // namespace bodyschema

@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "bodyschema/camera/stereo_rig.hpp"
-#include "bodyschema/effects/catalogue.hpp"
-#include "bodyschema/effects/effect.hpp"
+#include "bodyschema/effects/effect_kind.hpp"
 
 namespace bodyschema {
 

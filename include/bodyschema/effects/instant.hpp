@@ -6,6 +6,7 @@
 
 #include "bodyschema/core/time.hpp"
 #include "bodyschema/observation/observation.hpp"
+#include "bodyschema/robot/robot_setup.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
 #include "bodyschema/robot/gravity_torques.hpp"
 

@@ -1,14 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "bodyschema/core/time.hpp"
-#include "bodyschema/geometry/pose.hpp"
 #include "bodyschema/estimator/weakest_direction.hpp"
+#include "bodyschema/geometry/pose.hpp"
 
 namespace bodyschema {
 
@@ -17,8 +16,11 @@ enum class EstimatorState {
   kLearningBackground,  ///< no masks yet: the background is being learned
   kHandNotInView,       ///< the observed silhouette is empty: no update, the last offsets are kept
   kConverging,          ///< updating, not yet to be relied on
-  kConverged,           ///< pictures fit, `hand_sd_m` is small; mode paper: the spread is at its smallest, no more
-  kDiverged,            ///< the best prediction no longer fits the pictures; searching again
+  /// Several distinct postures agree within what is claimed, and the hand is known as well as asked for. In mode paper:
+  /// the spread is at its smallest, no more.
+  kConverged,
+  kDiverged,     ///< the best prediction no longer fits the pictures; searching again
+  kModelMisfit,  ///< postures agree only if something is wrong by more than is believed possible: see `misfit`
 };
 const char* to_string(EstimatorState state);
 
@@ -31,6 +33,28 @@ struct StageTimes {
   double total_ms = 0.0;
 };
 
+/// One parameter of an effect that is estimated beside the joints' offsets.
+struct EstimatedParameter {
+  std::string effect;          ///< "link_length"
+  std::string joint, source;   ///< its target
+  std::string parameter;       ///< "change"
+  std::string name;            ///< of all of these: "link_length of r_elbow", "camera_pose turn_x"
+  std::string unit;            ///< what people read: "mm", "deg", "%"
+  double si_per_unit = 1.0;    ///< value in SI = value in unit * si_per_unit
+  double value = 0.0;          ///< SI
+  double sd = 0.0;             ///< SI
+  double prior_sd = 0.0;       ///< SI, what was believed of it before any picture
+};
+
+/// What the pictures say about the memory of earlier ones.
+enum class FrameVerdict {
+  kNothingKnown,  ///< there is no memory to compare with
+  kAgrees,
+  kDoubtful,     ///< not learned from; a single bad frame, or the beginning of something
+  kContradicts,  ///< the memory does not explain it
+};
+const char* to_string(FrameVerdict verdict);
+
 /// Result of one step. Offsets follow the paper's sign: encoder = true + offset.
 struct Estimate {
   Microseconds utime = 0;
@@ -38,26 +62,37 @@ struct Estimate {
   std::vector<std::string> joint_names;  ///< the estimated joints
   Eigen::VectorXd offset_rad;            ///< one per name
   Eigen::MatrixXd covariance_rad2;
-  std::vector<std::string> nuisance_names;  ///< head offsets, camera and size parameters, if any
-  std::size_t head_joints = 0;              ///< so many of these, the first, are offsets of head joints
-  std::vector<std::string> nuisance_units;  ///< "rad", "px" or "1" (relative), one per name
-  Eigen::VectorXd nuisance;                 ///< in that unit
-  Eigen::VectorXd nuisance_sd;              ///< in that unit
+  Eigen::VectorXd prior_sd_rad;             ///< of each joint's offset before any picture
+  std::vector<EstimatedParameter> effects;  ///< what else is estimated
   double effective_sample_size = 0.0;       ///< particles, 0 when not computed from this frame
-  double best_likelihood = 0.0;             ///< 1 - Hammoude distance of the estimate, both images; 0 when not in view
-  double contour_rms_px = 0.0;              ///< outline residual, 0 when not computed from this frame
+  double best_likelihood = 0.0;             ///< 1 - Hammoude distance of the estimate, all images; 0 when not in view
+  double contour_rms_px = 0.0;              ///< outline residual, px of a 320x240 picture; 0: not from this frame
   WeakestDirection weakest;
-  double hand_sd_m = 0.0;           ///< hand base in the eye frame: root of the summed variances of x, y, z
-  std::string stalled_joint;        ///< its encoder stands although the pictures show it move;
-                                    ///< empty: none. The state is never kConverged then
+  double hand_sd_m = 0.0;        ///< hand base in the camera frame: root of the summed variances of x, y, z
+  double hand_sd_limit_m = 0.0;  ///< `converged` needs it smaller; 0: not in this mode
+  FrameVerdict verdict = FrameVerdict::kNothingKnown;
+  double innovation = 0.0;        ///< normalised innovation squared of this frame against the memory
+  double innovation_dof = 0.0;    ///< and its expectation, were all as believed
+  double innovation_usual = 1.0;  ///< mean of innovation / dof of late
+  std::size_t postures = 0;       ///< distinct ones that the offsets rest on
+  double posture_sd_rad = 0.0;    ///< what a posture gets wrong, as an angle of each joint; learned
+  double outline_sd_px = 0.0;     ///< of one residual of the outlines, measured; px of a 320x240 picture
+  double outline_alike = 0.0;     ///< how many neighbouring outline points err as one; measured
+  std::string changed;            ///< what was taken to have changed in this frame: "r_elbow slipped by 4.9 deg"
+  std::string misfit;             ///< in kModelMisfit: what is wrong by more than believed possible, and what to do
+  std::string stalled_joint;      ///< its encoder stands although the pictures show it move;
+                                  ///< empty: none. The state is never kConverged then
   double stalled_motion_rad = 0.0;  ///< how far it has been seen to move
   bool cameras_swapped = false;     ///< the left picture shows what the right eye sees and the other way
                                     ///< round; nothing is learned from them, state kDiverged. Mode best
-  std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected. In one that is absent: for
-                                    ///< the encoders of another, the camera where it was known to be when last
-                                    ///< seen; never seen since the start or a reload, where its configuration has it
+  std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected; in one that is absent for the
+                                    ///< encoders of another
   std::vector<Pose> X_CP_nominal;   ///< the same with encoders and model as they are
   StageTimes times;
+
+  /// Whether the pictures tell a joint's offset: its standard deviation is below 0.5 deg and below a third of what was
+  /// believed before.
+  [[nodiscard]] bool told(std::size_t joint) const;
 };
 
 }  // namespace bodyschema

@@ -16,7 +16,8 @@ namespace bodyschema {
 struct Contestant {
   std::string name;  ///< "best.stereo", "paper.mono", ...
   EstimatorOptions options;
-  bool mono = false;  ///< left camera only
+  bool mono = false;          ///< left camera only
+  bool offsets_only = false;  ///< nothing but the joints' offsets is estimated
 };
 
 /// What one contestant did with one frame.

@@ -30,4 +30,7 @@ struct Image {
   }
 };
 
+/// What a mask made by others holds, one of these a pixel: a gray picture.
+inline constexpr std::uint8_t kMaskBackground = 0, kMaskUnknown = 128, kMaskRobot = 255;
+
 }  // namespace bodyschema

@@ -7,7 +7,13 @@ namespace bodyschema {
 
 /// What a camera is, minus what the configuration says.
 struct CameraCorrection {
-  double shift_x_m = 0.0;    ///< camera moved along its own x axis, metres
+  /// The rig, all cameras together as they are fixed to each other, moved along and turned about the first
+  /// camera's axes: metres, rotation vector in radians.
+  Eigen::Vector3d rig_shift_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rig_turn_rad = Eigen::Vector3d::Zero();
+  /// This camera alone, along and about its own axes.
+  Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();
   double focal_scale = 0.0;  ///< fx and fy are multiplied by 1 + this
   double cx_px = 0.0;        ///< principal point, px
   double cy_px = 0.0;        ///< principal point, px
@@ -26,6 +32,12 @@ struct JointAdjustment {
   }
 };
 
+/// What the rendered parts of one segment of the body (JointRoles::segments) look like, minus what their meshes say.
+struct ShapeCorrection {
+  double scale = 0.0;        ///< parts are scaled by 1 + this about their own frames
+  double dilation_px = 0.0;  ///< the observed outline lies this far outside the predicted one
+};
+
 /// Everything in which the prediction of one camera's picture at one instant departs from what URDF
 /// and configuration say. All zero means: as they say. Effects (storey `effects`) add to it; the sum
 /// is applied.
@@ -38,18 +50,18 @@ struct Corrections {
   /// The arm stands this much further along the root's axes, seen from the eyes, metres.
   Eigen::Vector3d base_shift_m = Eigen::Vector3d::Zero();
   CameraCorrection camera;
-  double mesh_scale = 0.0;   ///< rendered parts are scaled by 1 + this about their own frames
-  double dilation_px = 0.0;  ///< the observed outline lies this far outside the predicted one
+  std::vector<ShapeCorrection> shapes;  ///< one per segment
 
-  explicit Corrections(Eigen::Index joint_count = 0)
-      : dq(Eigen::VectorXd::Zero(joint_count)), adjustments(static_cast<std::size_t>(joint_count)) {}
+  explicit Corrections(Eigen::Index joint_count = 0, std::size_t segment_count = 1)
+      : dq(Eigen::VectorXd::Zero(joint_count)), adjustments(static_cast<std::size_t>(joint_count)),
+        shapes(segment_count) {}
   /// Back to zero; allocates nothing.
   void clear() {
     dq.setZero();
     for (auto& a : adjustments) a = {};
     base_shift_m.setZero();
     camera = {};
-    mesh_scale = dilation_px = 0.0;
+    for (auto& s : shapes) s = {};
   }
 };
 

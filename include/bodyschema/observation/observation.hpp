@@ -8,7 +8,6 @@
 #include "bodyschema/core/time.hpp"
 #include "bodyschema/geometry/binary_mask.hpp"
 #include "bodyschema/geometry/image.hpp"
-#include "bodyschema/observation/corrections.hpp"
 
 namespace bodyschema {
 
@@ -25,25 +24,12 @@ struct CameraObservation {
   Microseconds utime = 0;  ///< exposure time of this picture
   JointSample joints;      ///< encoders interpolated to `utime`
   Image image;             ///< the picture as received (gray or RGB), kept for overlays
+  Image given_mask{};      ///< what others say of each pixel (kMaskRobot and its like), as the lens bends it; empty: nothing
   BinaryMask mask;         ///< the robot's silhouette, filled in by vision
   BinaryMask valid;        ///< pixels that count; empty: all
   /// Share of each pixel covered by the robot, 0 to 255, one per pixel in row order: the mask
   /// before thresholding, from which outlines are found to a fraction of a pixel. Empty: none.
   std::vector<std::uint8_t> coverage;
-  /// What is known to differ from the robot's model at this exposure, joint offsets left out.
-  /// Absent: nothing is known (no extended model).
-  std::optional<Corrections> corrections;
-};
-
-/// Where the robot was when a camera looked, as far as it is known without looking: what its pose is
-/// predicted from. Refers to its parts, which must outlive it.
-struct Exposure {
-  const Eigen::VectorXd& q;                  ///< encoders, RobotModel order, radians
-  const Corrections* corrections = nullptr;  ///< beyond the joint offsets; null: none
-  // Implicit: encoders alone, or a picture that brings both, are an exposure.
-  Exposure(const Eigen::VectorXd& encoders, const Corrections* known = nullptr) : q(encoders), corrections(known) {}
-  Exposure(const CameraObservation& seen)
-      : q(seen.joints.q), corrections(seen.corrections ? &*seen.corrections : nullptr) {}
 };
 
 /// One synchronised instant: the unit that enters the estimator, whether it came from a live robot,
@@ -52,6 +38,11 @@ struct Observation {
   Microseconds utime = 0;  ///< of the first camera that is present
   /// One per camera of the rig; absent when that camera delivered nothing within the pairing window.
   std::vector<std::optional<CameraObservation>> cameras;
+  /// Encoder samples at their full rate since the observation before, in order of time; the last ones may be later than
+  /// the exposures. Velocities zero. What has a memory or follows the motion lives on them.
+  std::vector<JointSample> encoders;
+  /// The samples before these are of another clock, or of another beginning of it.
+  bool encoders_begin_anew = false;
 };
 
 }  // namespace bodyschema

@@ -8,6 +8,7 @@
 
 #include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/effects/error_model.hpp"
+#include "bodyschema/estimator/estimate.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
 
 namespace bodyschema {
@@ -25,21 +26,19 @@ struct Correction {
   /// encoder - true, by joint name, rad.
   std::vector<std::pair<std::string, double>> offsets_rad;
   std::vector<std::pair<std::string, double>> sd_rad;
-  /// The same of the head's joints; without them those of the arm would be wrong.
-  std::vector<std::pair<std::string, double>> head_offsets_rad;
-  std::vector<std::pair<std::string, double>> head_sd_rad;
-  /// What else was estimated beside them, by name and unit ("dilation_px"); no file applies it.
-  std::vector<std::pair<std::string, double>> nuisances;
+  /// What else was estimated; it holds together with the offsets: without the head's, those of the arm would be wrong.
+  std::vector<EstimatedParameter> effects;
   /// What whoever applies it must know, one line each; stands in every file.
   std::vector<std::string> warnings;
 
-  // What an extended model adds that a URDF can hold.
+  // What effects, estimated or of an extended model, add that a URDF can hold.
   std::vector<std::pair<std::string, double>> known_offsets_rad;  ///< encoder - true, by joint
   std::vector<JointPlacement> placements;
-  std::vector<std::pair<std::string, double>> camera_shifts_m;  ///< along x of the camera, by link
+  /// Of cameras, by link: the corrected frame in the one of the URDF.
+  std::vector<std::pair<std::string, Pose>> camera_motions;
 };
 
-/// One effect of an extended model and what the exported files make of it.
+/// One effect, estimated or of an extended model, and what the exported files make of it.
 struct AppliedEffect {
   std::string effect;   ///< "link_length of r_shoulder_yaw change 2.1 mm"
   std::string applied;  ///< file that holds it; empty: none
@@ -51,9 +50,9 @@ struct AppliedEffect {
 /// Throws FileError naming file and key, DataError when the replay did not end converged.
 Correction read_correction(const std::filesystem::path& summary, bool anyway = false);
 
-/// Adds to `correction` what a URDF can hold of an extended model, and says of every effect where it
+/// Adds to `correction` what a URDF can hold of some effects, and says of every one where it
 /// went. Joint offsets are left out: those of the replay count.
-std::vector<AppliedEffect> add_extended_model(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
+std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
                                               const RobotSetup& setup, const StereoRig& rig, Correction& correction);
 
 /// A copy of the URDF that is right when it is fed the encoders as they are: every corrected joint's

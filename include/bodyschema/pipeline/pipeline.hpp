@@ -16,6 +16,7 @@
 #include "bodyschema/pipeline/frozen_picture.hpp"
 #include "bodyschema/robot/robot_model.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
+#include "bodyschema/vision/given_mask.hpp"
 #include "bodyschema/vision/segmenter.hpp"
 
 namespace bodyschema {
@@ -29,8 +30,7 @@ class Pipeline {
   /// @param method  instead of the configured one, where that proved to be of no use
   explicit Pipeline(const Configuration& configuration, std::optional<SegmentationMethod> method = std::nullopt);
 
-  /// A fresh decoder and synchroniser for this robot and rig; its observations carry what the
-  /// extended model knows, where there is one.
+  /// A fresh decoder and synchroniser for this robot and rig.
   [[nodiscard]] ObservationStream make_stream() const;
 
   /// Fills in the observation's masks and takes one step of the estimator: segment(), estimate().
@@ -40,7 +40,7 @@ class Pipeline {
   ///   effect with `vision.method: statistics`, which goes by the estimate before.
   Estimate process(Observation& observation, const Observation* next = nullptr);
   /// Straightens the pictures and fills in the masks. A camera that repeats its last picture while
-  /// the arm moves gets none: it is frozen. False while the background is being learned.
+  /// the arm moves gets none: it is frozen; nor does one whose mask did not come (`vision.method: given`). False while the background is being learned.
   bool segment(Observation& observation);
   /// One step of the estimator on an observation that has its masks.
   Estimate estimate(const Observation& observation);
@@ -70,6 +70,7 @@ class Pipeline {
   [[nodiscard]] const std::optional<ErrorModel>& error_model() const { return error_model_; }
   [[nodiscard]] const BusOptions& bus() const { return bus_; }
   [[nodiscard]] const EstimatorOptions& options() const { return options_; }
+  [[nodiscard]] const Beliefs& beliefs() const { return beliefs_; }
   [[nodiscard]] Estimator& estimator() { return estimator_; }
   /// Whether a camera repeats its picture, as of the last observation that had one of it.
   [[nodiscard]] const PictureChange& picture(std::size_t camera) const { return changes_[camera]; }
@@ -87,6 +88,7 @@ class Pipeline {
  private:
   struct Eye {
     Segmenter segmenter;
+    GivenMask given;
     std::optional<Undistorter> undistorter;
     BinaryMask seen;  ///< by the lens, in a straightened picture; empty: all of it
     FrozenPicture picture{};
@@ -118,6 +120,7 @@ class Pipeline {
   std::shared_ptr<const RobotModel> robot_;
   std::optional<ErrorModel> error_model_;
   StereoRig rig_;
+  Beliefs beliefs_;
   std::vector<Eye> eyes_;  ///< those of the other thread while it looks ahead
   std::vector<PictureChange> changes_;
   BackgroundWatch background_watch_;

@@ -32,6 +32,13 @@ struct LinkMesh {
   bool consistent_winding = true;  ///< neighbours agree; closed components face outward
 };
 
+/// A frame that the URDF does not have, fixed to one of its links or to another such frame given before it.
+struct AddedFrame {
+  std::string name;
+  std::string parent;
+  Pose X_PF = Pose::Identity();  ///< pose in the parent
+};
+
 struct RobotModelOptions {
   std::filesystem::path urdf;
   /// Searched in order for `package://name/rest` (as root/name/rest) and for relative paths that
@@ -39,6 +46,8 @@ struct RobotModelOptions {
   std::vector<std::filesystem::path> mesh_search_roots;
   /// Links whose visual meshes are loaded; all others are never opened.
   std::vector<std::string> rendered_links;
+  /// Links of the loaded robot besides the URDF's; they have neither mass nor mesh.
+  std::vector<AddedFrame> added_frames{};
 };
 
 /// A robot as its URDF describes it: joints, links, masses and the meshes of the rendered links.

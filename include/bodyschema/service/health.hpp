@@ -36,6 +36,7 @@ struct CameraFacts {
 struct HealthFacts {
   std::string cameras_channel;
   std::string joints_channel;
+  std::string masks_channel;
   double picture_age_ms = -1.0;  ///< since a message arrived on the cameras' channel
   double joints_age_ms = -1.0;   ///< the same for encoders
   double estimate_age_ms = -1.0;

@@ -7,6 +7,7 @@
 
 #include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/geometry/pose.hpp"
+#include "bodyschema/simulator/lens.hpp"
 
 namespace bodyschema::simulator {
 
@@ -24,6 +25,8 @@ class Background {
   /// Fills `picture` (three floats a pixel, levels) with what the camera sees.
   /// @param X_WC  camera in the root frame, metres
   void paint(const CameraModel& camera, const Pose& X_WC, std::vector<float>& picture) const;
+  /// The same in rows [v0, v1) alone, for a camera whose rays are known.
+  void paint(const Lens& lens, const Pose& X_WC, int v0, int v1, std::vector<float>& picture) const;
 
  private:
   Background() = default;

@@ -43,6 +43,11 @@ struct FaultSite {
   std::string hand_link;
   Eigen::Vector3d gravity_W{0, 0, -9.81};
   std::size_t cameras = 2;
+  std::vector<std::string> camera_names;  ///< as in the rig
+  /// The pair frame K, in which both cameras are displaced together: origin midway between the cameras, axes of
+  /// the first one, head and eyes at RobotSetup::default_joints. It is rigid with the last link that carries all.
+  std::string mount_link;
+  Pose X_MK = Pose::Identity();            ///< K in that link, metres
   const Trajectory* trajectory = nullptr;  ///< intended motion; outlives the faults
   double begin_s = 0.0;                    ///< when the motion proper begins
   double end_s = 0.0;                      ///< ... and ends
@@ -50,6 +55,10 @@ struct FaultSite {
 
   FaultSite() = default;
   FaultSite(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig);
+  /// Positions in RobotModel::meshes of the covers that belong to a part of the robot: `all`, `hand` (what all
+  /// arm joints move), `palm` and `fingers` (the hand's pieces that are rigid with the hand link, and the others),
+  /// `forearm`, `upper_arm`, or rendered links by name, several joined by '+'. Empty: no such part.
+  [[nodiscard]] std::vector<std::size_t> covers_of(const std::string& part) const;
 };
 
 /// A joint whose rotation axis or place is not where the URDF has it. Neither changes the pose at
@@ -61,14 +70,35 @@ struct JointMisplacement {
   double tilt_2_rad = 0.0;     ///< ... about the second
   double shift_1_m = 0.0;      ///< everything beyond moves along the first perpendicular direction
   double shift_2_m = 0.0;      ///< ... along the second
+  /// Everything beyond moves by this in the frame of the link that carries the joint, metres.
+  Eigen::Vector3d shift_P = Eigen::Vector3d::Zero();
+};
+
+/// A rendered link's cover as it was moulded, against its mesh.
+struct TrueCover {
+  double scale = 1.0;       ///< about the origin of the link's frame
+  double dilation_m = 0.0;  ///< the surface lies this far outside the drawn one, along its normals
+};
+
+/// Things that a hand can hold.
+enum class HeldKind { kNone, kBox, kBottle, kStick };
+/// What the hand holds: rigid with the hand link, between thumb (the first fingertip) and fingers.
+struct HeldThing {
+  HeldKind kind = HeldKind::kNone;
+  double length_m = 0.0;  ///< longest side; 0: 0.11 (box), 0.22 (bottle), 0.30 (stick)
+  double from_s = 0.0;    ///< there from this time after the beginning of the motion on; 0: all the time
 };
 
 /// The robot and its cameras as built, where that is not what URDF and configuration say.
 struct TrueBody {
   std::vector<CameraModel> cameras;
-  std::vector<Eigen::Vector3d> camera_shift_C;  ///< in the camera's own frame, metres
+  std::vector<Pose> X_CT;        ///< each true camera in the frame where it should be, metres
+  Pose X_KT = Pose::Identity();  ///< displacement of all cameras together (FaultSite::X_MK)
+  std::string mount_link;        ///< FaultSite's
+  Pose X_MK = Pose::Identity();  ///< FaultSite's
   std::vector<JointMisplacement> misplacements;
-  double mesh_scale = 1.0;
+  std::vector<TrueCover> covers;  ///< one per RobotModel::meshes
+  HeldThing held;
   double dilation_px = 0.0;  ///< the picture of the robot spills this far over its outline
   double payload_kg = 0.0;   ///< held at the hand link's origin
 };
@@ -78,6 +108,15 @@ struct TrueBody {
 struct ExposureTiming {
   double latency_s = 0.0;
   double right_skew_s = 0.0;
+  double longer_exposure_s = 0.0;  ///< true - configured time that a row is exposed
+  double longer_readout_s = 0.0;   ///< true - configured time from the first row to the last
+};
+
+/// An encoder that delivers one and the same reading for a while, seconds of the log.
+struct EncoderStall {
+  Eigen::Index joint = 0;
+  double begin_s = 0.0;
+  double end_s = 0.0;
 };
 
 /// Torques that gravity puts on the joints of the robot as built, load in the hand included.
@@ -115,6 +154,7 @@ class Fault {
   /// Changes encoder angles, which start out as the motors' angles.
   virtual void read(Eigen::VectorXd& encoder) const { (void)encoder; }
   virtual void expose(ExposureTiming&) {}
+  virtual void stall(std::vector<EncoderStall>&) {}
 };
 
 /// Strict access to a fault's arguments. Errors name the fault, the key and what was expected.
@@ -126,6 +166,13 @@ class FaultArguments {
   [[nodiscard]] Eigen::Index joint(const std::string& key = "joint") const;
   [[nodiscard]] std::string choice_or(const std::string& key, const std::string& fallback,
                                       const std::vector<std::string>& choices) const;
+  /// Positions of the covers named by `part`; all when it is left out.
+  [[nodiscard]] std::vector<std::size_t> covers() const;
+  /// What share of a change befalls each camera by `source`: left, right, common, or difference (the first camera
+  /// by half, the second by minus half).
+  [[nodiscard]] std::vector<double> camera_shares() const;
+  /// The unit vector of `axis`, x, y or z; x when it is left out.
+  [[nodiscard]] Eigen::Vector3d axis() const;
   [[nodiscard]] const FaultSpec& spec() const { return spec_; }
 
  private:

@@ -13,7 +13,12 @@
 namespace bodyschema::simulator {
 
 /// How pictures travel.
-enum class PictureFormat { kRgb, kGray, kJpeg };
+enum class PictureFormat {
+  kRgb,  ///< as the camera delivers them: JPEG where SimulatorSettings::jpeg_quality says so
+  kGray,
+  kJpeg,
+  kMasks,  ///< in gray, how much of each pixel shows the robot (255: all)
+};
 
 /// Turns frames into the messages of a robot, in the order in which they would arrive: encoders at
 /// their own time, both pictures together a little after the later shutter. Nothing of the truth
@@ -48,6 +53,7 @@ class FramePublisher {
 ///                   "hand_in_left_camera": 4x4, "hand_in_right_camera": 4x4,
 ///                   "fingertips_in_hand_m", "fingertips_in_left_camera_m", "fingertips_px_left", ..}] }
 ///
+/// Where there are things beside the robot's arm, frames say "holding" and "hidden_share_left" too.
 /// Of a rig with one camera, only that one is there, under its name.
 /// `utime` is the stamp of the frame's first picture; joints and poses are those of the moment of
 /// exposure. One thread.
@@ -67,6 +73,7 @@ class TruthWriter {
   std::vector<std::string> joint_names_;
   std::vector<std::string> camera_names_;
   Microseconds utime_shift_;
+  bool hides_ = false;  ///< there are things that may hide the robot
   bool first_ = true;
 };
 

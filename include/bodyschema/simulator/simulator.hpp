@@ -25,7 +25,7 @@ const char* name_of(Phase phase);
 /// How much of each frame is worked out.
 enum class Output {
   kPictures,     ///< RGB pictures (and silhouettes)
-  kSilhouettes,  ///< exact masks and coverage only: no room, no light, no noise
+  kSilhouettes,  ///< exact masks and coverage only: no room, no light, no noise but OutlineNoise
   kJoints,       ///< encoders and truth only
 };
 
@@ -47,7 +47,7 @@ struct SimulationPlan {
   int threads = 1;  ///< 2 draws both pictures of a frame at the same time
 };
 
-/// What was true when one camera's picture was taken.
+/// What was true when one camera's picture was taken: in the middle of the exposure of its middle row.
 struct CameraTruth {
   Microseconds exposure_utime = 0;             ///< differs from the stamp by latency and skew
   Eigen::VectorXd q;                           ///< true joint angles, radians, RobotModel order
@@ -56,14 +56,20 @@ struct CameraTruth {
   std::vector<Eigen::Vector3d> fingertips_C;   ///< metres, RobotSetup::fingertip_links
   std::vector<Eigen::Vector2d> fingertips_px;  ///< by the true lens
   double visible_share = 0.0;                  ///< of the picture's pixels that show the robot; 0 without pictures
+  double hidden_share = 0.0;                   ///< of the robot's picture that other things hide
+  bool holding = false;                        ///< the hand holds a thing
 };
 
 /// One picture as a camera delivers it.
 struct CameraFrame {
-  std::string name;                    ///< the rig's: "left", "right"
-  Microseconds utime = 0;              ///< stamp
-  Image image;                         ///< RGB; empty unless Output::kPictures
-  BinaryMask silhouette;               ///< exact; empty with Output::kJoints
+  std::string name;                ///< the rig's: "left", "right"
+  int number = 0;                  ///< in messages: CameraModel::number()
+  Microseconds utime = 0;          ///< stamp
+  Image image;                     ///< RGB; empty unless Output::kPictures
+  std::vector<std::uint8_t> jpeg;  ///< `image` as the camera compressed it; empty: it did not
+  /// What is seen of the robot: exact (but for OutlineNoise), over the time of exposure mostly there; empty with
+  /// Output::kJoints.
+  BinaryMask silhouette;
   std::vector<std::uint8_t> coverage;  ///< share of each pixel that is robot, 0-255, row order
 };
 
@@ -101,6 +107,9 @@ class Simulator {
   [[nodiscard]] int frame_count() const;
   /// Frames before the motion proper.
   [[nodiscard]] int first_motion_frame() const;
+
+  /// Whether there are things in the scene beside the robot's arm (a table, a held thing, other arms).
+  [[nodiscard]] bool has_things() const;
 
   [[nodiscard]] const TrueRobot& robot() const;
   [[nodiscard]] const SimulationPlan& plan() const;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,7 @@ class TrueKinematics {
   /// @param q  true joint angles, radians
   /// @param X_WB  out, one pose per link
   void compute(const Eigen::VectorXd& q, std::span<Pose> X_WB);
-  /// Pose of a camera from the pose of its link: the camera may sit beside its place.
+  /// Pose of a camera from the pose of its link at the last `compute`: the camera may sit beside its place.
   [[nodiscard]] Pose camera(std::size_t index, const Pose& X_WLink) const;
 
  private:
@@ -33,10 +34,15 @@ class TrueKinematics {
     Eigen::Vector3d tilt_1_P = Eigen::Vector3d::Zero();
     Eigen::Vector3d tilt_2_P = Eigen::Vector3d::Zero();
   };
-  std::size_t link_count_;
+  std::size_t link_count_;     // asked for
+  std::size_t tracked_count_;  // ... and the mount
   std::unique_ptr<ForwardKinematics> nominal_;
   std::vector<Misplacement> misplacements_;
-  std::vector<Eigen::Vector3d> camera_shift_C_;
+  std::vector<Pose> X_CT_;
+  bool mount_moved_ = false;  // then the mount is the link after those asked for
+  Pose X_MK_ = Pose::Identity(), X_KT_ = Pose::Identity();
+  Pose X_WM_ = Pose::Identity();  // at the last compute
+  std::vector<Pose> tracked_;
   std::vector<Pose> X_W_;
 };
 
@@ -55,8 +61,10 @@ class TrueRobot {
   /// Joint angles at a time of the log, radians, RobotModel order.
   void joints(double t_s, Eigen::VectorXd& q) const;
   [[nodiscard]] Eigen::VectorXd joints(double t_s) const;
-  /// Encoder angles before noise and rounding.
+  /// Encoder angles before noise and rounding. Of a stalled encoder they are those of the moment it stalled at.
   void encoders(double t_s, Eigen::VectorXd& encoder) const;
+  /// When the encoder of a joint that is stalled at this time began to be so.
+  [[nodiscard]] std::optional<double> stalled_since(Eigen::Index joint, double t_s) const;
   /// The motor angles that were asked for.
   [[nodiscard]] const Trajectory& trajectory() const { return trajectory_; }
   [[nodiscard]] const TrueBody& body() const { return body_; }
@@ -70,6 +78,7 @@ class TrueRobot {
   Trajectory trajectory_;
   TrueBody body_;
   ExposureTiming timing_;
+  std::vector<EncoderStall> stalls_;
   std::vector<std::unique_ptr<Fault>> readers_;  // by stage
   Eigen::VectorXd offsets_;
   double start_s_ = 0.0;

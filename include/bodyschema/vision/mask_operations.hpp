@@ -41,6 +41,8 @@ class ComponentFilter {
  public:
   /// Clears 8-connected pieces with fewer than `min_px` pixels.
   void remove_small(BinaryMask& mask, int min_px);
+  /// Pixels of the largest 8-connected piece; 0: there is none.
+  [[nodiscard]] int largest_piece(const BinaryMask& mask);
   /// Sets 4-connected pieces of background that touch no border and have at most `max_px` pixels.
   void fill_small_holes(BinaryMask& mask, int max_px);
 

@@ -16,6 +16,7 @@ enum class SegmentationMethod {
   kBackgroundPicture,  ///< still cameras, a picture of the background is given
   kLearnedBackground,  ///< still cameras, the background is learned from noisy frames
   kStatistics,         ///< anything: colour statistics on both sides of the predicted outline
+  kGiven,              ///< others find the robot and send masks beside the pictures
 };
 
 /// What the outline of the robot looks like in the pictures.
@@ -59,6 +60,9 @@ struct VisionSetup {
 
   /// statistics: how far from the predicted outline the robot is searched for, px.
   int search_px = 12;
+
+  /// given: pieces of robot with a smaller share of the largest one's pixels are taken for neither robot nor background.
+  double min_piece_share = 0.05;
 
   /// Reads and checks the section; throws ConfigurationError.
   static VisionSetup from(const Configuration& vision);

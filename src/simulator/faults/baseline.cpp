@@ -12,7 +12,7 @@ FaultKind baseline() {
   kind.make = [](const FaultArguments& arguments, const FaultSite&) {
     const double distance = 1e-3 * arguments.number("value", -50.0, 50.0);
     return body_fault([=](TrueBody& body) {
-      if (body.camera_shift_C.size() > 1) body.camera_shift_C[1].x() += distance;
+      if (body.X_CT.size() > 1) body.X_CT[1].translation().x() += distance;
     });
   };
   kind.targets = [](const FaultSite& site) {

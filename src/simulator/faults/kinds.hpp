@@ -43,6 +43,13 @@ FaultKind velocity_lag();
 FaultKind acceleration_lag();
 FaultKind local_kink();
 FaultKind random_walk();
+FaultKind camera_rotation();
+FaultKind camera_position();
+FaultKind cover_dilation();
+FaultKind held();
+FaultKind stalled_encoder();
+FaultKind exposure_time();
+FaultKind readout_time();
 
 /// Targets with one detectable size per arm joint, shoulder to wrist; 0 leaves a joint out because
 /// pictures of the hand do not show the fault there.
@@ -57,6 +64,11 @@ inline std::vector<FaultTarget> on_arm_joints(const FaultSite& site, const std::
     targets.push_back({std::move(spec), size});
   }
   return targets;
+}
+
+/// None: a kind that is never drawn at random.
+inline std::vector<FaultTarget> nowhere(const FaultSite&) {
+  return {};
 }
 
 /// One target: the whole robot.
@@ -76,6 +88,20 @@ std::unique_ptr<Fault> body_fault(Change change) {
     Change change_;
   };
   return std::make_unique<BodyFault>(std::move(change));
+}
+
+/// A fault that only changes when pictures are exposed.
+template <class Change>
+std::unique_ptr<Fault> timing_fault(Change change) {
+  class TimingFault final : public Fault {
+   public:
+    explicit TimingFault(Change c) : change_(std::move(c)) {}
+    void expose(ExposureTiming& timing) override { change_(timing); }
+
+   private:
+    Change change_;
+  };
+  return std::make_unique<TimingFault>(std::move(change));
 }
 
 /// A fault that only changes encoder readings.

@@ -8,10 +8,15 @@ FaultKind mesh_scale() {
   kind.name = "mesh_scale";
   kind.parameter = "scale";
   kind.unit = "%";
-  kind.meaning = "true size of the meshes / nominal - 1";
+  kind.meaning =
+      "true size of the meshes / nominal - 1, of part=all|hand|palm|fingers|forearm|upper_arm or links joined by '+'";
+  kind.keys = {"part"};
   kind.make = [](const FaultArguments& arguments, const FaultSite&) {
     const double scale = 1.0 + 0.01 * arguments.number("value", -50.0, 50.0);
-    return body_fault([=](TrueBody& body) { body.mesh_scale *= scale; });
+    const auto covers = arguments.covers();
+    return body_fault([=](TrueBody& body) {
+      for (const auto i : covers) body.covers[i].scale *= scale;
+    });
   };
   kind.targets = [](const FaultSite&) { return on_robot("mesh_scale", 0.6); };
   return kind;

@@ -14,15 +14,12 @@ FaultKind principal_point() {
   kind.keys = {"source", "axis"};
   kind.make = [](const FaultArguments& arguments, const FaultSite&) {
     const double shift = arguments.number("value", -200.0, 200.0);
-    const auto source = arguments.choice_or("source", "common", {"left", "right", "common", "difference"});
+    const auto shares = arguments.camera_shares();
     const bool along_x = arguments.choice_or("axis", "x", {"x", "y"}) == "x";
     return body_fault([=](TrueBody& body) {
-      for (std::size_t c = 0; c < body.cameras.size(); ++c) {
-        double share = 1.0;
-        if (source == "left" || source == "right") share = body.cameras[c].name == source ? 1.0 : 0.0;
-        if (source == "difference") share = c == 0 ? 0.5 : -0.5;
+      for (std::size_t c = 0; c < shares.size(); ++c) {
         auto& k = body.cameras[c].intrinsics;
-        (along_x ? k.cx : k.cy) += share * shift;
+        (along_x ? k.cx : k.cy) += shares[c] * shift;
       }
     });
   };

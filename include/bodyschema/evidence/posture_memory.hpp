@@ -1,0 +1,160 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "bodyschema/core/time.hpp"
+
+namespace bodyschema {
+
+/// A quadratic about some parameters in absolute coordinates: -2 ln likelihood = x' A x - 2 b' x + constant.
+struct Quadratic {
+  Eigen::MatrixXd A;
+  Eigen::VectorXd b;
+  static Quadratic zero(Eigen::Index n) { return {Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)}; }
+  void add(const Quadratic& other, double factor = 1.0) {
+    A += factor * other.A;
+    b += factor * other.b;
+  }
+};
+
+/// What a memory is about.
+struct MemoryLayout {
+  Eigen::VectorXd prior_mean, prior_sd;  ///< of what is estimated, SI
+  /// Which of these are angles of joints: what a posture gets wrong shows as if these were wrong in it.
+  std::vector<bool> is_joint;
+  /// Standard deviations of what is not estimated but may be wrong all the same, SI: Schmidt's considered parameters
+  /// (Jazwinski 1970, section 8.4). Quadratics are over the estimated parameters, then these.
+  Eigen::VectorXd considered_sd;
+  [[nodiscard]] Eigen::Index estimated() const { return prior_sd.size(); }
+  [[nodiscard]] Eigen::Index size() const { return prior_sd.size() + considered_sd.size(); }
+};
+
+struct MemoryOptions {
+  double memory_s = 300.0;          ///< after so long a posture's say has faded to 1/e
+  double block_s = 0.25;            ///< of motion that counts as one posture
+  double same_posture_rad = 0.05;   ///< joints nearer than this are the same posture
+  std::size_t most_blocks = 120;    ///< the oldest are summed up beyond
+  double encoder_sd_rad = 0.0006;   ///< of one reading: noise and rounding; the least a posture gets wrong
+  double posture_sd_rad = 0.0012;   ///< what a posture is believed to get wrong before any was seen, per joint
+  double posture_prior = 8.0;       ///< how many told directions that belief counts as
+};
+
+/// The estimate: best values, and how well they are known.
+struct MemoryEstimate {
+  Eigen::VectorXd x;
+  Eigen::MatrixXd own;          ///< covariance of x if the model were right
+  Eigen::MatrixXd sensitivity;  ///< d x / d considered
+  Eigen::MatrixXd covariance;   ///< with what is considered
+};
+
+/// How a piece of evidence agrees with the rest.
+struct Innovation {
+  double nis = 0.0;  ///< normalised innovation squared: of chi-square distribution where all is as believed
+  double dof = 0.0;  ///< directions that the piece tells
+};
+
+/// What postures taught about a state, kept posture by posture: the fused estimate, the same without any of them and
+/// the test of a new one come from the same sums.
+///
+/// A block is one posture of the arm, or a quarter of a second of motion. Its first pictures speak for it: what the model gets
+/// wrong in a posture it gets wrong in all pictures of it, so that more of them teach nothing new. A posture that comes
+/// again takes the place of what it said before. Every block is linearised about one state, and again when the estimate
+/// has moved on: quadratics from different places claim to know directions that no picture tells (Huang et al., 2010,
+/// on the consistency of filters for simultaneous localisation and mapping). What blocks disagree about beyond their pictures' noise is learned
+/// as an error of every posture, in the joints' angles (a variance component, by MacKay's update of its evidence, 1992).
+/// At most `most_blocks` are kept. Not thread-safe.
+class PostureMemory {
+ public:
+  PostureMemory(MemoryLayout layout, const MemoryOptions& options);
+
+  /// Adds one frame that agrees with what is known.
+  /// @param q  joints of the posture, rad
+  /// @param frame  the pictures' say, over estimated and considered parameters, divided by the variance of a residual
+  /// @param x  where they were linearised
+  /// @return the number of the block that it began; nothing where it belongs to one that is there
+  std::optional<std::uint64_t> add(double time_s, const Eigen::VectorXd& q, const Quadratic& frame,
+                                   const Eigen::VectorXd& x);
+  void forget_all();
+  /// Numbers of the blocks that are kept one by one.
+  [[nodiscard]] std::vector<std::uint64_t> blocks() const;
+  /// The block whose pictures were linearised furthest from the estimate, and where they are to be linearised next: at
+  /// the estimate, or some way towards it. Nothing where all are near.
+  struct Stale {
+    std::uint64_t block = 0;
+    Eigen::VectorXd x;
+  };
+  [[nodiscard]] std::optional<Stale> most_stale() const;
+  /// A block's pictures linearised anew, about x.
+  void relinearise(std::uint64_t block, const Quadratic& pictures, const Eigen::VectorXd& x);
+
+  /// Some parameters changed at a time: what was known of them before holds no longer, the rest stays.
+  void release(std::span<const Eigen::Index> parameters, double from_s);
+
+  [[nodiscard]] const MemoryEstimate& estimate() const;
+  /// The estimate of one frame: the fused one with that posture's own error, seen by the frame's pictures.
+  [[nodiscard]] MemoryEstimate in_posture(const Quadratic& frame) const;
+  /// The same of a frame without evidence.
+  [[nodiscard]] MemoryEstimate in_posture() const;
+  /// How a frame agrees with everything that is known.
+  [[nodiscard]] Innovation innovation(const Quadratic& frame) const;
+  /// The step of some parameters that would make a frame agree best, and how it agrees then.
+  struct Step {
+    Eigen::VectorXd size;  ///< per parameter, SI
+    Innovation left;
+  };
+  [[nodiscard]] Step step(const Quadratic& frame, std::span<const Eigen::Index> parameters) const;
+
+  /// Chi-square of the state of one posture against everything that is known: with that posture's own error, and what
+  /// is considered.
+  [[nodiscard]] double distance(const Eigen::VectorXd& x) const;
+  /// The best state of one posture given everything and a frame of it.
+  [[nodiscard]] Eigen::VectorXd solve_with(const Quadratic& frame) const;
+
+  [[nodiscard]] bool empty() const { return blocks_.empty() && !old_; }
+  /// Without any posture: the beliefs alone; what a posture gets wrong is as learned here.
+  [[nodiscard]] PostureMemory beliefs() const;
+  /// Distinct postures that are remembered.
+  [[nodiscard]] std::size_t postures() const { return blocks_.size() + old_postures_; }
+  /// Mean NIS per direction of the last postures against the rest; 1: as believed.
+  [[nodiscard]] double dispersion() const;
+  /// What a posture gets wrong, per joint, rad.
+  [[nodiscard]] double posture_sd_rad() const;
+  [[nodiscard]] const MemoryLayout& layout() const { return layout_; }
+
+ private:
+  struct Block {
+    std::uint64_t number = 0;
+    double begin_s = 0.0, end_s = 0.0;
+    Eigen::VectorXd q;   ///< of its first frame
+    Quadratic pictures;  ///< of its first frame, as last linearised ...
+    Eigen::VectorXd x;   ///< ... about this state
+  };
+  [[nodiscard]] Quadratic with_posture_error(const Quadratic& block) const;
+  [[nodiscard]] Quadratic sum(const Block* without = nullptr) const;
+  [[nodiscard]] MemoryEstimate solve(const Quadratic& sum) const;
+  [[nodiscard]] const Eigen::MatrixXd& posture_precision() const;
+  void changed();
+  [[nodiscard]] Eigen::MatrixXd with_considered(const MemoryEstimate& estimate) const;
+  void learn_posture_error(const Block& block);
+  void fold_oldest();
+
+  MemoryLayout layout_;
+  MemoryOptions options_;
+  Quadratic prior_;
+  std::vector<Block> blocks_;  ///< the last one is still open
+  std::optional<Quadratic> old_;
+  std::size_t old_postures_ = 0;
+  std::uint64_t begun_ = 0;
+  double now_s_ = 0.0, old_s_ = 0.0;
+  double error_square_ = 0.0, error_directions_ = 0.0;  ///< of postures: sums of MacKay's update
+  double nis_ = 0.0, nis_dof_ = 0.0;
+  double posture_variance_;
+  mutable std::optional<MemoryEstimate> estimate_;
+  mutable Eigen::MatrixXd posture_precision_;  ///< of a posture's state; empty: not worked out yet
+};
+
+}  // namespace bodyschema

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "bodyschema/outline/coordinates.hpp"
+#include "bodyschema/outline/observed_edges.hpp"
+#include "bodyschema/outline/robot_projection.hpp"
+#include "bodyschema/silhouette/contour_points.hpp"
+
+namespace bodyschema {
+
+/// How a picture's outline is looked at. Lengths are those of a picture of 320x240 and grow with the picture
+/// (picture_unit).
+struct OutlineSearch {
+  double search_px = 8.0;   ///< how far along the normal from the prediction
+  double spacing_px = 3.0;  ///< between points, along the outline
+  /// Robust scale c: a residual r costs r^2 c^2 / (r^2 + c^2) and weighs (c^2 / (r^2 + c^2))^2 (Geman and McClure): what
+  /// lies many c away, a tool that no mesh shows or somebody's arm, says nothing.
+  double robust_px = 3.0;
+};
+
+/// The length in a camera's pictures that one pixel of a 320x240 picture has: settings in px are multiplied by it.
+double picture_unit(const PinholeIntrinsics& k);
+
+/// One point of a predicted outline with its counterpart in the picture.
+struct OutlinePoint {
+  std::size_t part = 0;
+  Eigen::Vector3d p_C = Eigen::Vector3d::Zero();     ///< the surface point that makes the outline, m
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();   ///< predicted, px
+  Eigen::Vector2d normal = Eigen::Vector2d::Zero();  ///< unit, image, outwards
+  double residual_px = 0.0;                          ///< observed minus predicted, along the normal
+  double weight = 1.0;                               ///< robust weight
+};
+
+/// What one picture says about some coordinates near a prediction. With G the derivatives of the predicted outline
+/// along its normals, W robust weights and r the observed minus predicted distances in px: A = G'WG, b = G'Wr, so that
+/// the cost after a step d is square - 2 b'd + d'A d, px^2. Not yet divided by the variance of a residual.
+struct OutlineEvidence {
+  Eigen::MatrixXd A;
+  Eigen::VectorXd b;
+  double square = 0.0;  ///< r'Wr
+  double weight = 0.0;  ///< trace of W: sqrt(square / weight) is the residual's rms in px
+  double cost = 0.0;    ///< robust cost of the whole predicted outline, px^2; a point without counterpart costs c^2
+  double misfit = 0.0;  ///< the same with one c for all: comparable however far was searched
+  double sampled = 0.0;  ///< points of the predicted outline in the picture
+  double matched = 0.0;  ///< ... that found a counterpart within the search
+  void clear(Eigen::Index coordinates);
+  [[nodiscard]] double rms_px() const { return weight > 0.0 ? std::sqrt(square / weight) : 0.0; }
+  [[nodiscard]] double matched_share() const { return sampled > 0.0 ? matched / sampled : 0.0; }
+};
+
+/// The measurement: distances between the predicted outline of the robot and the observed one along the image normal,
+/// with their derivatives by any coordinates. Estimator, replay, calibration and diagnosis all call this.
+///
+/// The outline of a smooth body moves along its normal as its surface points do, so derivatives are those of points
+/// fixed to their parts; they come from finite differences of the kinematics (mimic joints and tilted axes need no
+/// special care), cameras and shapes in closed form. One per thread; allocates nothing once warm.
+class OutlineMeasurement {
+ public:
+  OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                     const JointRoles& roles);
+
+  [[nodiscard]] const Coordinates& coordinates() const { return coordinates_; }
+  [[nodiscard]] RobotProjection& projection() { return projection_; }
+  [[nodiscard]] std::size_t part_count() const { return projection_.part_count(); }
+
+  /// Compares one picture with its prediction.
+  /// @param q  encoders at its exposure
+  /// @param active  coordinates wanted, by position; A and b are over these, in this order
+  void linearise(const ObservedEdges& edges, const Eigen::Ref<const Eigen::VectorXd>& q,
+                 const Corrections& corrections, std::size_t camera, std::span<const std::uint32_t> active,
+                 const OutlineSearch& search, OutlineEvidence& out);
+  /// What a picture of this view would tell if every point of its outline were found where it is predicted.
+  void expect(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera,
+              std::span<const std::uint32_t> active, const OutlineSearch& search, OutlineEvidence& out);
+  /// The matched points of the last `linearise`.
+  [[nodiscard]] std::span<const OutlinePoint> points() const { return points_; }
+
+  /// Motion of a link (position in RobotProjection::links) per unit of each active coordinate: 6 x active, translation
+  /// of its frame in m and rotation vector in rad, camera frame.
+  Eigen::MatrixXd link_jacobian(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
+                                std::size_t camera, std::span<const std::uint32_t> active, std::size_t link);
+
+ private:
+  void find_motions(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera,
+                    std::span<const std::uint32_t> active);
+  /// @param edges  null: every point is where it is predicted
+  void compare(const ObservedEdges* edges, const Corrections& corrections, std::size_t camera,
+               const OutlineSearch& search, OutlineEvidence& out);
+  void differentiate(const Corrections& corrections, const PinholeIntrinsics& k, std::span<const std::uint32_t> active,
+                     OutlineEvidence& out);
+
+  Coordinates coordinates_;
+  RobotProjection projection_, moved_;
+  ContourExtractor extractor_;
+  Corrections probe_;
+  std::vector<Eigen::Isometry3f> X_CB_;
+  std::vector<Pose> links_;  ///< of the prediction
+  /// Velocity of a point (p_C, 1) of a link per unit of an active coordinate: [coordinate][link].
+  std::vector<Eigen::Matrix<double, 3, 4>> motion_;
+  std::vector<OutlinePoint> points_;
+  Eigen::MatrixXd rows_;
+};
+
+}  // namespace bodyschema

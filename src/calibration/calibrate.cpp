@@ -1,0 +1,443 @@
+#include "bodyschema/calibration/calibrate.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <thread>
+#include <utility>
+
+#include "bodyschema/calibration/camera_search.hpp"
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/core/progress_bar.hpp"
+#include "bodyschema/core/write_file.hpp"
+#include "bodyschema/evidence/batch_fit.hpp"
+#include "bodyschema/pipeline/watched_log.hpp"
+#include "calibration_files.hpp"
+#include "next_posture.hpp"
+
+namespace bodyschema {
+namespace {
+
+constexpr const char* kAdvice =
+    " in at least five postures that differ in every joint, held still or moved slowly, the arm in view of all cameras";
+/// Physical. px of a 320x240 picture: how far off the outlines may be at first, joints some degrees off.
+constexpr double kFrom_px = 40.0;
+constexpr std::size_t kPlaces = 5;  ///< places of a searched camera that are tried
+/// Statistical. A place of the camera is taken for the only one where the next best fits this much worse: silhouettes
+/// of a wrong place are off by a third, of the right one by what masks get wrong.
+constexpr double kOnly = 1.25;
+/// Physical. Less of the outline found than this, and it is somebody else's.
+constexpr double kLeastFound = 0.6;
+constexpr double kNear_px = 2.5;            ///< physical, px of a 320x240 picture: residuals of outlines that belong together
+constexpr double kBeyondBelief_sd = 4.0;    ///< statistical
+constexpr double kDisagreement = 4.0;       ///< statistical: mean NIS per direction
+constexpr std::size_t kFewestPostures = 3;  ///< fewer cannot disagree
+
+int threads_of(const CalibrationOptions& options) {
+  return options.threads > 0 ? options.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+}
+
+bool to_be_searched(const CameraModel& camera) {
+  return camera.mount.knowledge == PlaceKnowledge::kUnknown;
+}
+
+class Calibrator {
+ public:
+  Calibrator(const Configuration& configuration, const CalibrationOptions& options)
+      : configuration_(configuration), options_(options), pipeline_(configuration), rig_(pipeline_.rig()) {
+    configuration.reject_unknown_keys();
+    make_folder(options.out);
+  }
+
+  Calibration run() {
+    WatchedLog watched = watch_log(pipeline_, {.log = options_.log,
+                                               .picture_rate_hz = options_.picture_rate_hz,
+                                               .kept = 12,
+                                               .quiet = options_.quiet},
+                                   false);
+    refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);
+    log_ = &watched.pictures;
+    if (!options_.quiet) bar_.emplace("calibration", 100);
+    find_cameras();
+    LogFit fit(*log_, threads_of(options_));
+    BatchFit best = fitted(fit, starts_, {});
+    progress(0.7);
+    describe(fit, best);
+    hold_out(fit, best);
+    progress(0.9);
+    conclude(best);
+    suggest(fit, best);
+    write_calibration(result_, best, *log_, watched.kept, pipeline_, configuration_, options_);
+    progress(1.0);
+    return std::move(result_);
+  }
+
+ private:
+  void progress(double share) {
+    if (bar_) bar_->set(static_cast<std::uint64_t>(100.0 * share));
+  }
+
+  // --- cameras ----------------------------------------------------------------------------------
+
+  /// Where cameras of which nothing is known may be: several places of the first, the best one of the second.
+  void find_cameras() {
+    starts_ = {rig_};
+    for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
+      if (!to_be_searched(rig_.cameras[c])) continue;
+      CameraSearch search(*log_, threads_of(options_));
+      const auto places = search.find(c, kPlaces);
+      if (places.empty()) {
+        throw DataError(fmt::format("{}: camera '{}' is to be found, and saw the robot in fewer than three postures; "
+                                    "record the arm{}",
+                                    options_.log.string(), rig_.cameras[c].name, kAdvice));
+      }
+      if (places.size() > 1) ambiguity_ = std::max(ambiguity_, places[0].distance / places[1].distance);
+      std::vector<StereoRig> rigs;
+      for (const auto& place : places) {
+        // Without a second camera to agree with, every good place of the first is tried.
+        if (place.distance > kOnly * kOnly * places.front().distance) break;
+        for (const auto& rig : starts_) {
+          rigs.push_back(rig);
+          auto& mount = rigs.back().cameras[c].mount;
+          mount.X_PC = mount.X_PC * place.X_PC;
+        }
+        if (c > 0) break;
+      }
+      starts_ = std::move(rigs);
+      progress(0.3);
+    }
+  }
+
+  // --- fit --------------------------------------------------------------------------------------
+
+  [[nodiscard]] BatchSettings settings() const {
+    BatchSettings s;
+    s.noise = pipeline_.options().noise;
+    s.memory = pipeline_.options().memory;
+    s.spacing_px = pipeline_.options().outline_spacing_px;
+    return s;
+  }
+
+  [[nodiscard]] BatchFit from(LogFit& fit, const std::vector<std::size_t>& pictures, double from_px) {
+    const auto roles = log_->roles();
+    const auto beliefs = Beliefs::from(configuration_, roles, rig_, pipeline_.options());
+    BatchFit batch(fit, State(roles, beliefs.state), beliefs.tolerances, settings());
+    batch.run(from_px, pictures);
+    return batch;
+  }
+
+  /// The best fit from all starts; the rig is that of the best one then.
+  BatchFit fitted(LogFit& fit, const std::vector<StereoRig>& starts, const std::vector<std::size_t>& pictures) {
+    std::optional<BatchFit> best;
+    StereoRig best_rig;
+    double second = 1e9;
+    for (const auto& rig : starts) {
+      use(fit, rig);
+      BatchFit batch = from(fit, pictures, kFrom_px);
+      if (!best || batch.misfit() < best->misfit()) {
+        if (best) second = std::min(second, best->misfit());
+        best.emplace(std::move(batch));
+        best_rig = rig;
+      } else {
+        second = std::min(second, batch.misfit());
+      }
+    }
+    use(fit, best_rig);
+    if (starts.size() > 1) only_ = second / std::max(1e-9, best->misfit());
+    return std::move(*best);
+  }
+
+  void use(LogFit& fit, const StereoRig& rig) {
+    rig_ = rig;
+    log_->replace_rig(load_robot(pipeline_.setup(), rig), rig);
+    fit.refresh();
+  }
+
+  // --- what it says -------------------------------------------------------------------------------
+
+  void describe(LogFit& fit, const BatchFit& batch) {
+    const auto& estimate = batch.estimate();
+    const auto& state = batch.state();
+    const Eigen::VectorXd x = state.x(), sd = estimate.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+    for (Eigen::Index k = 0; k < state.size(); ++k) {
+      const auto& p = state.parameters()[static_cast<std::size_t>(k)];
+      if (k < state.joints()) {
+        CalibratedJoint joint{p.name, x[k], sd[k], false, {}};
+        joint.told = sd[k] < kTold_rad && sd[k] < p.prior_sd / 3.0;
+        if (!joint.told) joint.untold_why = why_untold(batch, k);
+        result_.joints.push_back(std::move(joint));
+      } else {
+        result_.parameters.push_back(
+            {p.name, p.unit, x[k] / p.si_per_unit, sd[k] / p.si_per_unit, p.prior_sd / p.si_per_unit});
+      }
+    }
+    result_.pictures = static_cast<std::size_t>(std::count_if(
+        batch.at().evidence.begin(), batch.at().evidence.end(), [](const auto& e) { return e.weight > 0.0; }));
+    result_.postures = batch.memory().postures();
+    result_.dispersion = batch.memory().dispersion();
+    result_.posture_sd_rad = batch.memory().posture_sd_rad();
+    result_.outline_sd_px = batch.noise().front().sd_px() * picture_unit(rig_.cameras.front().intrinsics);
+    result_.outline_points_alike = batch.noise().front().correlated_points();
+    describe_cameras(batch);
+    result_.outline_px.before = median_distance_px(fit, ErrorModel(log_->roles()), {});
+    result_.outline_px.after = median_distance_px(fit, state.model(), {});
+    result_.hand_sd_m = hand_sd_m(fit, batch);
+  }
+
+  /// A joint that moves no outline, or one whose motion something else imitates.
+  [[nodiscard]] std::string why_untold(const BatchFit& batch, Eigen::Index joint) const {
+    const auto& C = batch.estimate().covariance;
+    const auto& state = batch.state();
+    constexpr double kHardlyLearned = 0.8, kAlike = 0.7;
+    if (std::sqrt(C(joint, joint)) > kHardlyLearned * state.parameters()[static_cast<std::size_t>(joint)].prior_sd) {
+      return "its motion hardly changes the outline: a round link, or one out of view";
+    }
+    Eigen::Index like = -1;
+    double most = kAlike;
+    for (Eigen::Index k = 0; k < state.size(); ++k) {
+      const double alike = std::abs(C(joint, k)) / std::sqrt(C(joint, joint) * C(k, k));
+      if (k == joint || alike <= most) continue;
+      most = alike;
+      like = k;
+    }
+    if (like < 0) return "the postures hardly tell it";
+    return "no picture tells it from " + state.parameters()[static_cast<std::size_t>(like)].name;
+  }
+
+  /// Where a camera is in the frame of the link that carries it, and how that depends on the state.
+  void describe_cameras(const BatchFit& batch) {
+    const auto& state = batch.state();
+    for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
+      const auto& camera = rig_.cameras[c];
+      CalibratedCamera found;
+      found.name = camera.name;
+      found.link = carrier_of(c);
+      found.searched = to_be_searched(camera);
+      const auto place = [&](const Eigen::VectorXd& x) { return camera_place(state, x, c); };
+      const Eigen::VectorXd x = state.x();
+      found.X_link_optical = place(x);
+      Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, state.size());
+      for (Eigen::Index k = 0; k < state.size(); ++k) {
+        const auto& effect = state.model()[state.parameters()[static_cast<std::size_t>(k)].ref.effect].name();
+        if (effect != "camera_pose" && effect != "camera_pair" && effect != "baseline") continue;
+        found.estimated = true;
+        constexpr double kStep = 1e-5;
+        Eigen::VectorXd moved = x;
+        moved[k] += kStep;
+        const Pose X = place(moved);
+        J.col(k).head<3>() = (X.translation() - found.X_link_optical.translation()) / kStep;
+        const Eigen::AngleAxisd turn(Eigen::Matrix3d(X.linear() * found.X_link_optical.linear().transpose()));
+        J.col(k).tail<3>() = turn.angle() * turn.axis() / kStep;
+      }
+      const Eigen::MatrixXd C = J * batch.estimate().covariance * J.transpose();
+      found.sd_m = std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace()));
+      found.sd_rad = std::sqrt(std::max(0.0, C.bottomRightCorner<3, 3>().trace()));
+      result_.cameras.push_back(std::move(found));
+    }
+  }
+
+  [[nodiscard]] std::string carrier_of(std::size_t camera) const {
+    const auto& mount = rig_.cameras[camera].mount;
+    if (mount.relative) return carrier_of(0);
+    return mount.parent.empty() ? rig_.cameras[camera].link : mount.parent;
+  }
+
+  [[nodiscard]] Pose camera_place(const State& state, const Eigen::VectorXd& x, std::size_t camera) const {
+    State moved = state;
+    moved.set(x);
+    const auto q = pipeline_.setup().default_joints(*log_->robot());
+    std::vector<std::string> cameras;
+    for (const auto& c : rig_.cameras) cameras.push_back(c.link);
+    CorrectedKinematics kinematics(log_->robot(), {carrier_of(camera)}, cameras);
+    Instant at;
+    at.camera = camera;
+    at.encoder = at.q = q;
+    at.qdot = at.qddot = Eigen::VectorXd::Zero(q.size());
+    Corrections all = log_->roles().no_corrections(), own = all;
+    moved.model().corrections(at, all);
+    own.camera = all.camera;
+    std::vector<Pose> X_CL(1);
+    kinematics.compute(q, own, camera, X_CL);
+    return X_CL[0].inverse(Eigen::Isometry);
+  }
+
+  /// Median distance of outline points to the masks' edges; far ones count as far as was looked.
+  [[nodiscard]] double median_distance_px(LogFit& fit, const ErrorModel& model,
+                                          const std::vector<std::size_t>& pictures) const {
+    constexpr double kReach_px = 30.0;
+    std::vector<std::vector<double>> own(log_->pictures().size());
+    const auto at = fit.linearise(model, {}, {kReach_px, 3.0, 1e6}, pictures,
+                                  [&](std::size_t p, std::span<const OutlinePoint> points) {
+                                    for (const auto& point : points) own[p].push_back(std::abs(point.residual_px));
+                                  });
+    std::vector<double> all;
+    for (std::size_t p = 0; p < own.size(); ++p) {
+      const double unit = picture_unit(rig_.cameras[log_->pictures()[p].camera].intrinsics);
+      // Points that found no edge at all.
+      own[p].resize(static_cast<std::size_t>(at.evidence[p].sampled), kReach_px * unit);
+      all.insert(all.end(), own[p].begin(), own[p].end());
+    }
+    if (all.empty()) return 0.0;
+    const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
+    std::nth_element(all.begin(), middle, all.end());
+    return *middle;
+  }
+
+  [[nodiscard]] double hand_sd_m(LogFit& fit, const BatchFit& batch) const {
+    const auto& state = batch.state();
+    std::vector<ParameterRef> refs;
+    for (const auto& p : state.parameters()) refs.push_back(p.ref);
+    const auto directions = fit.directions(batch.at(), state.model(), refs);
+    double sum = 0.0, n = 0.0;
+    auto& measurement = fit.measurement();
+    for (std::size_t p = 0; p < log_->pictures().size(); ++p) {
+      if (log_->pictures()[p].camera != 0) continue;
+      const auto motion =
+          measurement.link_jacobian(log_->pictures()[p].joints.q, batch.at().corrections[p], 0, batch.at().coordinates,
+                                    measurement.projection().hand_link());
+      Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, state.size());
+      for (Eigen::Index k = 0; k < state.size(); ++k) {
+        for (const auto& step : directions[p][static_cast<std::size_t>(k)]) {
+          const auto at = std::find(batch.at().coordinates.begin(), batch.at().coordinates.end(), step.coordinate);
+          J.col(k) += step.amount * motion.col(at - batch.at().coordinates.begin()).head<3>();
+        }
+      }
+      sum += (J * batch.estimate().covariance * J.transpose()).trace();
+      n += 1.0;
+    }
+    return n > 0.0 ? std::sqrt(std::max(0.0, sum / n)) : 0.0;
+  }
+
+  // --- does it hold -------------------------------------------------------------------------------
+
+  /// Outlines of postures that a fit has not seen: of up to `kFolds` parts of the log in turn.
+  void hold_out(LogFit& fit, const BatchFit& batch) {
+    constexpr std::size_t kFolds = 5;
+    const auto postures = batch.postures();
+    if (postures < 2 * kFewestPostures - 1) return;
+    const std::size_t folds = std::min(kFolds, postures);
+    double sum = 0.0, n = 0.0;
+    for (std::size_t fold = 0; fold < folds; ++fold) {
+      std::vector<std::size_t> kept, left_out;
+      for (std::size_t p = 0; p < log_->pictures().size(); ++p) {
+        (batch.posture_of()[p] % folds == fold ? left_out : kept).push_back(p);
+      }
+      if (kept.empty() || left_out.empty()) continue;
+      const auto roles = log_->roles();
+      const auto beliefs = Beliefs::from(configuration_, roles, rig_, pipeline_.options());
+      State start(roles, beliefs.state);
+      BatchFit part(fit, start, beliefs.tolerances, settings());
+      part.start_at(batch.state().x());
+      part.run(0.0, kept);
+      sum += median_distance_px(fit, part.state().model(), left_out) * static_cast<double>(left_out.size());
+      n += static_cast<double>(left_out.size());
+    }
+    if (n > 0.0) result_.outline_px.heldout = sum / n;
+  }
+
+  void conclude(const BatchFit& batch) {
+    const double rms = batch.noise().front().sd_px();
+    const auto told = static_cast<std::size_t>(
+        std::count_if(result_.joints.begin(), result_.joints.end(), [](const auto& j) { return j.told; }));
+    for (const auto& joint : result_.joints) {
+      if (!joint.told) result_.remarks.push_back(joint.name + ": " + joint.untold_why);
+    }
+    const auto say = [&](CalibrationState state, std::string sentence) {
+      result_.state = state;
+      result_.sentence = std::move(sentence);
+    };
+    if (batch.at().matched_share() < kLeastFound || rms > kNear_px) {
+      return say(CalibrationState::kNotConverged,
+                 fmt::format("Not converged: {:.0f} % of the predicted outline lies near an edge of the robot in the "
+                             "pictures, expected at least {:.0f} %; check masks, robot and cameras' intrinsics.",
+                             100.0 * batch.at().matched_share(), 100.0 * kLeastFound));
+    }
+    if (only_ < kOnly) {
+      return say(CalibrationState::kNotConverged,
+                 fmt::format("Not converged: another place of the camera explains the pictures nearly as well (misfit "
+                             "{:.2f} times as large); record more postures.",
+                             only_));
+    }
+    if (result_.postures < kFewestPostures) {
+      return say(CalibrationState::kNotConverged,
+                 fmt::format("Not converged: {} distinct postures cannot contradict each other; record at least {}.",
+                             result_.postures, kFewestPostures));
+    }
+    if (const auto wrong = beyond_belief(batch); !wrong.empty()) return say(CalibrationState::kModelMisfit, wrong);
+    if (result_.dispersion > kDisagreement) {
+      return say(CalibrationState::kModelMisfit,
+                 fmt::format("Model misfit: postures disagree by {:.1f} times what is claimed; run bodyschema diagnose "
+                             "on a moving log, and look at the overlays for masks that are wrong.",
+                             std::sqrt(result_.dispersion)));
+    }
+    if (told == 0) {
+      return say(CalibrationState::kNotConverged,
+                 "Not converged: the pictures tell no joint's offset; record postures that differ more.");
+    }
+    std::string untold;
+    for (const auto& joint : result_.joints) {
+      if (!joint.told) untold += (untold.empty() ? "" : ", ") + joint.name;
+    }
+    say(CalibrationState::kGood,
+        fmt::format("Good: {} of {} joints told; the hand is known to {:.1f} mm in the camera's frame (one sigma){}.", told,
+                    result_.joints.size(), 1e3 * result_.hand_sd_m,
+                    untold.empty() ? "" : "; not told, and not to be applied: " + untold));
+  }
+
+  [[nodiscard]] std::string beyond_belief(const BatchFit& batch) const {
+    const auto& state = batch.state();
+    const Eigen::VectorXd away = (state.x() - state.prior_mean()).cwiseQuotient(state.prior_sd());
+    Eigen::Index worst = -1;
+    for (Eigen::Index k = state.joints(); k < state.size(); ++k) {
+      if (std::abs(away[k]) <= kBeyondBelief_sd || (worst >= 0 && std::abs(away[k]) <= std::abs(away[worst]))) continue;
+      worst = k;
+    }
+    if (worst < 0) return {};
+    const auto& p = state.parameters()[static_cast<std::size_t>(worst)];
+    return fmt::format("Model misfit: the pictures ask for {} {:.3g} {}, {:.0f} times what is believed possible; "
+                       "something else is wrong with robot or cameras (estimator.state says what is believed).",
+                       p.name, state.x()[worst] / p.si_per_unit, p.unit, std::abs(away[worst]));
+  }
+
+  /// The posture that would tell most of what is told worst.
+  void suggest(LogFit& fit, const BatchFit& batch) {
+    if (result_.state == CalibrationState::kNotConverged) return;
+    if (auto next = next_posture(fit, batch, pipeline_.setup())) {
+      result_.next_posture_rad = std::move(next->joints_rad);
+      result_.next_posture_for = std::move(next->tells);
+    }
+  }
+
+  static constexpr double kTold_rad = 0.5 * kPi / 180.0;
+
+  const Configuration& configuration_;
+  CalibrationOptions options_;
+  Pipeline pipeline_;
+  StereoRig rig_;
+  PictureLog* log_ = nullptr;
+  std::vector<StereoRig> starts_;
+  double ambiguity_ = 0.0;
+  double only_ = 1e9;  ///< misfit of the second best place over that of the best
+  Calibration result_;
+  std::optional<ProgressBar> bar_;
+};
+
+}  // namespace
+
+const char* to_string(CalibrationState state) {
+  switch (state) {
+    case CalibrationState::kGood: return "good";
+    case CalibrationState::kModelMisfit: return "model_misfit";
+    case CalibrationState::kNotConverged: return "not_converged";
+  }
+  return "unknown";
+}
+
+Calibration calibrate(const Configuration& configuration, const CalibrationOptions& options) {
+  return Calibrator(configuration, options).run();
+}
+
+}  // namespace bodyschema

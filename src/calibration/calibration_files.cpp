@@ -1,0 +1,277 @@
+#include "calibration_files.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "bodyschema/core/write_file.hpp"
+#include "bodyschema/pipeline/export_correction.hpp"
+#include "bodyschema/pipeline/overlay.hpp"
+#include "bodyschema/report/report.hpp"
+#include "bodyschema/silhouette/silhouette_scorer.hpp"
+
+namespace bodyschema {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json matrix_json(const Pose& X) {
+  Json rows = Json::array();
+  for (int r = 0; r < 4; ++r) {
+    Json row = Json::array();
+    for (int c = 0; c < 4; ++c) row.push_back(X.matrix()(r, c));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+Json to_json(const Calibration& c, const std::string& root) {
+  Json json;
+  json["state"] = to_string(c.state);
+  json["sentence"] = c.sentence;
+  json["told"] = Json::array();
+  for (const auto& joint : c.joints) {
+    json["offset_deg"][joint.name] = degrees(joint.offset_rad);
+    json["stddev_deg"][joint.name] = degrees(joint.sd_rad);
+    if (joint.told) json["told"].push_back(joint.name);
+    if (!joint.told) json["untold"][joint.name] = joint.untold_why;
+  }
+  for (const auto& camera : c.cameras) {
+    auto& entry = json["cameras"][camera.name];
+    entry["link"] = camera.link;
+    entry[camera.link == root ? "X_base_optical" : "X_" + camera.link + "_optical"] = matrix_json(camera.X_link_optical);
+    entry["estimated"] = camera.estimated;
+    entry["sd_mm"] = 1e3 * camera.sd_m;
+    entry["sd_deg"] = degrees(camera.sd_rad);
+  }
+  json["outline_px"] = {{"before", c.outline_px.before}, {"after", c.outline_px.after}};
+  if (c.outline_px.heldout) json["outline_px"]["heldout"] = *c.outline_px.heldout;
+  json["effects"] = Json::array();
+  for (const auto& p : c.parameters) {
+    json["effects"].push_back({{"name", p.name},
+                               {"unit", p.unit},
+                               {"value", p.value},
+                               {"stddev", p.sd},
+                               {"prior_stddev", p.prior_sd}});
+  }
+  json["hand_sd_mm"] = 1e3 * c.hand_sd_m;
+  json["postures"] = c.postures;
+  json["pictures"] = c.pictures;
+  json["dispersion"] = c.dispersion;
+  json["posture_sd_deg"] = degrees(c.posture_sd_rad);
+  json["outline"] = {{"stddev_px", c.outline_sd_px}, {"points_alike", c.outline_points_alike}};
+  json["remarks"] = c.remarks;
+  if (!c.next_posture_rad.empty()) {
+    json["next_posture_for"] = c.next_posture_for;
+    for (const auto& [joint, angle] : c.next_posture_rad) json["next_posture_deg"][joint] = degrees(angle);
+  }
+  return json;
+}
+
+/// What is told, as the exporter takes it; what is not told stays out unless asked for.
+Correction correction_of(const Calibration& c, bool all) {
+  Correction correction;
+  for (const auto& joint : c.joints) {
+    if (!joint.told && !all) {
+      correction.warnings.push_back(joint.name + " is left as it is: " + joint.untold_why);
+      continue;
+    }
+    correction.offsets_rad.emplace_back(joint.name, joint.offset_rad);
+    correction.sd_rad.emplace_back(joint.name, joint.sd_rad);
+  }
+  return correction;
+}
+
+std::string offsets_yaml(const Calibration& c, bool all) {
+  std::string text = "# encoder = true + offset: subtract from every encoder reading. Degrees.\nversion: 1\n";
+  std::string offsets = "offset_deg:\n", sds = "stddev_deg:\n";
+  for (const auto& joint : c.joints) {
+    if (!joint.told && !all) {
+      text += fmt::format("# {} is left out: {}\n", joint.name, joint.untold_why);
+      continue;
+    }
+    offsets += fmt::format("  {}: {:.4f}\n", joint.name, degrees(joint.offset_rad));
+    sds += fmt::format("  {}: {:.4f}\n", joint.name, degrees(joint.sd_rad));
+  }
+  return text + offsets + sds;
+}
+
+std::string cameras_yaml(const Calibration& c, const StereoRig& rig) {
+  std::string text = "# Cameras as found: put in place of the section of the same name.\ncameras:\n";
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    const auto& camera = c.cameras[i];
+    const auto& k = rig.cameras[i].intrinsics;
+    const auto& d = rig.cameras[i].distortion;
+    const Eigen::Matrix4d X = camera.X_link_optical.matrix();
+    text += fmt::format("  {}:\n    link: {}\n    X_link_optical:\n", camera.name, camera.link);
+    for (int r = 0; r < 4; ++r) {
+      text += fmt::format("      - [{:.9f}, {:.9f}, {:.9f}, {:.9f}]\n", X(r, 0), X(r, 1), X(r, 2), X(r, 3));
+    }
+    if (camera.estimated) {
+      text += fmt::format("    pose: roughly\n    pose_sd_deg: {:.4f}\n    pose_sd_mm: {:.3f}\n",
+                          std::max(1e-3, degrees(camera.sd_rad) / std::sqrt(3.0)),
+                          std::max(1e-2, 1e3 * camera.sd_m / std::sqrt(3.0)));
+    }
+    text += fmt::format(
+        "    width: {}\n    height: {}\n    fx: {:.4f}\n    fy: {:.4f}\n    cx: {:.4f}\n    cy: {:.4f}\n"
+        "    distortion: [{:.6g}, {:.6g}, {:.6g}, {:.6g}, {:.6g}]\n",
+        k.width, k.height, k.fx, k.fy, k.cx, k.cy, d[0], d[1], d[2], d[3], d[4]);
+  }
+  return text;
+}
+
+/// Silhouettes predicted with the fit, and with encoders and model as they are.
+class Outlines {
+ public:
+  Outlines(PictureLog& log, const BatchFit& batch)
+      : log_(log), batch_(batch), projection_(log.robot(), log.setup(), log.rig(), log.roles()),
+        nothing_(log.roles().no_corrections()), X_CB_(projection_.part_count()) {
+    SilhouetteOptions options;
+    options.engine = "contour";
+    options.threads = 1;
+    scorer_ = make_silhouette_scorer(silhouette_model(*log.robot(), log.setup()), log.rig().intrinsics(), options);
+  }
+  BinaryMask at(const JointSample& joints, std::size_t camera, bool corrected) {
+    Corrections corrections = nothing_;
+    if (corrected) {
+      Instant at;
+      at.utime = joints.utime;
+      at.camera = camera;
+      at.encoder = joints.q;
+      at.q = joints.q - batch_.state().model().offsets();
+      at.qdot = at.qddot = Eigen::VectorXd::Zero(joints.q.size());
+      batch_.state().model().corrections(at, corrections);
+    }
+    projection_.place(joints.q, corrections, camera);
+    projection_.parts(X_CB_);
+    return scorer_->render(X_CB_, camera);
+  }
+
+ private:
+  PictureLog& log_;
+  const BatchFit& batch_;
+  RobotProjection projection_;
+  const Corrections nothing_;
+  std::vector<Eigen::Isometry3f> X_CB_;
+  std::unique_ptr<SilhouetteScorer> scorer_;
+};
+
+void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, const std::vector<Observation>& kept,
+                const CalibrationOptions& options) {
+  Report page("Calibration of " + options.log.filename().string());
+  page.verdict(c.sentence);
+  page.heading("Offsets of the joints");
+  page.paragraph("encoder = true + offset; one standard deviation. What is not told keeps what was believed and is not to be applied.");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& joint : c.joints) {
+    rows.push_back({joint.name, fmt::format("{:.2f}", degrees(joint.offset_rad)),
+                    fmt::format("{:.2f}", degrees(joint.sd_rad)), joint.told ? "told" : joint.untold_why});
+  }
+  page.table({"joint", "offset, deg", "sd, deg", ""}, rows);
+  page.heading("Cameras");
+  rows.clear();
+  for (const auto& camera : c.cameras) {
+    const Eigen::Vector3d p = camera.X_link_optical.translation();
+    rows.push_back({camera.name, camera.link, fmt::format("{:.4f}, {:.4f}, {:.4f}", p.x(), p.y(), p.z()),
+                    camera.estimated ? fmt::format("{:.1f}", 1e3 * camera.sd_m) : "as configured",
+                    camera.estimated ? fmt::format("{:.2f}", degrees(camera.sd_rad)) : "as configured"});
+  }
+  page.table({"camera", "on link", "place in its frame, m", "sd, mm", "sd, deg"}, rows);
+  if (!c.parameters.empty()) {
+    page.heading("What else was estimated");
+    rows.clear();
+    for (const auto& p : c.parameters) {
+      rows.push_back({p.name, fmt::format("{:.3g}", p.value), fmt::format("{:.2g}", p.sd), fmt::format("{:.2g}", p.prior_sd),
+                      p.unit});
+    }
+    page.table({"effect", "value", "sd", "sd believed before", "unit"}, rows);
+  }
+  page.heading("How well it fits");
+  rows = {{"before", fmt::format("{:.2f}", c.outline_px.before)}, {"after", fmt::format("{:.2f}", c.outline_px.after)}};
+  if (c.outline_px.heldout) rows.push_back({"postures left out of the fit", fmt::format("{:.2f}", *c.outline_px.heldout)});
+  page.table({"outline to outline, median", "px"}, rows);
+  page.paragraph(fmt::format(
+      "{} pictures of {} distinct postures. One point of an outline errs by {:.2f} px, {:.0f} neighbours alike; a posture "
+      "errs by {:.2f} deg per joint; postures disagree by {:.2f} times what is claimed.",
+      c.pictures, c.postures, c.outline_sd_px, c.outline_points_alike, degrees(c.posture_sd_rad),
+      std::sqrt(std::max(0.0, c.dispersion))));
+  if (!c.next_posture_rad.empty()) {
+    page.heading("What to record next");
+    rows.clear();
+    for (const auto& [joint, angle] : c.next_posture_rad) rows.push_back({joint, fmt::format("{:.1f}", degrees(angle))});
+    page.paragraph("This posture would tell most of " + c.next_posture_for + ", of those drawn at random within the joints' limits and in view. Check it for collisions.");
+    page.table({"joint", "encoder, deg"}, rows);
+  }
+  page.heading("Pictures");
+  page.paragraph("Outlines of encoders and model as they are (red) and of the calibration (green).");
+  Outlines outlines(log, batch);
+  for (const auto& observation : kept) {
+    std::vector<OverlayView> views;
+    for (std::size_t k = 0; k < observation.cameras.size(); ++k) {
+      const auto& seen = observation.cameras[k];
+      if (!seen || seen->image.empty()) continue;
+      views.push_back({&seen->image, outlines.at(seen->joints, k, false), outlines.at(seen->joints, k, true), {}});
+    }
+    if (views.empty()) continue;
+    page.picture(draw_overlay(views, fmt::format("{:.1f} s", seconds(observation.utime - kept.front().utime)), 1,
+                              {"encoders as they are", "calibrated"}),
+                 fmt::format("{:.1f} s", seconds(observation.utime - kept.front().utime)));
+  }
+  page.write(options.out / "report.html");
+}
+
+}  // namespace
+
+void write_calibration(const Calibration& calibration, const BatchFit& batch, PictureLog& log,
+                       const std::vector<Observation>& kept, const Pipeline& pipeline,
+                       const Configuration& configuration, const CalibrationOptions& options) {
+  Json json = to_json(calibration, log.robot()->root_link());
+  json["log"] = options.log.filename().string();
+  json["configuration_hash"] = configuration.hash();
+  json["model_hash"] = pipeline.model_hash();
+  replace_file(options.out / "calibration.json", json.dump(2) + '\n');
+  write_page(calibration, batch, log, kept, options);
+  replace_file(options.out / "offsets.yaml", offsets_yaml(calibration, options.all_parameters));
+  ErrorModel cameras(log.roles());
+  for (std::size_t e = 0; e < batch.state().model().size(); ++e) {
+    const Effect& effect = batch.state().model()[e];
+    if (effect_kind(effect.name()).home == EffectHome::kCameras) cameras.add(effect.clone());
+  }
+  replace_file(options.out / "cameras.yaml", cameras_yaml(calibration, cameras.corrected(log.rig())));
+  write_corrected_urdf(pipeline.setup().model.urdf, correction_of(calibration, options.all_parameters),
+                       options.out / "corrected.urdf");
+}
+
+std::string to_table(const Calibration& c) {
+  std::string text = c.sentence + "\n\n";
+  text += fmt::format("{:<24} {:>10} {:>8}\n", "joint", "offset deg", "sd deg");
+  for (const auto& joint : c.joints) {
+    text += fmt::format("{:<24} {:>10.2f} {:>8.2f}  {}\n", joint.name, degrees(joint.offset_rad), degrees(joint.sd_rad),
+                        joint.told ? "" : "not told: " + joint.untold_why);
+  }
+  for (const auto& camera : c.cameras) {
+    const Eigen::Vector3d p = camera.X_link_optical.translation();
+    text += fmt::format("\ncamera {:<16} at {:.4f} {:.4f} {:.4f} m in {}{}", camera.name, p.x(), p.y(), p.z(), camera.link,
+                        camera.estimated
+                            ? fmt::format(", known to {:.1f} mm and {:.2f} deg", 1e3 * camera.sd_m, degrees(camera.sd_rad))
+                            : ", as configured");
+  }
+  text += "\n";
+  for (const auto& p : c.parameters) {
+    if (p.name.starts_with("camera_")) continue;
+    text += fmt::format("\n{:<36} {:>9.3f} {:<3} sd {:.3f} (believed {:.3f})", p.name, p.value, p.unit, p.sd, p.prior_sd);
+  }
+  text += fmt::format("\n\noutlines, median distance: {:.2f} px before, {:.2f} px after{}\n", c.outline_px.before,
+                      c.outline_px.after,
+                      c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out", *c.outline_px.heldout) : "");
+  if (!c.next_posture_rad.empty()) {
+    text += "to tell " + c.next_posture_for + " better, record this posture as well (deg; check it for collisions):";
+    for (const auto& [joint, angle] : c.next_posture_rad) text += fmt::format(" {} {:.0f}", joint, degrees(angle));
+    text += '\n';
+  }
+  return text;
+}
+
+}  // namespace bodyschema

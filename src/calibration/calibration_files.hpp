@@ -1,0 +1,16 @@
+#pragma once
+
+#include <vector>
+
+#include "bodyschema/calibration/calibrate.hpp"
+#include "bodyschema/evidence/batch_fit.hpp"
+#include "bodyschema/pipeline/pipeline.hpp"
+
+namespace bodyschema {
+
+/// Writes everything that `calibrate` promises. `log` has the robot and rig that the fit ended with.
+void write_calibration(const Calibration& calibration, const BatchFit& batch, PictureLog& log,
+                       const std::vector<Observation>& kept, const Pipeline& pipeline,
+                       const Configuration& configuration, const CalibrationOptions& options);
+
+}  // namespace bodyschema

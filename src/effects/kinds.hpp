@@ -1,0 +1,97 @@
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <span>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bodyschema/effects/effect_kind.hpp"
+#include "bodyschema/geometry/pose.hpp"
+
+/// What the files of the catalogue share. Each defines one function, named as its effect, that returns its kind;
+/// CMakeLists.txt lists them, and catalogue.cpp gathers them from there.
+namespace bodyschema::effects {
+
+using Targets = std::vector<EffectTarget>;
+using Parameters = std::span<const EffectParameter>;
+
+inline constexpr double kDeg = kPi / 180.0;
+
+inline EffectParameter in_degrees(const char* name, double typical_deg) {
+  return {.name = name, .unit = "deg", .si_per_unit = kDeg, .typical = typical_deg * kDeg};
+}
+inline EffectParameter in_mm(const char* name, double typical_mm) {
+  return {.name = name, .unit = "mm", .si_per_unit = 1e-3, .typical = 1e-3 * typical_mm};
+}
+inline EffectParameter in_percent(const char* name, double typical_percent) {
+  return {.name = name, .unit = "%", .si_per_unit = 0.01, .typical = 0.01 * typical_percent};
+}
+inline EffectParameter in_ms(const char* name, double typical_ms) {
+  return {.name = name, .unit = "ms", .si_per_unit = 1e-3, .typical = 1e-3 * typical_ms};
+}
+inline EffectParameter in_px(const char* name, double typical_px) {
+  return {.name = name, .unit = "px", .si_per_unit = 1.0, .typical = typical_px};
+}
+
+/// What an effect without memory looks at.
+enum class Follows { kPosture, kMotion, kGravity };
+
+/// An effect without memory: what it adds is a function of its parameters and the instant.
+template <class Apply>
+class PlainEffect final : public ClonableEffect<PlainEffect<Apply>> {
+ public:
+  PlainEffect(std::string name, EffectTarget target, std::vector<EffectParameter> parameters, Follows follows,
+              Apply apply)
+      : ClonableEffect<PlainEffect<Apply>>(std::move(name), std::move(target), std::move(parameters)),
+        follows_(follows), apply_(std::move(apply)) {}
+  void apply(const Instant& at, Corrections& add_to) const override { apply_(this->parameters(), at, add_to); }
+  [[nodiscard]] bool follows_motion() const override { return follows_ == Follows::kMotion; }
+  [[nodiscard]] bool follows_gravity() const override { return follows_ == Follows::kGravity; }
+
+ private:
+  Follows follows_;
+  Apply apply_;
+};
+
+/// @param apply  void(Parameters, const Instant&, Corrections& add_to)
+template <class Apply>
+std::unique_ptr<Effect> plain(std::string name, const EffectTarget& target, std::vector<EffectParameter> parameters,
+                              Apply apply, Follows follows = Follows::kPosture) {
+  return std::make_unique<PlainEffect<Apply>>(std::move(name), target, std::move(parameters), follows,
+                                              std::move(apply));
+}
+
+/// The whole robot.
+inline Targets whole_robot(const JointRoles&) {
+  return {EffectTarget{}};
+}
+inline Targets joint_targets(const JointRoles& roles, const std::vector<Eigen::Index>& joints) {
+  Targets targets;
+  for (const auto joint : joints) targets.push_back({roles.names[static_cast<std::size_t>(joint)], ""});
+  return targets;
+}
+/// One target per arm joint.
+inline Targets arm_targets(const JointRoles& roles) {
+  return joint_targets(roles, roles.arm);
+}
+/// The whole body, then each of its segments by name where there are several.
+Targets body_targets(const JointRoles& roles);
+/// Positions in Corrections::shapes that a target of `body_targets` means.
+std::vector<std::size_t> segments_of(const EffectTarget& target, const JointRoles& roles);
+
+/// "more" or "less", "longer" or "shorter", ... by the sign of a parameter.
+inline std::string by_sign(const EffectParameter& p, const char* positive, const char* negative) {
+  return p.value < 0.0 ? negative : positive;
+}
+/// "3.1 deg": a number of two decimals at the most, for reasons.
+std::string short_number(double value, int decimals = 1);
+
+/// Reasons that several effects share; empty: testable.
+std::string too_little_motion(const std::string& joint, const JointRoles& roles, const LogMotion& motion);
+std::string too_slow(const LogMotion& motion);
+std::string needs_two_cameras(const LogMotion& motion);
+
+}  // namespace bodyschema::effects

@@ -1,0 +1,225 @@
+#include "frame_model.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace bodyschema {
+namespace {
+
+std::vector<ParameterRef> refs_of(const State& state) {
+  std::vector<ParameterRef> refs;
+  for (const auto& parameter : state.parameters()) refs.push_back(parameter.ref);
+  return refs;
+}
+
+}  // namespace
+
+bool Frame::exposed() const {
+  return std::any_of(seen.begin(), seen.end(), [](const auto* camera) { return camera != nullptr; });
+}
+
+FrameModel::FrameModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                       const JointRoles& roles, State state, const ErrorModel& beside)
+    : roles_(roles), rig_(rig), state_(std::move(state)), measurement_(robot, setup, rig, roles), track_(robot, setup),
+      probes_(state_.model(), refs_of(state_), measurement_.coordinates()),
+      beside_(beside, fitted_parameters(beside), measurement_.coordinates()),
+      settled_(rig.cameras.size(), roles.no_corrections()), scratch_(roles.no_corrections()), nothing_(scratch_),
+      position_(static_cast<std::size_t>(measurement_.coordinates().size()), -1) {
+  for (std::size_t e = 0; e < state_.model().size(); ++e) {
+    sags_ = sags_ || std::as_const(state_).model()[e].follows_gravity();
+    remembers_ = remembers_ || std::as_const(state_).model()[e].has_memory();
+  }
+}
+
+void FrameModel::forget() {
+  track_.forget();
+  state_.model().forget();
+  probes_.forget();
+  beside_.forget();
+}
+
+/// What effects look at, with those that have a memory as they are now.
+void FrameModel::expose(const JointSample& joints, std::size_t camera, const Eigen::VectorXd& x, Exposure& out) {
+  track_.instant(joints, camera, state_.model().offsets(), out.at);
+  if (remembers_) {
+    out.remembered = roles_.no_corrections();
+    for (std::size_t e = 0; e < state_.model().size(); ++e) {
+      const Effect& effect = std::as_const(state_).model()[e];
+      if (effect.has_memory()) effect.apply(out.at, out.remembered);
+    }
+  }
+  if (!sags_) return;
+  // Gravity acts on the arm where it stands, sagged.
+  corrections(out, x, scratch_);
+  track_.torques_at(joints, -scratch_.dq, out.at);
+}
+
+Frame FrameModel::take(const Observation& observation, const Eigen::VectorXd& x) {
+  if (observation.encoders_begin_anew) forget();
+  track_.add(observation.encoders);
+  state_.set(x);
+  probes_.follow(state_.model());
+  Frame frame;
+  frame.exposures.resize(rig_.cameras.size());
+  frame.seen.resize(rig_.cameras.size(), nullptr);
+  // The earlier exposure first: what has a memory goes with time.
+  std::vector<std::size_t> order;
+  for (std::size_t c = 0; c < frame.seen.size() && c < observation.cameras.size(); ++c) {
+    if (!observation.cameras[c]) continue;
+    frame.seen[c] = &*observation.cameras[c];
+    order.push_back(c);
+  }
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return frame.seen[a]->utime < frame.seen[b]->utime; });
+  for (const auto c : order) {
+    JointSample joints = frame.seen[c]->joints;
+    joints.utime = frame.seen[c]->utime;
+    track_.advance(joints.utime, [&](const JointSample& sample) {
+      state_.model().observe(sample);
+      probes_.observe(sample);
+      beside_.observe(sample);
+    });
+    expose(joints, c, x, frame.exposures[c]);
+  }
+  for (std::size_t c = 0; c < frame.seen.size() && !order.empty(); ++c) {
+    if (frame.seen[c] == nullptr) expose(frame.seen[order.front()]->joints, c, x, frame.exposures[c]);
+  }
+  return frame;
+}
+
+Exposure FrameModel::at_rest(const Eigen::VectorXd& q, std::size_t camera) {
+  Exposure exposure;
+  Instant& at = exposure.at;
+  track_.torques_at({0, q, Eigen::VectorXd::Zero(q.size())}, state_.model().offsets(), at);
+  at.camera = camera;
+  at.encoder = q;
+  at.q = q - state_.model().offsets();
+  at.qdot = at.qddot = Eigen::VectorXd::Zero(q.size());
+  return exposure;
+}
+
+Exposure FrameModel::preview(const JointSample& joints, std::size_t camera) {
+  Exposure exposure;
+  expose(joints, camera, state_.x(), exposure);
+  return exposure;
+}
+
+void FrameModel::corrections(const Exposure& exposure, const Eigen::VectorXd& x, Corrections& out) {
+  state_.set(x);
+  if (!remembers_) {
+    state_.model().corrections(exposure.at, out);
+    return;
+  }
+  if (exposure.remembered.dq.size() > 0) {
+    out = exposure.remembered;
+  } else {
+    out.clear();
+  }
+  for (std::size_t e = 0; e < state_.model().size(); ++e) {
+    const Effect& effect = std::as_const(state_).model()[e];
+    if (!effect.has_memory()) effect.apply(exposure.at, out);
+  }
+}
+
+void FrameModel::settle(const Frame& frame, const Eigen::VectorXd& x) {
+  settled_frame_ = &frame;
+  Eigen::VectorXd rest = x;
+  rest.head(state_.joints()).setZero();
+  for (std::size_t c = 0; c < settled_.size(); ++c) corrections(frame.exposures[c], rest, settled_[c]);
+}
+
+void FrameModel::place(const Eigen::VectorXd& x, std::size_t camera, std::span<Eigen::Isometry3f> X_CB) {
+  scratch_ = settled_[camera];
+  for (Eigen::Index k = 0; k < state_.joints(); ++k) {
+    scratch_.dq[state_.parameters()[static_cast<std::size_t>(k)].joint] -= x[k];
+  }
+  auto& projection = measurement_.projection();
+  projection.place(settled_frame_->exposures[camera].at.encoder, scratch_, camera);
+  projection.parts(X_CB);
+}
+
+RobotProjection& FrameModel::project(const Exposure& exposure, const Eigen::VectorXd& x) {
+  corrections(exposure, x, scratch_);
+  measurement_.projection().place(exposure.at.encoder, scratch_, exposure.at.camera);
+  return measurement_.projection();
+}
+
+RobotProjection& FrameModel::project_nominal(const Exposure& exposure) {
+  measurement_.projection().place(exposure.at.encoder, nothing_, exposure.at.camera);
+  return measurement_.projection();
+}
+
+Pose FrameModel::hand_pose(const Exposure& exposure, const Eigen::VectorXd& x) {
+  return project(exposure, x).hand();
+}
+
+Pose FrameModel::nominal_hand_pose(const Exposure& exposure) {
+  return project_nominal(exposure).hand();
+}
+
+/// Leaves what the parameters do to the coordinates in `J_`, and these in `active_`.
+void FrameModel::find_directions(const Exposure& exposure, const Eigen::VectorXd& x, bool with_beside) {
+  state_.set(x);
+  probes_.follow(state_.model());
+  probes_.directions(exposure.at, directions_);
+  if (with_beside) {
+    beside_.directions(exposure.at, more_directions_);
+    directions_.insert(directions_.end(), more_directions_.begin(), more_directions_.end());
+  }
+  std::fill(position_.begin(), position_.end(), -1);
+  active_.clear();
+  for (const auto& direction : directions_) {
+    for (const auto& step : direction) {
+      if (position_[step.coordinate] >= 0) continue;
+      position_[step.coordinate] = static_cast<Eigen::Index>(active_.size());
+      active_.push_back(step.coordinate);
+    }
+  }
+  J_.setZero(static_cast<Eigen::Index>(active_.size()), state_.size() + beside_count());
+  for (std::size_t k = 0; k < directions_.size(); ++k) {
+    for (const auto& step : directions_[k]) J_(position_[step.coordinate], static_cast<Eigen::Index>(k)) = step.amount;
+  }
+}
+
+void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::span<const OutlineSearch> search,
+                           bool with_beside, FrameEvidence& out,
+                           const std::function<void(std::size_t, std::span<const OutlinePoint>)>& look) {
+  const Eigen::Index n = state_.size() + beside_count();
+  out.cameras.resize(frame.seen.size());
+  out.cost.assign(frame.seen.size(), 0.0);
+  out.sampled = out.matched = out.square = out.weight = 0.0;
+  for (std::size_t c = 0; c < frame.seen.size(); ++c) {
+    auto& evidence = out.cameras[c];
+    evidence.A.setZero(n, n);
+    evidence.b.setZero(n);
+    evidence.square = evidence.weight = 0.0;
+    const auto* seen = frame.seen[c];
+    if (seen == nullptr || seen->mask.empty()) continue;
+    const auto& k = rig_.cameras[c].intrinsics;
+    const auto& exposure = frame.exposures[c];
+    find_directions(exposure, x, with_beside);
+    corrections(exposure, x, scratch_);
+    measurement_.linearise(ObservedEdges(*seen, k), exposure.at.encoder, scratch_, c, active_, search[c], evidence_);
+    out.sampled += evidence_.sampled;
+    out.matched += evidence_.matched;
+    const double unit2 = picture_unit(k) * picture_unit(k);
+    out.cost[c] = evidence_.cost / unit2;
+    if (evidence_.weight <= 0.0) continue;
+    evidence.A = J_.transpose() * evidence_.A * J_ / unit2;
+    evidence.b = J_.transpose() * evidence_.b / unit2;
+    evidence.square = evidence_.square / unit2;
+    evidence.weight = evidence_.weight;
+    out.square += evidence.square;
+    out.weight += evidence.weight;
+    if (look) look(c, measurement_.points());
+  }
+}
+
+Eigen::MatrixXd FrameModel::hand_jacobian(const Exposure& exposure, const Eigen::VectorXd& x) {
+  find_directions(exposure, x, true);
+  corrections(exposure, x, scratch_);
+  const auto link = measurement_.projection().hand_link();
+  return measurement_.link_jacobian(exposure.at.encoder, scratch_, exposure.at.camera, active_, link).topRows<3>() * J_;
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "bodyschema/effects/encoder_track.hpp"
+#include "bodyschema/estimator/exposure.hpp"
+#include "bodyschema/evidence/log_fit.hpp"
+#include "bodyschema/evidence/state.hpp"
+#include "bodyschema/outline/effect_probes.hpp"
+#include "bodyschema/outline/outline_measurement.hpp"
+
+namespace bodyschema {
+
+/// What the pictures of one frame say about a state near some value of it.
+struct FrameEvidence {
+  std::vector<StateEvidence> cameras;   ///< about the value; px^2 of a 320x240 picture, not divided by a variance
+  double sampled = 0.0, matched = 0.0;  ///< outline points of all cameras
+  double square = 0.0, weight = 0.0;    ///< of residuals, as OutlineEvidence
+  std::vector<double> cost;             ///< per camera: robust cost of the whole outline
+  [[nodiscard]] double rms_px() const { return weight > 0.0 ? std::sqrt(square / weight) : 0.0; }
+  [[nodiscard]] double matched_share() const { return sampled > 0.0 ? matched / sampled : 0.0; }
+};
+
+/// The pictures of one frame with what is known of their exposures: all that is needed to look at them again.
+struct Frame {
+  std::vector<Exposure> exposures;                ///< per camera; where one saw nothing, another's
+  std::vector<const CameraObservation*> seen;     ///< per camera; null: nothing. Not owned
+  [[nodiscard]] bool exposed() const;             ///< whether any camera saw anything
+};
+
+/// What a state predicts, and what pictures say of it: plays the encoders through the state's effects, turns their
+/// parameters into corrections of each exposure, and asks the outlines.
+///
+/// A state is a vector x, one value per parameter of State. Besides there are effects that are not estimated
+/// (`beside`): their values stay zero, but what they would change is asked for. One thread.
+class FrameModel {
+ public:
+  FrameModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+             const JointRoles& roles, State state, const ErrorModel& beside);
+
+  /// Shows the next observation's encoder samples to the effects. The observation must live as long as its frame.
+  /// @param x  the state believed in, under which gravity acts on the arm
+  Frame take(const Observation& observation, const Eigen::VectorXd& x);
+  void forget();
+
+  [[nodiscard]] const State& state() const { return state_; }
+  [[nodiscard]] const JointRoles& roles() const { return roles_; }
+  [[nodiscard]] std::size_t part_count() const { return measurement_.part_count(); }
+  [[nodiscard]] Eigen::Index beside_count() const { return static_cast<Eigen::Index>(beside_.parameters().size()); }
+  [[nodiscard]] double picture_unit_px(std::size_t camera) const { return picture_unit(rig_.cameras[camera].intrinsics); }
+  /// An exposure that has not been taken: its motion as far as it is known so far.
+  [[nodiscard]] Exposure preview(const JointSample& joints, std::size_t camera);
+  /// One of an arm at rest, known by its encoders alone.
+  [[nodiscard]] Exposure at_rest(const Eigen::VectorXd& q, std::size_t camera);
+
+  void corrections(const Exposure& exposure, const Eigen::VectorXd& x, Corrections& out);
+  /// Transforms of the parts in a camera of a frame. Entries of x beyond the joint offsets are taken from the last
+  /// `settle`: what many hypotheses about offsets are drawn with.
+  void settle(const Frame& frame, const Eigen::VectorXd& x);
+  void place(const Eigen::VectorXd& x, std::size_t camera, std::span<Eigen::Isometry3f> X_CB);
+
+  /// Evidence of every camera with a mask about the state near x and, where wanted, about what lies beside it.
+  /// @param search  one per camera
+  /// @param look  called with a camera's matched points
+  void linearise(const Frame& frame, const Eigen::VectorXd& x, std::span<const OutlineSearch> search, bool with_beside,
+                 FrameEvidence& out,
+                 const std::function<void(std::size_t, std::span<const OutlinePoint>)>& look = {});
+
+  [[nodiscard]] Pose hand_pose(const Exposure& exposure, const Eigen::VectorXd& x);
+  [[nodiscard]] Pose nominal_hand_pose(const Exposure& exposure);
+  /// How the hand's place in the camera moves: 3 x (state, beside), m per SI unit.
+  [[nodiscard]] Eigen::MatrixXd hand_jacobian(const Exposure& exposure, const Eigen::VectorXd& x);
+  /// Places the robot; RobotProjection then holds it.
+  RobotProjection& project(const Exposure& exposure, const Eigen::VectorXd& x);
+  RobotProjection& project_nominal(const Exposure& exposure);
+
+ private:
+  void find_directions(const Exposure& exposure, const Eigen::VectorXd& x, bool with_beside);
+  void expose(const JointSample& joints, std::size_t camera, const Eigen::VectorXd& x, Exposure& out);
+
+  JointRoles roles_;
+  StereoRig rig_;
+  State state_;
+  bool sags_ = false;        ///< some effect follows gravity
+  bool remembers_ = false;   ///< some effect has a memory
+  OutlineMeasurement measurement_;
+  EncoderTrack track_;
+  EffectProbes probes_, beside_;
+  const Frame* settled_frame_ = nullptr;
+  std::vector<Corrections> settled_;  ///< per camera, of the state without joint offsets
+  Corrections scratch_;
+  const Corrections nothing_;
+  std::vector<Direction> directions_, more_directions_;
+  std::vector<std::uint32_t> active_;
+  std::vector<Eigen::Index> position_;  ///< of a coordinate among the active; -1: it is none
+  OutlineEvidence evidence_;
+  Eigen::MatrixXd J_;
+};
+
+}  // namespace bodyschema

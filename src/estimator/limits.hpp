@@ -1,0 +1,48 @@
+#pragma once
+
+/// Every limit of the estimator that no configuration sets, with its unit and its kind: `physical`, a bound that
+/// follows from what robots and pictures are; `statistical`, a quantile of a stated distribution.
+namespace bodyschema::limits {
+
+/// Physical. px of a 320x240 picture: outlines whose residuals are larger (robust rms) are somebody else's.
+inline constexpr double kNear_px = 2.5;
+/// Physical. A picture that shows less of the predicted outline shows something else as well.
+inline constexpr double kLeastMatched = 0.5;
+inline constexpr double kFewestPoints = 20.0;
+/// Physical. rad; Gauss-Newton goes no further at once: sines are no longer linear.
+inline constexpr double kMaxStep_rad = 0.2;
+/// Physical. Pictures after which the measured noise has forgotten one: light and background change in minutes.
+inline constexpr double kNoisePictures = 100.0;
+
+/// Statistical. A frame whose innovation exceeds what this share of frames reach by chance is doubted: chi-square of
+/// its degrees of freedom, times what is usual in this log.
+inline constexpr double kDoubt_tail = 1e-4;
+/// Statistical. Frames over which the usual innovation is the mean; before any, the belief counts as so many.
+inline constexpr double kUsualFrames = 30.0;
+inline constexpr double kUsualPrior = 5.0;
+/// Statistical. Chi-square by which another explanation must be better: a likelihood ratio of 1 : 1e5.
+inline constexpr double kClearlyBetter = 23.0;
+/// Physical. Hammoude distance of an arm found elsewhere against that of the one believed in: wrong arms are off by far
+/// more, right ones by what masks get wrong.
+inline constexpr double kNearer = 0.8;
+/// Statistical. What one more free parameter must be better by: ln of prior over posterior variance, usually.
+inline constexpr double kPerParameter = 9.0;
+
+/// Statistical. A parameter further from what was believed than this many of its standard deviations contradicts it.
+inline constexpr double kBeyondBelief_sd = 4.0;
+/// Statistical. Postures that disagree by more than this times what is claimed (mean NIS per direction).
+inline constexpr double kDisagreement = 4.0;
+
+/// Physical. s; a single bad picture, a person passing, lasts shorter than what a robot does to itself; longer
+/// contradictions without a better explanation are said.
+inline constexpr double kPatience_s = 0.5;
+/// Physical. s; a memory that another one replaced may prove right again within it.
+inline constexpr double kAlternative_s = 3.0;
+/// Physical. rad; the search's particles are never narrower: an arm's first picture knows no better.
+inline constexpr double kSearchSpread_rad = 0.0349066;
+/// Physical. rad; of slips that are searched for at once; larger ones take more frames.
+inline constexpr double kLargestSlip_rad = 0.2094395;
+/// Physical. of the distance to the camera: how well hands are to be known where nobody says (1 mm at 0.35 m).
+inline constexpr double kHandPerDistance = 1.0 / 350.0;
+
+}  // namespace bodyschema::limits

@@ -1,0 +1,195 @@
+#include "bodyschema/evidence/batch_fit.hpp"
+
+#include <algorithm>
+#include <mutex>
+#include <numeric>
+#include <utility>
+
+namespace bodyschema {
+namespace {
+
+/// A log is all of one time: nothing fades.
+MemoryOptions unfading(MemoryOptions options) {
+  options.memory_s = 1e12;
+  options.most_blocks = 100000;
+  return options;
+}
+
+ErrorModel effects_of(const std::vector<Belief>& beliefs, const JointRoles& roles) {
+  ErrorModel model(roles);
+  for (const auto& belief : beliefs) model.add(belief.effect, belief.target);
+  return model;
+}
+
+std::vector<ParameterRef> refs_of(const State& state) {
+  std::vector<ParameterRef> refs;
+  for (const auto& parameter : state.parameters()) refs.push_back(parameter.ref);
+  return refs;
+}
+
+constexpr double kFinest_px = 6.0;
+
+}  // namespace
+
+Eigen::VectorXd posture_of(const Eigen::VectorXd& q, const JointRoles& roles) {
+  Eigen::VectorXd result(static_cast<Eigen::Index>(roles.arm.size() + roles.head.size()));
+  Eigen::Index i = 0;
+  for (const auto* group : {&roles.arm, &roles.head}) {
+    for (const auto joint : *group) result(i++) = q(joint);
+  }
+  return result;
+}
+
+MemoryLayout memory_layout(const State& state, const std::vector<Belief>& considered) {
+  MemoryLayout layout;
+  layout.prior_mean = state.prior_mean();
+  layout.prior_sd = state.prior_sd();
+  for (const auto& parameter : state.parameters()) {
+    const auto& effect = state.model()[parameter.ref.effect];
+    layout.is_joint.push_back(effect.name() == "joint_offset" || effect.name() == "head_offset");
+  }
+  std::vector<double> sds;
+  for (const auto& belief : considered) sds.insert(sds.end(), belief.sd.begin(), belief.sd.end());
+  layout.considered_sd = Eigen::Map<const Eigen::VectorXd>(sds.data(), static_cast<Eigen::Index>(sds.size()));
+  return layout;
+}
+
+BatchFit::BatchFit(LogFit& fit, State state, const std::vector<Belief>& considered, const BatchSettings& settings)
+    : fit_(fit), state_(std::move(state)), beside_(effects_of(considered, fit.log().roles())), settings_(settings),
+      memory_(memory_layout(state_, considered), unfading(settings.memory)),
+      noise_(fit.log().rig().cameras.size(), OutlineNoise(settings.noise)) {
+  group_postures();
+}
+
+/// Pictures in a row that show one posture, or a quarter of a second of motion.
+void BatchFit::group_postures() {
+  const auto pictures = fit_.log().pictures();
+  posture_of_.assign(pictures.size(), 0);
+  Eigen::VectorXd q;
+  double begin_s = 0.0;
+  for (std::size_t p = 0; p < pictures.size(); ++p) {
+    const Eigen::VectorXd own = bodyschema::posture_of(pictures[p].joints.q, fit_.log().roles());
+    const double time_s = seconds(pictures[p].joints.utime);
+    const bool stays = q.size() > 0 && (own - q).cwiseAbs().maxCoeff() < settings_.memory.same_posture_rad;
+    if (q.size() == 0 || (!stays && time_s - begin_s >= settings_.memory.block_s)) {
+      if (q.size() > 0) ++postures_;
+      q = own;
+      begin_s = time_s;
+    }
+    posture_of_[p] = postures_;
+  }
+  if (q.size() > 0) ++postures_;
+}
+
+std::vector<OutlineSearch> BatchFit::searches() const {
+  std::vector<OutlineSearch> list;
+  for (const auto& noise : noise_) list.push_back({kFinest_px, settings_.spacing_px, noise.robust_px()});
+  return list;
+}
+
+void BatchFit::run(double from_px, const std::vector<std::size_t>& pictures) {
+  const auto variance = [&] {
+    double sum = 0.0;
+    for (const auto& noise : noise_) sum += noise.variance_px2() / static_cast<double>(noise_.size());
+    return sum;
+  };
+  FitSettings settings{.iterations = settings_.iterations,
+                       .from_px = from_px,
+                       .finest_px = kFinest_px,
+                       .robust_px = 3.0,
+                       .spacing_px = settings_.spacing_px,
+                       .variance_px2 = variance()};
+  fit_.fit(state_, settings, pictures);
+  if (settings_.progress) settings_.progress(0.5);
+  measure(pictures);
+  // With the noise as it is: how far beliefs and pictures pull, and which outlines are somebody else's.
+  double robust_px = 0.0;
+  for (const auto& noise : noise_) robust_px = std::max(robust_px, noise.robust_px());
+  settings.from_px = 0.0;
+  settings.robust_px = robust_px;
+  settings.variance_px2 = variance();
+  fit_.fit(state_, settings, pictures);
+  measure(pictures);
+  if (settings_.progress) settings_.progress(0.8);
+  fuse(pictures);
+  if (settings_.progress) settings_.progress(1.0);
+}
+
+void BatchFit::measure(const std::vector<std::size_t>& pictures) {
+  noise_.assign(noise_.size(), OutlineNoise(settings_.noise));
+  const auto all = fit_.log().pictures();
+  std::vector<std::vector<OutlinePoint>> points(all.size());
+  double robust_px = 3.0;
+  static_cast<void>(fit_.linearise(state_.model(), {}, {kFinest_px, settings_.spacing_px, robust_px}, pictures,
+                                   [&](std::size_t p, std::span<const OutlinePoint> seen) {
+                                     points[p].assign(seen.begin(), seen.end());
+                                   }));
+  for (std::size_t p = 0; p < all.size(); ++p) {
+    if (points[p].empty()) continue;
+    noise_[all[p].camera].add(points[p], picture_unit(fit_.log().rig().cameras[all[p].camera].intrinsics));
+  }
+}
+
+/// All postures about the state, fused; the state moves to what comes of it until it stays.
+void BatchFit::fuse(const std::vector<std::size_t>& pictures) {
+  constexpr int kRounds = 4;
+  const auto refs = refs_of(state_);
+  auto beside = fitted_parameters(beside_);
+  auto coordinates = fit_.moved_by(state_.model(), refs);
+  const auto more = fit_.moved_by(beside_, beside);
+  coordinates.insert(coordinates.end(), more.begin(), more.end());
+  std::sort(coordinates.begin(), coordinates.end());
+  coordinates.erase(std::unique(coordinates.begin(), coordinates.end()), coordinates.end());
+  const auto n = state_.size(), m = static_cast<Eigen::Index>(beside.size());
+  const auto all = fit_.log().pictures();
+  double robust_px = 0.0;
+  for (const auto& noise : noise_) robust_px = std::max(robust_px, noise.robust_px());
+  const Eigen::VectorXd start = state_.x();
+  for (int round = 0; round < kRounds; ++round) {
+    at_ = fit_.linearise(state_.model(), coordinates, {kFinest_px, settings_.spacing_px, robust_px}, pictures);
+    misfit_ = fit_.misfit(at_, at_.sampled());
+    const auto own = fit_.directions(at_, state_.model(), refs), other = fit_.directions(at_, beside_, beside);
+    std::vector<Eigen::Index> position(static_cast<std::size_t>(fit_.coordinates().size()), -1);
+    for (std::size_t i = 0; i < coordinates.size(); ++i) position[coordinates[i]] = static_cast<Eigen::Index>(i);
+    const Eigen::VectorXd x = state_.x();
+    memory_.forget_all();
+    for (std::size_t first = 0; first < all.size();) {
+      std::size_t last = first;
+      Quadratic posture = Quadratic::zero(n + m);
+      std::vector<double> seen(noise_.size(), 0.0);
+      for (; last < all.size() && posture_of_[last] == posture_of_[first]; ++last) {
+        seen[all[last].camera] += at_.evidence[last].weight > 0.0;
+      }
+      double total = 0.0;
+      for (std::size_t p = first; p < last; ++p) {
+        const auto& evidence = at_.evidence[p];
+        if (evidence.weight <= 0.0) continue;
+        total += 1.0;
+        const auto& camera = fit_.log().rig().cameras[all[p].camera];
+        const double unit = picture_unit(camera.intrinsics);
+        // The pictures of a posture count as one of each camera.
+        const double precision = 1.0 / (unit * unit * noise_[all[p].camera].variance_px2() * seen[all[p].camera]);
+        Eigen::MatrixXd J = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(coordinates.size()), n + m);
+        for (Eigen::Index k = 0; k < n + m; ++k) {
+          const auto& direction =
+              k < n ? own[p][static_cast<std::size_t>(k)] : other[p][static_cast<std::size_t>(k - n)];
+          for (const auto& step : direction) J(position[step.coordinate], k) = step.amount;
+        }
+        posture.A += precision * J.transpose() * evidence.A * J;
+        posture.b += precision * J.transpose() * evidence.b;
+      }
+      if (total > 0.0) {
+        posture.b += posture.A.leftCols(n) * x;
+        memory_.add(seconds(all[first].joints.utime) , bodyschema::posture_of(all[first].joints.q, fit_.log().roles()),
+                    posture, x);
+      }
+      first = last;
+    }
+    if (memory_.empty()) return;
+    state_.set(memory_.estimate().x);
+    const Eigen::VectorXd moved = (state_.x() - x).cwiseQuotient(memory_.layout().prior_sd);
+    if (moved.cwiseAbs().maxCoeff() < 1e-3) return;
+  }
+}
+
+}  // namespace bodyschema

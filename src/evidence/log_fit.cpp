@@ -1,0 +1,287 @@
+#include "bodyschema/evidence/log_fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <set>
+#include <thread>
+#include <utility>
+
+namespace bodyschema {
+namespace {
+
+/// A picture in which fewer points of the outline are found shows something else.
+constexpr double kFewestPoints = 20.0;
+constexpr double kLeastShare = 0.3;
+constexpr double kNarrow = 0.75;    ///< of the search, a step
+
+/// Plays the encoder log: `observe` sees every sample up to each picture, then `visit` the picture.
+template <class Observe, class Visit>
+void play(const PictureLog& log, Observe observe, Visit visit) {
+  const auto encoders = log.encoders();
+  std::size_t next = 0;
+  for (std::size_t p = 0; p < log.pictures().size(); ++p) {
+    const auto until = log.pictures()[p].joints.utime;
+    for (; next < encoders.size() && encoders[next].utime <= until; ++next) observe(encoders[next]);
+    visit(p);
+  }
+}
+
+}  // namespace
+
+double LinearLog::rms_px() const {
+  double square = 0.0, weight = 0.0;
+  for (const auto& e : evidence) {
+    square += e.square;
+    weight += e.weight;
+  }
+  return weight > 0.0 ? std::sqrt(square / weight) : 0.0;
+}
+
+double LinearLog::sampled() const {
+  double points = 0.0;
+  for (const auto& e : evidence) points += e.sampled;
+  return points;
+}
+
+double LinearLog::matched_share() const {
+  double matched = 0.0;
+  for (const auto& e : evidence) matched += e.matched;
+  const double points = sampled();
+  return points > 0.0 ? matched / points : 0.0;
+}
+
+void StateEvidence::add(const StateEvidence& other, double factor) {
+  if (A.size() == 0) {
+    A.setZero(other.A.rows(), other.A.cols());
+    b.setZero(other.b.size());
+  }
+  A += factor * other.A;
+  b += factor * other.b;
+  square += factor * other.square;
+  weight += factor * other.weight;
+}
+
+LogFit::LogFit(PictureLog& log, int threads) : log_(log), workers_(static_cast<std::size_t>(std::max(1, threads))) {
+  refresh();
+}
+
+void LogFit::refresh() {
+  for (auto& worker : workers_) {
+    worker = std::make_unique<OutlineMeasurement>(log_.robot(), log_.setup(), log_.rig(), log_.roles());
+  }
+}
+
+LogFit::~LogFit() = default;
+
+const Coordinates& LogFit::coordinates() const {
+  return workers_.front()->coordinates();
+}
+
+LinearLog LogFit::linearise(const ErrorModel& model, std::span<const std::uint32_t> coordinates,
+                            const OutlineSearch& search, std::span<const std::size_t> pictures,
+                            const std::function<void(std::size_t, std::span<const OutlinePoint>)>& look) {
+  LinearLog result;
+  const auto count = log_.pictures().size();
+  result.coordinates.assign(coordinates.begin(), coordinates.end());
+  result.instants.resize(count);
+  result.corrections.assign(count, model.roles().no_corrections());
+  result.evidence.resize(count);
+  std::vector<char> wanted(count, pictures.empty() ? 1 : 0);
+  for (const auto p : pictures) wanted[p] = 1;
+
+  auto playing = model;
+  playing.forget();
+  bool sags = false;
+  for (std::size_t e = 0; e < model.size(); ++e) sags = sags || model[e].follows_gravity();
+  const auto offsets = model.offsets();
+  Instant sagged;
+  play(
+      log_, [&](const JointSample& sample) { playing.observe(sample); },
+      [&](std::size_t p) {
+        log_.instant(p, offsets, result.instants[p]);
+        playing.corrections(result.instants[p], result.corrections[p]);
+        if (!sags) return;
+        // Gravity acts on the arm where it stands, sagged.
+        log_.instant(p, -result.corrections[p].dq, sagged);
+        result.instants[p].gravity_torque = sagged.gravity_torque;
+        result.instants[p].payload_torque = sagged.payload_torque;
+        playing.corrections(result.instants[p], result.corrections[p]);
+      });
+
+  std::atomic<std::size_t> next{0};
+  const auto work = [&](OutlineMeasurement& measurement) {
+    for (std::size_t p; (p = next++) < count;) {
+      auto& evidence = result.evidence[p];
+      if (wanted[p] == 0) {
+        evidence.clear(static_cast<Eigen::Index>(coordinates.size()));
+        continue;
+      }
+      const auto& picture = log_.pictures()[p];
+      measurement.linearise(log_.edges(p), picture.joints.q, result.corrections[p], picture.camera, coordinates,
+                            search, evidence);
+      if (evidence.matched < kFewestPoints || evidence.matched_share() < kLeastShare) {
+        const auto blind = std::exchange(evidence, {});
+        evidence.clear(static_cast<Eigen::Index>(coordinates.size()));
+        evidence.cost = blind.cost;
+        evidence.misfit = blind.misfit;
+        evidence.sampled = blind.sampled;
+      } else if (look) {
+        look(p, measurement.points());
+      }
+    }
+  };
+  std::vector<std::jthread> threads;
+  for (std::size_t t = 1; t < workers_.size(); ++t) threads.emplace_back([&, t] { work(*workers_[t]); });
+  work(*workers_.front());
+  threads.clear();
+  return result;
+}
+
+std::vector<std::vector<Direction>> LogFit::directions(const LinearLog& at, const ErrorModel& model,
+                                                       const std::vector<ParameterRef>& parameters) {
+  EffectProbes probes(model, parameters, coordinates());
+  std::vector<std::vector<Direction>> result(log_.pictures().size());
+  play(
+      log_, [&](const JointSample& sample) { probes.observe(sample); },
+      [&](std::size_t p) { probes.directions(at.instants[p], result[p]); });
+  return result;
+}
+
+std::vector<StateEvidence> LogFit::project(const LinearLog& at, const ErrorModel& model,
+                                           const std::vector<ParameterRef>& parameters) {
+  const auto n = static_cast<Eigen::Index>(parameters.size()), m = static_cast<Eigen::Index>(at.coordinates.size());
+  std::vector<Eigen::Index> position(static_cast<std::size_t>(coordinates().size()), -1);
+  for (std::size_t i = 0; i < at.coordinates.size(); ++i) position[at.coordinates[i]] = static_cast<Eigen::Index>(i);
+  const auto all = directions(at, model, parameters);
+  std::vector<StateEvidence> result(at.evidence.size());
+  Eigen::MatrixXd J(m, n);
+  for (std::size_t p = 0; p < result.size(); ++p) {
+    const auto& evidence = at.evidence[p];
+    if (evidence.weight <= 0.0) {
+      result[p].A.setZero(n, n);
+      result[p].b.setZero(n);
+      continue;
+    }
+    J.setZero();
+    for (Eigen::Index k = 0; k < n; ++k) {
+      for (const auto& step : all[p][static_cast<std::size_t>(k)]) {
+        if (const auto i = position[step.coordinate]; i >= 0) J(i, k) = step.amount;
+      }
+    }
+    result[p] = {J.transpose() * evidence.A * J, J.transpose() * evidence.b, evidence.square, evidence.weight};
+  }
+  return result;
+}
+
+std::vector<std::uint32_t> LogFit::moved_by(const ErrorModel& model, const std::vector<ParameterRef>& parameters) {
+  // What moves where depends on the model alone, but for effects that rest with the arm: all pictures are asked.
+  LinearLog at;
+  at.instants.resize(log_.pictures().size());
+  const auto offsets = model.offsets();
+  for (std::size_t p = 0; p < at.instants.size(); ++p) log_.instant(p, offsets, at.instants[p]);
+  std::set<std::uint32_t> moved;
+  for (const auto& picture : directions(at, model, parameters)) {
+    for (const auto& direction : picture) {
+      for (const auto& step : direction) moved.insert(step.coordinate);
+    }
+  }
+  return {moved.begin(), moved.end()};
+}
+
+double LogFit::mean_cost(const LinearLog& at, double usual_points, double OutlineEvidence::* cost) const {
+  double sum = 0.0, points = 0.0, worst = 0.0;
+  for (std::size_t p = 0; p < at.evidence.size(); ++p) {
+    const auto& evidence = at.evidence[p];
+    if (evidence.sampled <= 0.0) continue;
+    const double unit = picture_unit(log_.rig().cameras[log_.pictures()[p].camera].intrinsics);
+    const double own = evidence.*cost / (unit * unit);
+    sum += own;
+    points += evidence.sampled;
+    worst = std::max(worst, own / evidence.sampled);
+  }
+  // Some of the outline always comes and goes; much of it gone is no better fit.
+  constexpr double kUsualLoss = 0.1;
+  const double lost = std::max(0.0, (1.0 - kUsualLoss) * usual_points - points);
+  return (sum + worst * lost) / std::max(1.0, points + lost);
+}
+
+double LogFit::fit(State& state, const FitSettings& settings, std::span<const std::size_t> pictures) {
+  std::vector<ParameterRef> parameters;
+  for (const auto& p : state.parameters()) parameters.push_back(p.ref);
+  const auto coordinates = moved_by(state.model(), parameters);
+  const Eigen::VectorXd precision = state.prior_sd().array().square().inverse();
+  const auto n = state.size();
+
+  struct Trial {
+    Eigen::VectorXd x;
+    LinearLog at;
+    double cost = 0.0;  ///< with the beliefs' share, per outline point
+  };
+  double usual_points = 0.0;
+  const auto look = [&](const Eigen::VectorXd& x, double search_px) {
+    const bool near = search_px <= settings.finest_px;
+    Trial trial{x, {}, 0.0};
+    state.set(x);
+    trial.x = state.x();
+    const double robust_px = near ? settings.robust_px : std::max(settings.robust_px, 0.5 * search_px);
+    trial.at = linearise(state.model(), coordinates,
+                         {.search_px = search_px, .spacing_px = settings.spacing_px, .robust_px = robust_px}, pictures);
+    if (usual_points <= 0.0) usual_points = trial.at.sampled();
+    const Eigen::VectorXd away = trial.x - state.prior_mean();
+    trial.cost = mean_cost(trial.at, usual_points, near ? &OutlineEvidence::cost : &OutlineEvidence::misfit) +
+                 settings.variance_px2 * away.cwiseAbs2().dot(precision) / std::max(1.0, usual_points);
+    return trial;
+  };
+  const auto step = [&](const Trial& trial, double damping) {
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd g = Eigen::VectorXd::Zero(n);
+    state.set(trial.x);
+    for (const auto& e : project(trial.at, state.model(), parameters)) {
+      H += e.A / settings.variance_px2;
+      g += e.b / settings.variance_px2;
+    }
+    H.diagonal() += precision;
+    g -= precision.cwiseProduct(trial.x - state.prior_mean());
+    // Scaled to a unit diagonal: parameters have different units.
+    const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
+    Eigen::MatrixXd S = scale.asDiagonal() * H * scale.asDiagonal();
+    S.diagonal().array() += damping;
+    return Eigen::VectorXd(scale.asDiagonal() * S.ldlt().solve(scale.asDiagonal() * g));
+  };
+
+  Trial best = look(state.x(), std::max(settings.finest_px, settings.from_px));
+  if (settings.from_px > settings.finest_px) {
+    // From afar the way to the outlines may lead over worse places: every step is taken, the best kept.
+    Trial trial = best;
+    for (double search_px = settings.from_px;; search_px = std::max(settings.finest_px, kNarrow * search_px)) {
+      trial = look(trial.x + step(trial, 1e-3), search_px);
+      if (trial.cost < best.cost) best = trial;
+      if (search_px <= settings.finest_px) break;
+    }
+    best = look(best.x, settings.finest_px);
+  }
+  double damping = 1e-6;
+  int retreats = 0;
+  for (int i = 0; i < settings.iterations && retreats < 5;) {
+    constexpr double kWorse = 1e-3;  // share: points of an outline come and go
+    Trial trial = look(best.x + step(best, damping), settings.finest_px);
+    if (trial.cost > (1.0 + kWorse) * best.cost) {
+      damping = std::max(1e-3, 10.0 * damping);
+      ++retreats;
+      continue;
+    }
+    const double gained = best.cost - trial.cost;
+    best = std::move(trial);
+    damping *= 0.1;
+    retreats = 0;
+    ++i;
+    if (settings.progress) settings.progress(static_cast<double>(i) / settings.iterations);
+    if (std::abs(gained) < 1e-5 * best.cost) break;
+  }
+  state.set(best.x);
+  return best.cost;
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,74 @@
+#include "bodyschema/evidence/picture_log.hpp"
+
+#include <algorithm>
+
+#include "bodyschema/observation/joint_motion.hpp"
+
+namespace bodyschema {
+
+PictureLog::PictureLog(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig)
+    : robot_(std::move(robot)), setup_(setup), rig_(rig), roles_(JointRoles::of(robot_, setup_, rig_)),
+      instants_(std::make_unique<InstantBuilder>(robot_, setup_.hand_link, setup_.gravity_W)) {}
+
+bool PictureLog::repeats_the_last(const std::vector<Picture>& pictures) const {
+  return std::all_of(pictures.begin(), pictures.end(), [&](const Picture& picture) {
+    const auto last = std::find_if(pictures_.rbegin(), pictures_.rend(),
+                                   [&](const Picture& p) { return p.camera == picture.camera; });
+    return last != pictures_.rend() && last->joints.q == picture.joints.q && last->mask == picture.mask &&
+           last->coverage == picture.coverage && last->valid == picture.valid;
+  });
+}
+
+void PictureLog::add(const Observation& observation) {
+  for (const auto& sample : observation.encoders) {
+    if (!encoders_.empty() && sample.utime <= encoders_.back().utime) {
+      if (sample.utime == encoders_.back().utime) encoders_.back() = sample;
+      continue;
+    }
+    encoders_.push_back(sample);
+  }
+  std::vector<Picture> pictures;
+  for (std::size_t c = 0; c < observation.cameras.size() && c < rig_.cameras.size(); ++c) {
+    const auto& seen = observation.cameras[c];
+    if (!seen || seen->mask.empty()) continue;
+    Picture picture{seen->joints, {}, c, seen->mask, seen->valid, seen->coverage};
+    picture.joints.utime = seen->utime;
+    pictures.push_back(std::move(picture));
+  }
+  if (repeats_the_last(pictures)) return;
+  for (auto& picture : pictures) {
+    // Left and right of one observation may carry stamps in either order.
+    const auto at = std::upper_bound(
+        pictures_.begin(), pictures_.end(), picture.joints.utime,
+        [](Microseconds utime, const Picture& other) { return utime < other.joints.utime; });
+    pictures_.insert(at, std::move(picture));
+  }
+}
+
+void PictureLog::replace_rig(std::shared_ptr<const RobotModel> robot, const StereoRig& rig) {
+  robot_ = std::move(robot);
+  rig_ = rig;
+  roles_ = JointRoles::of(robot_, setup_, rig_);
+  instants_ = std::make_unique<InstantBuilder>(robot_, setup_.hand_link, setup_.gravity_W);
+}
+
+void PictureLog::finish() {
+  for (auto& picture : pictures_) {
+    joint_motion(encoders_, picture.joints.utime, picture.joints.qdot, picture.qddot);
+    picture.joints.qdot.conservativeResize(picture.joints.q.size());
+    picture.qddot.conservativeResize(picture.joints.q.size());
+  }
+}
+
+ObservedEdges PictureLog::edges(std::size_t picture) const {
+  const auto& p = pictures_[picture];
+  const auto& k = rig_.cameras[p.camera].intrinsics;
+  return {p.coverage, p.mask, p.valid, k.width, k.height};
+}
+
+void PictureLog::instant(std::size_t picture, const Eigen::Ref<const Eigen::VectorXd>& offsets, Instant& out) {
+  instants_->build(pictures_[picture].joints, pictures_[picture].camera, offsets, out);
+  out.qddot = pictures_[picture].qddot;
+}
+
+}  // namespace bodyschema

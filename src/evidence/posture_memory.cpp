@@ -1,0 +1,333 @@
+#include "bodyschema/evidence/posture_memory.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace bodyschema {
+namespace {
+
+/// A direction of which a piece says less than this, in units of what was believed of it, is not told by it.
+constexpr double kLeastTold = 0.1;
+/// Blocks after which the dispersion has forgotten one.
+constexpr double kRecentBlocks = 12.0;
+
+Eigen::MatrixXd inverse(const Eigen::MatrixXd& A) {
+  return A.ldlt().solve(Eigen::MatrixXd::Identity(A.rows(), A.cols()));
+}
+
+}  // namespace
+
+PostureMemory::PostureMemory(MemoryLayout layout, const MemoryOptions& options)
+    : layout_(std::move(layout)), options_(options), prior_(Quadratic::zero(layout_.size())),
+      posture_variance_(std::pow(options.posture_sd_rad, 2)) {
+  const auto n = layout_.estimated();
+  const Eigen::VectorXd precision = layout_.prior_sd.array().square().inverse();
+  prior_.A.diagonal().head(n) = precision;
+  prior_.b.head(n) = precision.cwiseProduct(layout_.prior_mean);
+}
+
+/// The pictures see x + e with e the posture's own error, N(0, R): marginalised, A becomes (I + A R)^-1 A.
+Quadratic PostureMemory::with_posture_error(const Quadratic& block) const {
+  const double variance = std::max(posture_variance_, std::pow(options_.encoder_sd_rad, 2));
+  Eigen::MatrixXd damping = Eigen::MatrixXd::Identity(block.A.rows(), block.A.cols());
+  for (std::size_t i = 0; i < layout_.is_joint.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if (layout_.is_joint[i]) damping.col(k) += variance * block.A.col(k);
+  }
+  const Eigen::PartialPivLU<Eigen::MatrixXd> lu(damping);
+  Quadratic result{lu.solve(block.A), lu.solve(block.b)};
+  result.A = 0.5 * (result.A + result.A.transpose()).eval();
+  return result;
+}
+
+Quadratic PostureMemory::sum(const Block* without) const {
+  Quadratic total = prior_;
+  const auto kept = [&](double then_s) { return std::exp(-std::max(0.0, now_s_ - then_s) / options_.memory_s); };
+  if (old_) total.add(*old_, kept(old_s_));
+  for (const auto& block : blocks_) {
+    if (&block != without) total.add(with_posture_error(block.pictures), kept(block.end_s));
+  }
+  return total;
+}
+
+MemoryEstimate PostureMemory::solve(const Quadratic& total) const {
+  const auto n = layout_.estimated(), m = layout_.considered_sd.size();
+  MemoryEstimate result;
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(total.A.topLeftCorner(n, n));
+  result.x = ldlt.solve(total.b.head(n));
+  result.own = ldlt.solve(Eigen::MatrixXd::Identity(n, n));
+  result.sensitivity = -ldlt.solve(total.A.topRightCorner(n, m));
+  result.covariance = with_considered(result);
+  return result;
+}
+
+Eigen::MatrixXd PostureMemory::with_considered(const MemoryEstimate& estimate) const {
+  if (layout_.considered_sd.size() == 0) return estimate.own;
+  const Eigen::MatrixXd T = estimate.sensitivity * layout_.considered_sd.asDiagonal();
+  return estimate.own + T * T.transpose();
+}
+
+const MemoryEstimate& PostureMemory::estimate() const {
+  if (!estimate_) estimate_ = solve(sum());
+  return *estimate_;
+}
+
+void PostureMemory::changed() {
+  estimate_.reset();
+  posture_precision_.resize(0, 0);
+}
+
+const Eigen::MatrixXd& PostureMemory::posture_precision() const {
+  if (posture_precision_.size() == 0) posture_precision_ = inverse(in_posture().covariance);
+  return posture_precision_;
+}
+
+Eigen::VectorXd PostureMemory::solve_with(const Quadratic& frame) const {
+  const auto n = layout_.estimated();
+  const auto& precision = posture_precision();
+  return (precision + frame.A.topLeftCorner(n, n)).ldlt().solve(precision * estimate().x + frame.b.head(n));
+}
+
+double PostureMemory::distance(const Eigen::VectorXd& x) const {
+  const Eigen::VectorXd away = x - estimate().x;
+  return away.dot(posture_precision() * away);
+}
+
+PostureMemory PostureMemory::beliefs() const {
+  PostureMemory result = *this;
+  result.forget_all();
+  return result;
+}
+
+MemoryEstimate PostureMemory::in_posture() const {
+  MemoryEstimate result = estimate();
+  for (std::size_t i = 0; i < layout_.is_joint.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if (layout_.is_joint[i]) result.own(k, k) += std::max(posture_variance_, std::pow(options_.encoder_sd_rad, 2));
+  }
+  result.covariance = with_considered(result);
+  return result;
+}
+
+MemoryEstimate PostureMemory::in_posture(const Quadratic& frame) const {
+  const auto n = layout_.estimated(), m = layout_.considered_sd.size();
+  const MemoryEstimate before = in_posture();
+  // What is considered errs alike in memory and frame: it is carried through, not added.
+  const Eigen::MatrixXd precision = inverse(before.own);
+  MemoryEstimate after;
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(precision + frame.A.topLeftCorner(n, n));
+  after.x = ldlt.solve(precision * before.x + frame.b.head(n));
+  after.own = ldlt.solve(Eigen::MatrixXd::Identity(n, n));
+  after.sensitivity = ldlt.solve(precision * before.sensitivity - frame.A.topRightCorner(n, m));
+  after.covariance = with_considered(after);
+  return after;
+}
+
+PostureMemory::Step PostureMemory::step(const Quadratic& frame, std::span<const Eigen::Index> parameters) const {
+  const auto n = layout_.estimated(), m = layout_.considered_sd.size();
+  const auto& known = estimate();
+  const Quadratic seen = with_posture_error(frame);
+  // In units of what was believed.
+  const Eigen::MatrixXd scale = layout_.prior_sd.asDiagonal();
+  const Eigen::MatrixXd W = scale * seen.A.topLeftCorner(n, n) * scale;
+  const Eigen::VectorXd score = scale * (seen.b.head(n) - seen.A.topLeftCorner(n, n) * known.x);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(W);
+  Eigen::Index first = 0;
+  while (first < n && eigen.eigenvalues()[first] < kLeastTold) ++first;
+  const Eigen::Index told = n - first;
+  Step result{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size())), {}};
+  if (told == 0) return result;
+  const Eigen::VectorXd root = eigen.eigenvalues().tail(told).cwiseSqrt();
+  const Eigen::MatrixXd U = eigen.eigenvectors().rightCols(told);
+  const Eigen::VectorXd y = root.cwiseInverse().asDiagonal() * (U.transpose() * score);
+  // Of y: pictures' noise, what is not known, and what is considered, in memory and frame alike.
+  const Eigen::MatrixXd to_x = root.asDiagonal() * U.transpose() * layout_.prior_sd.cwiseInverse().asDiagonal();
+  Eigen::MatrixXd S = Eigen::MatrixXd::Identity(told, told) + to_x * known.own * to_x.transpose();
+  if (m > 0) {
+    const Eigen::MatrixXd E =
+        root.cwiseInverse().asDiagonal() * (U.transpose() * (scale * seen.A.topRightCorner(n, m))) *
+            layout_.considered_sd.asDiagonal() +
+        to_x * known.sensitivity * layout_.considered_sd.asDiagonal();
+    S += E * E.transpose();
+  }
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(S);
+  const Eigen::VectorXd z = ldlt.solve(y);
+  result.left = {y.dot(z), static_cast<double>(told)};
+  if (parameters.empty()) return result;
+  Eigen::MatrixXd G(told, static_cast<Eigen::Index>(parameters.size()));
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    G.col(static_cast<Eigen::Index>(i)) = to_x.col(parameters[i]);
+  }
+  const Eigen::MatrixXd SG = ldlt.solve(G);
+  Eigen::MatrixXd F = G.transpose() * SG;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    F(k, k) += 1.0 / std::pow(layout_.prior_sd[parameters[i]], 2);  // no further than what was believed possible
+  }
+  const Eigen::VectorXd g = SG.transpose() * y;
+  result.size = F.ldlt().solve(g);
+  result.left.nis -= g.dot(result.size);
+  result.left.dof -= static_cast<double>(parameters.size());
+  return result;
+}
+
+Innovation PostureMemory::innovation(const Quadratic& frame) const {
+  return step(frame, {}).left;
+}
+
+std::optional<std::uint64_t> PostureMemory::add(double time_s, const Eigen::VectorXd& q, const Quadratic& frame,
+                                                const Eigen::VectorXd& x) {
+  now_s_ = time_s;
+  if (!blocks_.empty()) {
+    auto& open = blocks_.back();
+    const bool stays = (q - open.q).cwiseAbs().maxCoeff() < options_.same_posture_rad;
+    if (stays || time_s - open.begin_s < options_.block_s) {
+      open.end_s = time_s;
+      return std::nullopt;
+    }
+  }
+  Block block{++begun_, time_s, time_s, q, frame, x};
+  if (!empty()) learn_posture_error(block);
+  // The posture again: it counts as one still.
+  std::erase_if(blocks_, [&](const Block& other) {
+    return (q - other.q).cwiseAbs().maxCoeff() < options_.same_posture_rad;
+  });
+  blocks_.push_back(std::move(block));
+  while (blocks_.size() > options_.most_blocks) fold_oldest();
+  changed();
+  return begun_;
+}
+
+std::vector<std::uint64_t> PostureMemory::blocks() const {
+  std::vector<std::uint64_t> numbers;
+  for (const auto& block : blocks_) numbers.push_back(block.number);
+  return numbers;
+}
+
+std::optional<PostureMemory::Stale> PostureMemory::most_stale() const {
+  // Physical: a joint turned by this moves an outline by a tenth of a pixel otherwise than its derivative says ...
+  constexpr double kLinear_rad = 0.007;
+  constexpr double kLinear = 0.5;      // of what was believed, for what is no angle
+  constexpr double kFarthest = 5.0;    // ... and by this many times that at once, outlines are lost from sight
+  const auto& x = estimate().x;
+  std::optional<Stale> stalest;
+  double most = 1.0;
+  for (const auto& block : blocks_) {
+    double far = 0.0;
+    for (Eigen::Index k = 0; k < layout_.estimated(); ++k) {
+      const double linear = layout_.is_joint[static_cast<std::size_t>(k)] ? kLinear_rad : kLinear * layout_.prior_sd[k];
+      far = std::max(far, std::abs(x[k] - block.x[k]) / linear);
+    }
+    if (far <= most) continue;
+    most = far;
+    stalest = Stale{block.number, block.x + std::min(1.0, kFarthest / far) * (x - block.x)};
+  }
+  return stalest;
+}
+
+void PostureMemory::relinearise(std::uint64_t number, const Quadratic& pictures, const Eigen::VectorXd& x) {
+  for (auto& block : blocks_) {
+    if (block.number != number) continue;
+    block.pictures = pictures;
+    block.x = x;
+    changed();
+    return;
+  }
+}
+
+void PostureMemory::fold_oldest() {
+  const auto block = blocks_.begin();
+  if (!old_) {
+    old_ = Quadratic::zero(layout_.size());
+    old_s_ = block->end_s;
+  }
+  const double kept = std::exp(-std::max(0.0, block->end_s - old_s_) / options_.memory_s);
+  old_->A *= kept;
+  old_->b *= kept;
+  old_->add(with_posture_error(block->pictures));
+  old_s_ = std::max(old_s_, block->end_s);
+  ++old_postures_;
+  blocks_.erase(block);
+}
+
+/// `block` is not among the others.
+void PostureMemory::learn_posture_error(const Block& block) {
+  const auto n = layout_.estimated();
+  changed();
+  const auto rest = estimate();
+  const Innovation agreement = innovation(block.pictures);
+  const double kept = std::exp(-1.0 / kRecentBlocks);
+  nis_ = kept * nis_ + agreement.nis;
+  nis_dof_ = kept * nis_dof_ + agreement.dof;
+
+  // The error of this posture given the others: N(0, variance) before, seen through pictures and what is not known.
+  const double variance = std::max(posture_variance_, std::pow(options_.encoder_sd_rad, 2));
+  std::vector<Eigen::Index> joints;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (layout_.is_joint[static_cast<std::size_t>(i)]) joints.push_back(i);
+  }
+  if (joints.empty()) return;
+  const Eigen::MatrixXd A = block.pictures.A.topLeftCorner(n, n);
+  const Eigen::VectorXd score = block.pictures.b.head(n) - A * rest.x;
+  // Information of the pictures with what is not known of the state integrated out.
+  const Eigen::MatrixXd damping = (Eigen::MatrixXd::Identity(n, n) + A * rest.covariance).inverse();
+  const Eigen::MatrixXd M = damping * A;
+  const Eigen::VectorXd s = damping * score;
+  const auto count = static_cast<Eigen::Index>(joints.size());
+  Eigen::MatrixXd precision = M(joints, joints);
+  precision = 0.5 * (precision + precision.transpose()).eval();
+  precision.diagonal().array() += 1.0 / variance;
+  const Eigen::MatrixXd V = inverse(precision);
+  const Eigen::VectorXd error = V * s(joints);
+  double told = 0.0;
+  for (Eigen::Index i = 0; i < count; ++i) told += std::clamp(1.0 - V(i, i) / variance, 0.0, 1.0);
+  error_square_ += error.squaredNorm();
+  error_directions_ += told;
+  const double prior = std::pow(options_.posture_sd_rad, 2);
+  posture_variance_ =
+      (options_.posture_prior * prior + error_square_) / (options_.posture_prior + error_directions_);
+  changed();
+}
+
+void PostureMemory::forget_all() {
+  blocks_.clear();
+  old_.reset();
+  old_postures_ = 0;
+  nis_ = nis_dof_ = 0.0;
+  changed();
+}
+
+void PostureMemory::release(std::span<const Eigen::Index> parameters, double from_s) {
+  std::vector<Block> later;
+  while (!blocks_.empty() && blocks_.back().begin_s >= from_s) {
+    later.insert(later.begin(), std::move(blocks_.back()));
+    blocks_.pop_back();
+  }
+  while (!blocks_.empty()) fold_oldest();
+  if (old_) {
+    for (const auto k : parameters) {
+      // Integrated out, with what was believed of it; the new value is believed of as the old one was.
+      old_->A(k, k) += prior_.A(k, k);
+      old_->b(k) += prior_.b(k);
+      const Eigen::VectorXd column = old_->A.col(k);
+      const double pivot = column(k), b = old_->b(k);
+      old_->A -= column * column.transpose() / pivot;
+      old_->b -= column * (b / pivot);
+    }
+  }
+  blocks_ = std::move(later);
+  changed();
+}
+
+double PostureMemory::dispersion() const {
+  return nis_dof_ > 0.0 ? nis_ / nis_dof_ : 1.0;
+}
+
+double PostureMemory::posture_sd_rad() const {
+  return std::sqrt(std::max(posture_variance_, std::pow(options_.encoder_sd_rad, 2)));
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,384 @@
+#include "bodyschema/imports/stills.hpp"
+
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <set>
+
+#include "bodyschema/camera/camera_info.hpp"
+#include "bodyschema/core/nearest_name.hpp"
+#include "csv_table.hpp"
+#include "picture_file.hpp"
+
+namespace bodyschema {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostPictures = 1'000'000;
+
+/// The number that a file's name ends in: 7 of "07.png" and "frame_0007.png".
+std::optional<std::int64_t> number_of(const fs::path& file) {
+  const std::string stem = file.stem().string();
+  const auto digits = stem.find_last_not_of("0123456789") + 1;  // npos + 1 is 0
+  std::int64_t number = 0;
+  const auto [end, error] = std::from_chars(stem.data() + digits, stem.data() + stem.size(), number);
+  if (error != std::errc{} || digits == stem.size()) return std::nullopt;
+  return number;
+}
+
+bool is_picture(const fs::path& file) {
+  std::string ending = file.extension().string();
+  for (char& c : ending) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+  return ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".ppm" || ending == ".pgm";
+}
+
+std::vector<fs::path> entries_of(const fs::path& folder) {
+  std::vector<fs::path> entries;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    if (entries.size() == kMostPictures) throw FileError(folder.string() + ": holds more than a million files");
+    entries.push_back(at->path());
+  }
+  if (error) throw FileError(folder.string() + ": cannot be read: " + error.message());
+  std::sort(entries.begin(), entries.end());
+  return entries;
+}
+
+void list_pictures(const fs::path& folder, std::map<std::int64_t, fs::path>& pictures,
+                   std::vector<std::string>& unnumbered) {
+  for (const fs::path& file : entries_of(folder)) {
+    if (!is_picture(file)) continue;
+    const auto number = number_of(file);
+    if (!number || !pictures.emplace(*number, file).second) unnumbered.push_back(file.string());
+  }
+}
+
+/// Where the pictures of each camera of the rig are: those of a folder of its name, or of the one that is configured.
+std::vector<std::string> folders_of(const ImportTarget& target, const std::map<std::string, std::string>& given,
+                                    const std::map<std::string, std::map<std::int64_t, fs::path>>& there) {
+  std::vector<std::string> folders;
+  for (const CameraModel& camera : target.rig.cameras) {
+    const auto other = given.find(camera.name);
+    const std::string& name = other != given.end() ? other->second : camera.name;
+    folders.push_back(there.contains(name) ? name : "");
+  }
+  return folders;
+}
+
+/// One row of joints.csv and its place in time.
+struct Posture {
+  const CsvTable::Row* row = nullptr;
+  Microseconds utime = 0;
+  std::optional<std::int64_t> number;
+};
+
+class StillsImport {
+ public:
+  StillsImport(const fs::path& folder, const ImportTarget& target, const StillsImportOptions& options,
+               const fs::path& log)
+      : target_(target), options_(options), folder_(StillsFolder::list(folder)),
+        table_(CsvTable::read(folder / "joints.csv")), builder_(target, log) {}
+
+  ImportSummary run(const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+    find_cameras();
+    read_columns();
+    read_postures();
+    std::uint64_t done = 0;
+    for (std::size_t i = 0; i < postures_.size(); ++i) {
+      const Posture& posture = postures_[i];
+      const bool any = has_picture(posture);
+      if (posture.number && !any) {
+        builder_.leave_out("postures", fmt::format("{}: no picture of posture {} in any camera",
+                                                  table_.where(*posture.row), *posture.number));
+      }
+      if (moving_) {
+        builder_.add_joints(posture.utime, posture.utime, joint_names_, joints_of(posture), velocities(i));
+        if (any) add_pictures(posture);
+      } else if (any) {
+        hold(posture);
+      }
+      if (progress) progress(++done, postures_.size());
+    }
+    say_what_is_left();
+    return builder_.finish();
+  }
+
+ private:
+  void find_cameras() {
+    image_folders_ = folders_of(target_, target_.mapping.cameras, folder_.images);
+    mask_folders_ = folders_of(target_, target_.mapping.masks, folder_.masks);
+    std::vector<std::string> there;
+    for (const auto& [name, pictures] : folder_.images) there.push_back(name);
+    for (std::size_t c = 0; c < image_folders_.size(); ++c) {
+      const std::string& camera = target_.rig.cameras[c].name;
+      if (image_folders_[c].empty() && std::all_of(image_folders_.begin(), image_folders_.end(),
+                                                   [](const auto& folder) { return folder.empty(); })) {
+        throw FileError(fmt::format(
+            "{}/images: no folder of camera '{}'; it has {}. Which is it? import: {{cameras: {{{}: {}}}}}",
+            folder_.folder.string(), camera, fmt::join(there, ", "), camera, nearest_name(camera, there)));
+      }
+    }
+    for (const std::string& name : there) {
+      if (std::find(image_folders_.begin(), image_folders_.end(), name) == image_folders_.end()) {
+        builder_.note(fmt::format("images/{} is not imported: no camera of the configuration has its pictures", name));
+      }
+    }
+    for (std::size_t c = 0; c < image_folders_.size(); ++c) compare_with_camera_info(c);
+  }
+
+  /// What the folder itself says of its cameras, against what the configuration believes.
+  void compare_with_camera_info(std::size_t c) {
+    const auto file = folder_.camera_infos.find(image_folders_[c]);
+    if (file == folder_.camera_infos.end()) return;
+    try {
+      const CameraInfo info = CameraInfo::read(file->second);
+      const CameraModel& camera = target_.rig.cameras[c];
+      const auto near = [](const PinholeIntrinsics& a, const PinholeIntrinsics& b) {
+        constexpr double kShare = 0.02, kShift_px = 0.02;  // of the focal length, of the picture's width
+        const double shift_px = kShift_px * a.width;
+        return std::abs(a.fx - b.fx) <= kShare * a.fx && std::abs(a.fy - b.fy) <= kShare * a.fy &&
+               std::abs(a.cx - b.cx) <= shift_px && std::abs(a.cy - b.cy) <= shift_px;
+      };
+      if (near(camera.intrinsics, info.intrinsics) || near(camera.intrinsics, info.rectified)) return;
+      builder_.note(fmt::format(
+          "camera '{}' is configured with fx {:.6g}, fy {:.6g}, cx {:.6g}, cy {:.6g}, but {} has {:.6g}, {:.6g}, "
+          "{:.6g}, {:.6g}",
+          camera.name, camera.intrinsics.fx, camera.intrinsics.fy, camera.intrinsics.cx, camera.intrinsics.cy,
+          file->second.string(), info.intrinsics.fx, info.intrinsics.fy, info.intrinsics.cx, info.intrinsics.cy));
+    } catch (const Error& error) {
+      builder_.note(fmt::format("not compared with the configuration: {}", error.what()));
+    }
+  }
+
+  void read_columns() {
+    number_column_ = table_.find({"posture", "frame"});
+    time_column_ = table_.find({"time_s"});
+    moving_ = time_column_ != CsvTable::kNone;
+    for (std::size_t c = 0; c < table_.names.size(); ++c) {
+      if (c == number_column_ || c == time_column_) continue;
+      joint_columns_.push_back(c);
+      joint_names_.push_back(table_.names[c]);
+    }
+    if (joint_names_.empty()) throw FileError(table_.file.string() + ": no column of a joint");
+  }
+
+  void read_postures() {
+    LeftOut bad = table_.bad;
+    std::set<std::int64_t> seen;
+    for (const CsvTable::Row& row : table_.rows) {
+      try {
+        Posture posture{&row, 0, std::nullopt};
+        if (number_column_ == CsvTable::kNone) {
+          posture.number = static_cast<std::int64_t>(&row - table_.rows.data());
+        } else if (const double number = row.values[number_column_]; !std::isnan(number)) {
+          constexpr double kMostNumber = 1e15;
+          if (number != std::floor(number) || number < 0.0 || number > kMostNumber) {
+            throw FileError(fmt::format("{}: {} is no number of a posture", table_.where(row), number));
+          }
+          posture.number = static_cast<std::int64_t>(number);
+        }
+        if (posture.number && !seen.insert(*posture.number).second) {
+          throw FileError(fmt::format("{}: posture {} comes a second time", table_.where(row), *posture.number));
+        }
+        if (moving_) {
+          const double time_s = row.values[time_column_];
+          if (!(time_s >= 0.0 && time_s <= seconds(kLatestStamp))) {
+            throw FileError(fmt::format("{}: time_s is {}, expected seconds from 0 on", table_.where(row), time_s));
+          }
+          posture.utime = microseconds(time_s);
+          if (!postures_.empty() && posture.utime <= postures_.back().utime) {
+            throw FileError(fmt::format("{}: time_s is not after the row before", table_.where(row)));
+          }
+        } else {
+          posture.utime =
+              options_.recorded_at + static_cast<Microseconds>(postures_.size() + 1) * kStillPeriod;
+        }
+        for (const std::size_t c : joint_columns_) {
+          if (!std::isnan(row.values[c]) || moving_) continue;
+          throw FileError(fmt::format("{}: no value in column '{}'", table_.where(row), table_.names[c]));
+        }
+        postures_.push_back(posture);
+      } catch (const FileError& error) {
+        bad.add(error);
+      }
+    }
+    bad.check(table_.rows.size() + table_.bad.count, "rows");
+    for (std::uint64_t i = 0; i < bad.count; ++i) builder_.leave_out("rows", bad.first);
+  }
+
+  [[nodiscard]] bool has_picture(const Posture& posture) const {
+    return posture.number && std::any_of(image_folders_.begin(), image_folders_.end(), [&](const auto& folder) {
+             return !folder.empty() && folder_.images.at(folder).contains(*posture.number);
+           });
+  }
+
+  [[nodiscard]] std::vector<double> joints_of(const Posture& posture) const {
+    std::vector<double> values;
+    for (const std::size_t c : joint_columns_) values.push_back(posture.row->values[c]);
+    return values;
+  }
+
+  /// Of a moving recording: the slopes to the rows before and after, over both where they are alike in length.
+  [[nodiscard]] std::vector<double> velocities(std::size_t i) const {
+    constexpr Microseconds kNear = 500'000;
+    const bool before = i > 0 && postures_[i].utime - postures_[i - 1].utime <= kNear;
+    const bool after = i + 1 < postures_.size() && postures_[i + 1].utime - postures_[i].utime <= kNear;
+    const Posture &a = postures_[before ? i - 1 : i], &b = postures_[after ? i + 1 : i];
+    std::vector<double> slopes(joint_columns_.size(), 0.0);
+    if (!before && !after) return slopes;
+    for (std::size_t k = 0; k < joint_columns_.size(); ++k) {
+      slopes[k] =
+          (b.row->values[joint_columns_[k]] - a.row->values[joint_columns_[k]]) / seconds(b.utime - a.utime);
+    }
+    return slopes;
+  }
+
+  void hold(const Posture& posture) {
+    constexpr Microseconds kStep = 25'000;
+    const auto values = joints_of(posture);
+    for (Microseconds t = posture.utime - kStillHold; t <= posture.utime + kStillHold; t += kStep) {
+      builder_.add_joints(t, t, joint_names_, values);
+      if (t == posture.utime) add_pictures(posture);
+    }
+  }
+
+  void add_pictures(const Posture& posture) {
+    for (std::size_t c = 0; c < image_folders_.size(); ++c) {
+      const fs::path* file = file_of(folder_.images, image_folders_[c], posture);
+      if (file == nullptr) continue;
+      const std::string what = "pictures of camera " + target_.rig.cameras[c].name;
+      try {
+        builder_.add_picture(posture.utime, c, posture.utime, read_picture_file(*file), file->string());
+      } catch (const FileError& error) {
+        builder_.leave_out(what, error.what());
+      }
+    }
+    if (!options_.masks) return;
+    for (std::size_t c = 0; c < mask_folders_.size(); ++c) {
+      const fs::path* file = file_of(folder_.masks, mask_folders_[c], posture);
+      if (file == nullptr) continue;
+      try {
+        builder_.add_mask(posture.utime, c, posture.utime, read_picture_file(*file), file->string());
+      } catch (const FileError& error) {
+        builder_.leave_out("masks of camera " + target_.rig.cameras[c].name, error.what());
+      }
+    }
+  }
+
+  static const fs::path* file_of(const std::map<std::string, std::map<std::int64_t, fs::path>>& all,
+                                 const std::string& folder, const Posture& posture) {
+    if (folder.empty() || !posture.number) return nullptr;
+    const auto& pictures = all.at(folder);
+    const auto file = pictures.find(*posture.number);
+    return file == pictures.end() ? nullptr : &file->second;
+  }
+
+  void say_what_is_left() {
+    std::set<std::int64_t> postures;
+    for (const Posture& posture : postures_) {
+      if (posture.number) postures.insert(*posture.number);
+    }
+    for (std::size_t c = 0; c < image_folders_.size(); ++c) {
+      if (image_folders_[c].empty()) continue;
+      for (const auto& [number, file] : folder_.images.at(image_folders_[c])) {
+        if (postures.contains(number)) continue;
+        builder_.leave_out("pictures of camera " + target_.rig.cameras[c].name,
+                           fmt::format("{}: joints.csv has no posture {}", file.string(), number));
+      }
+    }
+    for (const std::string& file : folder_.unnumbered) {
+      builder_.leave_out("files", file + ": its name ends in no number, or in that of another picture");
+    }
+    const bool has_masks = std::any_of(mask_folders_.begin(), mask_folders_.end(),
+                                       [](const std::string& folder) { return !folder.empty(); });
+    if (has_masks && !options_.masks) builder_.note("masks are there and are left out, as asked (--no-masks)");
+    for (const std::string& name : folder_.not_read) builder_.note(name + "/ is not read: nothing here makes use of it");
+  }
+
+  const ImportTarget& target_;
+  StillsImportOptions options_;
+  StillsFolder folder_;
+  CsvTable table_;
+  LogBuilder builder_;
+  std::vector<std::string> image_folders_, mask_folders_;  ///< by camera; empty: none
+  std::size_t number_column_ = CsvTable::kNone, time_column_ = CsvTable::kNone;
+  std::vector<std::size_t> joint_columns_;
+  std::vector<std::string> joint_names_;
+  bool moving_ = false;
+  std::vector<Posture> postures_;
+};
+
+}  // namespace
+
+StillsFolder StillsFolder::list(const fs::path& folder) {
+  if (!fs::is_directory(folder)) throw FileError(folder.string() + ": no such folder");
+  StillsFolder found;
+  found.folder = folder;
+  if (!fs::is_directory(folder / "images")) {
+    throw FileError(folder.string() + ": no folder 'images' in it; expected images/CAMERA/NN.png and joints.csv");
+  }
+  for (const char* kind : {"images", "masks"}) {
+    auto& cameras = kind == std::string("images") ? found.images : found.masks;
+    if (!fs::is_directory(folder / kind)) continue;
+    for (const fs::path& camera : entries_of(folder / kind)) {
+      if (!fs::is_directory(camera)) continue;
+      std::map<std::int64_t, fs::path> pictures;
+      list_pictures(camera, pictures, found.unnumbered);
+      if (!pictures.empty()) cameras[camera.filename().string()] = std::move(pictures);
+    }
+  }
+  if (found.images.empty()) {
+    throw FileError((folder / "images").string() + ": no pictures; expected images/CAMERA/NN.png");
+  }
+  if (fs::is_directory(folder / "camera_info")) {
+    for (const fs::path& file : entries_of(folder / "camera_info")) {
+      if (file.extension() == ".yaml" || file.extension() == ".yml") found.camera_infos[file.stem().string()] = file;
+    }
+  }
+  for (const fs::path& other : entries_of(folder)) {
+    const std::string name = other.filename().string();
+    if (!fs::is_directory(other) || name == "images" || name == "masks" || name == "camera_info") continue;
+    found.not_read.push_back(name);
+  }
+  return found;
+}
+
+StillsColumns StillsColumns::read(const fs::path& folder) {
+  const CsvTable table = CsvTable::read(folder / "joints.csv");
+  StillsColumns columns;
+  for (std::size_t c = 0; c < table.names.size(); ++c) {
+    if (table.names[c] == "posture" || table.names[c] == "frame" || table.names[c] == "time_s") continue;
+    columns.names.push_back(table.names[c]);
+    double& largest = columns.largest.emplace_back(0.0);
+    for (const auto& row : table.rows) {
+      if (!std::isnan(row.values[c])) largest = std::max(largest, std::abs(row.values[c]));
+    }
+  }
+  return columns;
+}
+
+PictureSize picture_size_in(const fs::path& file) {
+  constexpr std::size_t kHeader = 1 << 20;  // a JPEG may begin with a small picture of itself
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw FileError(file.string() + ": picture cannot be opened");
+  std::vector<std::uint8_t> bytes(kHeader);
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(in.gcount()));
+  const auto size = picture_size(bytes);
+  if (!size || size->width < 1 || size->height < 1) {
+    throw FileError(file.string() + ": no picture; expected PNG, JPEG, PPM or PGM");
+  }
+  return *size;
+}
+
+ImportSummary import_stills(const fs::path& folder, const ImportTarget& target, const StillsImportOptions& options,
+                            const fs::path& log, const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
+  return StillsImport(folder, target, options, log).run(progress);
+}
+
+}  // namespace bodyschema

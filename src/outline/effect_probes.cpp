@@ -1,0 +1,77 @@
+#include "bodyschema/outline/effect_probes.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace bodyschema {
+
+std::vector<ParameterRef> fitted_parameters(const ErrorModel& model) {
+  std::vector<ParameterRef> list;
+  for (std::size_t e = 0; e < model.size(); ++e) {
+    for (std::size_t p = 0; p < model[e].parameters().size(); ++p) {
+      if (model[e].parameters()[p].fitted) list.push_back({e, p});
+    }
+  }
+  return list;
+}
+
+EffectProbes::EffectProbes(const ErrorModel& model, std::vector<ParameterRef> parameters,
+                           const Coordinates& coordinates)
+    : coordinates_(coordinates), parameters_(std::move(parameters)), low_(model.roles().no_corrections()), high_(low_) {
+  for (const auto& ref : parameters_) {
+    probes_.push_back({model[ref.effect].clone(), model[ref.effect].clone(), 1.0});
+  }
+  follow(model);
+}
+
+void EffectProbes::place(Probe& probe, std::size_t parameter, double value) const {
+  constexpr double kNear = 0.05;  // of the typical size
+  auto& low = probe.low->parameters()[parameter];
+  auto& high = probe.high->parameters()[parameter];
+  const double reach = value == 0.0 ? low.typical : kNear * low.typical;
+  low.value = value == 0.0 ? 0.0 : std::max(value - reach, low.at_least);
+  high.value = value + reach;
+  probe.step = high.value - low.value;
+}
+
+void EffectProbes::follow(const ErrorModel& model) {
+  for (std::size_t i = 0; i < probes_.size(); ++i) {
+    const auto& effect = model[parameters_[i].effect];
+    for (std::size_t p = 0; p < effect.parameters().size(); ++p) {
+      probes_[i].low->parameters()[p].value = probes_[i].high->parameters()[p].value = effect.parameters()[p].value;
+    }
+    place(probes_[i], parameters_[i].parameter, effect.parameters()[parameters_[i].parameter].value);
+  }
+}
+
+void EffectProbes::observe(const JointSample& sample) {
+  for (auto& probe : probes_) {
+    if (!probe.low->has_memory()) continue;
+    probe.low->observe(sample);
+    probe.high->observe(sample);
+  }
+}
+
+void EffectProbes::forget() {
+  for (auto& probe : probes_) {
+    probe.low->forget();
+    probe.high->forget();
+  }
+}
+
+void EffectProbes::directions(const Instant& at, std::vector<Direction>& out) {
+  out.resize(probes_.size());
+  for (std::size_t i = 0; i < probes_.size(); ++i) {
+    low_.clear();
+    high_.clear();
+    std::as_const(*probes_[i].low).apply(at, low_);
+    std::as_const(*probes_[i].high).apply(at, high_);
+    out[i].clear();
+    for (std::size_t c = 0; c < coordinates_.all().size(); ++c) {
+      const double d = coordinates_[c].in(std::as_const(high_)) - coordinates_[c].in(std::as_const(low_));
+      if (d != 0.0) out[i].push_back({static_cast<std::uint32_t>(c), d / probes_[i].step});
+    }
+  }
+}
+
+}  // namespace bodyschema
