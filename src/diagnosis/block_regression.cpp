@@ -33,6 +33,16 @@ AddedColumns::AddedColumns(std::size_t blocks, Eigen::Index base, Eigen::Index a
     : B(blocks, Eigen::MatrixXd::Zero(base, added)), C(blocks, Eigen::MatrixXd::Zero(added, added)),
       d(blocks, Eigen::VectorXd::Zero(added)) {}
 
+double Scores::z() const {
+  const Eigen::VectorXd all = t();
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < all.size(); ++i) {
+    const double n = dof[i];
+    largest = std::max(largest, (8.0 * n + 1.0) / (8.0 * n + 3.0) * std::sqrt(n * std::log1p(all[i] * all[i] / n)));
+  }
+  return largest;
+}
+
 Eigen::VectorXd Scores::estimate() const {
   return stiffened(S).ldlt().solve(total);
 }
@@ -64,15 +74,30 @@ Scores BlockRegression::score(const AddedColumns& added) const {
   s.Y = total_.solve(B);
   s.S = C - B.transpose() * s.Y;
   s.u.resize(k, n);
+  Eigen::MatrixXd share(k, n);  // of the information
   for (Eigen::Index b = 0; b < n; ++b) {
     const auto at = static_cast<std::size_t>(b);
     s.u.col(b) = added.d[at] - added.B[at].transpose() * step_ -
                  s.Y.transpose() * (blocks_[at].g - blocks_[at].H * step_);
+    for (Eigen::Index i = 0; i < k; ++i) {
+      const auto y = s.Y.col(i);
+      share(i, b) = added.C[at](i, i) - 2.0 * y.dot(added.B[at].col(i)) + y.dot(blocks_[at].H * y);
+    }
   }
   s.beliefs = -s.Y.transpose() * precision_.cwiseSqrt().asDiagonal();
   s.total = s.u.rowwise().sum() - s.Y.transpose() * (pull_ - precision_.cwiseProduct(step_));
-  s.sd = (s.u.rowwise().squaredNorm() + s.beliefs.rowwise().squaredNorm()).cwiseSqrt();
   s.independent = s.S.diagonal().cwiseQuotient(C.diagonal().cwiseMax(1e-300)).cwiseMax(0.0);
+  s.sd.resize(k);
+  s.dof.resize(k);
+  for (Eigen::Index i = 0; i < k; ++i) {
+    const double best = s.total[i] / std::max(1e-300, s.S(i, i));
+    const double whole = share.row(i).cwiseMax(0.0).sum();
+    const double carriers = whole > 0.0 ? whole * whole / share.row(i).squaredNorm() : 1.0;
+    s.dof[i] = std::max(0.5, carriers - 1.0);
+    const double scatter = (s.u.row(i) - best * share.row(i)).squaredNorm() * (s.dof[i] + 1.0) / s.dof[i];
+    // Never less than white noise has.
+    s.sd[i] = std::sqrt(std::max(scatter, whole) + s.beliefs.row(i).squaredNorm());
+  }
   return s;
 }
 
@@ -150,8 +175,8 @@ Eigen::MatrixXd BlockRegression::covariance(const Scores& scores) const {
   return covariance;
 }
 
-double flip_threshold(const std::vector<Scores>& scores, double level, std::uint64_t seed) {
-  constexpr int kFlips = 1000;
+double chance_threshold(const std::vector<Scores>& scores, double level, std::uint64_t seed) {
+  constexpr int kDraws = 1000;
   Eigen::Index rows = 0;
   for (const auto& s : scores) rows += s.u.rows();
   if (rows == 0) return 0.0;
@@ -160,29 +185,27 @@ double flip_threshold(const std::vector<Scores>& scores, double level, std::uint
   Eigen::Index row = 0;
   for (const auto& s : scores) {
     for (Eigen::Index i = 0; i < s.u.rows(); ++i, ++row) {
-      const double scale = s.sd[i] > 0.0 ? 1.0 / s.sd[i] : 0.0;
+      const double length = std::sqrt(s.u.row(i).squaredNorm() + s.beliefs.row(i).squaredNorm());
+      const double scale = length > 0.0 ? 1.0 / length : 0.0;
       all.row(row).head(blocks) = (scale * s.u.row(i)).cast<float>();
       all.row(row).tail(beliefs) = (scale * s.beliefs.row(i)).cast<float>();
     }
   }
   std::mt19937_64 random(seed);
   std::normal_distribution<float> normal;
-  Eigen::MatrixXf flips(blocks + beliefs, kFlips);
-  for (int f = 0; f < kFlips; ++f) {
-    for (Eigen::Index b = 0; b < blocks; ++b) flips(b, f) = (random() & 1u) != 0 ? 1.0f : -1.0f;
-    for (Eigen::Index b = 0; b < beliefs; ++b) flips(blocks + b, f) = normal(random);
-  }
-  std::vector<float> largest(kFlips, 0.0f);
+  const Eigen::MatrixXf draws = Eigen::MatrixXf::NullaryExpr(blocks + beliefs, kDraws, [&] { return normal(random); });
+  std::vector<float> largest(kDraws, 0.0f);
   constexpr Eigen::Index kAtOnce = 512;
   for (Eigen::Index first = 0; first < rows; first += kAtOnce) {
-    const Eigen::MatrixXf t = all.middleRows(first, std::min(kAtOnce, rows - first)) * flips;
-    for (int f = 0; f < kFlips; ++f) {
-      largest[static_cast<std::size_t>(f)] = std::max(largest[static_cast<std::size_t>(f)], t.col(f).cwiseAbs().maxCoeff());
+    const Eigen::MatrixXf t = all.middleRows(first, std::min(kAtOnce, rows - first)) * draws;
+    for (int f = 0; f < kDraws; ++f) {
+      auto& most = largest[static_cast<std::size_t>(f)];
+      most = std::max(most, t.col(f).cwiseAbs().maxCoeff());
     }
   }
   std::sort(largest.begin(), largest.end());
-  const auto at = static_cast<std::size_t>(std::ceil((1.0 - level) * kFlips));
-  return static_cast<double>(largest[std::min<std::size_t>(at, kFlips - 1)]);
+  const auto at = static_cast<std::size_t>(std::ceil((1.0 - level) * kDraws));
+  return static_cast<double>(largest[std::min<std::size_t>(at, kDraws - 1)]);
 }
 
 double neighbours_alike(const std::vector<Scores>& scores) {

@@ -24,18 +24,21 @@ struct AddedColumns {
   [[nodiscard]] Eigen::Index size() const { return d.empty() ? 0 : d.front().size(); }
 };
 
-/// What is left of added columns once the base has taken what it can explain.
+/// What is left of added columns once the base has taken what it can explain; each column by itself.
 struct Scores {
-  Eigen::MatrixXd u;        ///< added x blocks: each block's say
+  Eigen::MatrixXd u;        ///< added x blocks: each block's say, with the column at zero
   Eigen::MatrixXd beliefs;  ///< added x base: what the beliefs about the base would add, per standard deviation
   Eigen::MatrixXd S;        ///< information left, added x added
   Eigen::MatrixXd Y;        ///< base x added: how the base makes up for them, with opposite sign
   Eigen::VectorXd total;    ///< sum of everything
-  Eigen::VectorXd sd;       ///< of the total, from how blocks differ and from the beliefs
-  /// The total over its standard deviation.
-  [[nodiscard]] Eigen::VectorXd t() const { return total.cwiseQuotient(sd.cwiseMax(1e-300)); }
+  Eigen::VectorXd sd;       ///< of the total, from how blocks differ about the best value, and from the beliefs
+  Eigen::VectorXd dof;      ///< blocks that carry the information, less one (Satterthwaite's count)
   /// Share of each column that the base cannot make up for.
   Eigen::VectorXd independent;
+  /// The total over its standard deviation.
+  [[nodiscard]] Eigen::VectorXd t() const { return total.cwiseQuotient(sd.cwiseMax(1e-300)); }
+  /// The largest |t|, as the normal variable that is as unlikely (Wallace's approximation, 1959).
+  [[nodiscard]] double z() const;
   [[nodiscard]] Eigen::VectorXd estimate() const;
 };
 
@@ -76,10 +79,9 @@ class BlockRegression {
   Eigen::VectorXd step_;  ///< from the linearisation to the optimum
 };
 
-/// The |t| that the largest of all candidates exceeds by chance in a share `level` of logs: every block's say with its
-/// sign flipped at random, over all candidates together.
-/// @param scores  of all candidates
-double flip_threshold(const std::vector<Scores>& scores, double level, std::uint64_t seed);
+/// The |z| that the largest of all candidates exceeds by chance in a share `level` of logs: every block's say times a
+/// random number, the same one for all candidates (wild bootstrap: Wu 1986; largest of all: Westfall and Young 1993).
+double chance_threshold(const std::vector<Scores>& scores, double level, std::uint64_t seed);
 
 /// How alike neighbouring blocks err: mean lag-one autocorrelation of the candidates' scores about their means.
 double neighbours_alike(const std::vector<Scores>& scores);

@@ -281,8 +281,8 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
       }
       if (log.at.instants[p].utime == log.at.instants[p - 1].utime || log.precision[p] <= 0.0) continue;
       result.all.push_back(base.score(tail));
-      const double t = std::abs(result.all.back().t()[0]);
-      if (!best || t > best->t()) {
+      const double t = result.all.back().z();
+      if (!best || t > best->z()) {
         best = Candidate{.cause = cause, .variable = {}, .parameters = {0}, .from = log.at.instants[p].utime};
         best->columns = tail;
         best->scores = result.all.back();

@@ -23,8 +23,7 @@ struct Candidate {
   AddedColumns columns{};
   Scores scores{};
   [[nodiscard]] bool generic() const { return !variable.empty(); }
-  /// The largest |t| of its columns.
-  [[nodiscard]] double t() const { return scores.u.rows() == 0 ? 0.0 : scores.t().cwiseAbs().maxCoeff(); }
+  [[nodiscard]] double z() const { return scores.u.rows() == 0 ? 0.0 : scores.z(); }
 };
 
 /// A log about one state: what every picture says about the state's parameters and about everything else that may be

@@ -1,3 +1,5 @@
+#include <cstdlib>
+#include <cstdio>
 #include "bodyschema/diagnosis/diagnoser.hpp"
 
 #include <spdlog/fmt/fmt.h>
@@ -113,7 +115,7 @@ class Diagnoser {
       auto slips = diagnosis::slips(log, base, report_.not_testable);
       std::move(slips.all.begin(), slips.all.end(), std::back_inserter(scores));
       std::move(slips.best.begin(), slips.best.end(), std::back_inserter(candidates));
-      const double threshold = flip_threshold(scores, options_.level, options_.seed);
+      const double threshold = chance_threshold(scores, options_.level, options_.seed);
       return {std::move(log), std::move(base), std::move(candidates), threshold};
     }
   }
@@ -126,9 +128,9 @@ class Diagnoser {
     const Heldout without = field.base.heldout();
     std::vector<Trial> trials;
     for (const auto& candidate : field.candidates) {
-      const double t = candidate.t();
-      if (round == 0) add_bar(candidate, t);
-      if (t < field.threshold || candidate.scores.independent.maxCoeff() < limits::kIndependent) continue;
+      const double z = candidate.z();
+      if (round == 0) add_bar(candidate, z);
+      if (z < field.threshold || candidate.scores.independent.maxCoeff() < limits::kIndependent) continue;
       const bool refused = std::find(refused_.begin(), refused_.end(), candidate.cause) != refused_.end();
       if (refused) continue;
       Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0};
@@ -136,10 +138,16 @@ class Diagnoser {
       if (trial.gain > 0.0) trials.push_back(std::move(trial));
     }
     std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.gain > b.gain; });
+    for (std::size_t i = 0; i < std::min<std::size_t>(12, trials.size()) && getenv("DBG"); ++i) {
+      const auto sz = size_of(field.log, *trials[i].candidate, trials[i].heldout.estimate.tail(trials[i].candidate->columns.size()));
+      fprintf(stderr, "R%zu thr %.2f blocks %zu %s|%s t %.2f gain %.4g of %.4g est %.4g size %.2f mm %.2f px\n", round, field.threshold, field.log.blocks, trials[i].candidate->cause.text().c_str(), trials[i].candidate->variable.c_str(), trials[i].candidate->z(), trials[i].gain, without.total(), trials[i].heldout.estimate.tail(trials[i].candidate->columns.size())[0], 1e3*sz.metres(), sz.outline_px);
+    }
     while (!trials.empty()) {
       const Trial* best = choose(trials);
       if (matters(field, *best)) {
+        const double c0 = search_.cost();
         const bool taken = take(field, *best);
+        if (getenv("DBG")) fprintf(stderr, "take %s: cost %.4f -> %.4f %d\n", best->candidate->cause.text().c_str(), c0, search_.cost(), taken);
         if (taken) return true;
       } else {
         crowded_ = true;
@@ -205,9 +213,10 @@ class Diagnoser {
     double least = 1e300;
     for (std::size_t c = 0; c < search_.causes().size(); ++c) {
       const auto [base, own] = without(search_, all, c);
-      const double t = base.score(own).t().cwiseAbs().maxCoeff();
+      const double t = base.score(own).z();
       const double gain = base.heldout().total() - with;
       const double strength = gain > 0.0 ? t : 0.0;
+      if (getenv("DBG")) fprintf(stderr, "drop? %s t %.2f gain %.3g\n", search_.causes()[c].name.text().c_str(), t, gain);
       if (strength >= least) continue;
       least = strength;
       worst = c;
@@ -222,7 +231,7 @@ class Diagnoser {
     Field field = this->field();
     for (const auto& candidate : field.candidates) {
       for (auto& bar : report_.bars) {
-        if (bar.label == label_of(candidate)) bar.z_after = std::max(bar.z_after, candidate.t());
+        if (bar.label == label_of(candidate)) bar.z_after = std::max(bar.z_after, candidate.z());
       }
     }
     return std::move(field.candidates);
@@ -242,16 +251,26 @@ class Diagnoser {
     report_.bars.push_back({.label = label, .generic = candidate.generic(), .z_before = t});
   }
 
-  /// What offsets and nuisances make up for in this log, and what so few blocks cannot tell.
+  /// What offsets and nuisances make up for in this log, and what so few blocks would show only if it were larger than
+  /// on any robot.
   void leave_out_untold(const Field& field) {
-    const double reach = std::sqrt(static_cast<double>(field.log.blocks));
+    const auto& roles = fit_.log().roles();
     for (const auto& candidate : field.candidates) {
       if (candidate.generic()) continue;
-      if (reach < field.threshold) {
-        report_.not_testable.push_back({candidate.cause, fmt::format("not testable with {} postures", field.log.blocks)});
-      } else if (candidate.scores.independent.maxCoeff() < limits::kIndependent) {
+      if (candidate.scores.independent.maxCoeff() < limits::kIndependent) {
         report_.not_testable.push_back({candidate.cause, "joint offsets and usual nuisances make up for it in this log"});
+        continue;
       }
+      const auto effect = make_effect(candidate.cause.name, {candidate.cause.joint, candidate.cause.source}, roles);
+      bool told = false;
+      Eigen::Index i = 0;
+      for (const auto& p : std::as_const(*effect).parameters()) {
+        if (!p.fitted) continue;
+        const double t = student_quantile(normal_tail(field.threshold), candidate.scores.dof[i]);
+        told = told || t < limits::kImplausible * p.typical * std::sqrt(candidate.scores.S(i, i));
+        ++i;
+      }
+      if (!told) report_.not_testable.push_back({candidate.cause, fmt::format("not testable with {} postures", field.log.blocks)});
     }
   }
 

@@ -220,7 +220,7 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, 
     cause.cause = found.name;
     cause.variable = found.variable;
     const auto [base, own] = without(search_, all, c);
-    cause.z = base.score(own).t().cwiseAbs().maxCoeff();
+    cause.z = base.score(own).z();
     const double lost = base.heldout().loss.sum();
     cause.heldout_gain = lost > 0.0 ? std::max(0.0, 1.0 - loss / lost) : 0.0;
     cause.same = {found.name};
