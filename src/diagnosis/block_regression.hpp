@@ -64,6 +64,8 @@ class BlockRegression {
   [[nodiscard]] const std::vector<BaseBlock>& parts() const { return blocks_; }
   [[nodiscard]] const Eigen::VectorXd& precision() const { return precision_; }
   [[nodiscard]] const Eigen::VectorXd& away() const { return away_; }
+  /// From the linearisation to the optimum.
+  [[nodiscard]] const Eigen::VectorXd& step() const { return step_; }
   [[nodiscard]] Scores score(const AddedColumns& added) const;
   [[nodiscard]] Heldout heldout(const AddedColumns& added = {}) const;
   /// Covariance of the base's parameters from how blocks differ, never below that of white noise.
@@ -76,7 +78,7 @@ class BlockRegression {
   Eigen::VectorXd precision_, away_, pull_;
   Eigen::MatrixXd H_;
   Eigen::LDLT<Eigen::MatrixXd> total_;
-  Eigen::VectorXd step_;  ///< from the linearisation to the optimum
+  Eigen::VectorXd step_;
 };
 
 /// The |z| that the largest of all candidates exceeds by chance in a share `level` of logs: every block's say times a

@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "bodyschema/core/time.hpp"
+#include "bodyschema/evidence/distributions.hpp"
 #include "bodyschema/geometry/pose.hpp"
+#include "limits.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
@@ -291,6 +293,18 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
     if (best) result.best.push_back(std::move(*best));
   }
   return result;
+}
+
+bool is_told(const Candidate& candidate, const JointRoles& roles, double threshold) {
+  const auto effect = make_effect(candidate.cause.name, {candidate.cause.joint, candidate.cause.source}, roles);
+  Eigen::Index i = 0;
+  for (const auto& p : std::as_const(*effect).parameters()) {
+    if (!p.fitted) continue;
+    const double t = student_quantile(normal_tail(threshold), candidate.scores.dof[i]);
+    if (t < limits::kImplausible * p.typical * std::sqrt(std::max(0.0, candidate.scores.S(i, i)))) return true;
+    ++i;
+  }
+  return false;
 }
 
 }  // namespace bodyschema::diagnosis

@@ -67,6 +67,9 @@ struct Slips {
 };
 Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<NotTestable>& untestable);
 
+/// Whether a cause would stand out of a log, with this threshold of z, before it is larger than on any robot.
+bool is_told(const Candidate& candidate, const JointRoles& roles, double threshold);
+
 /// First and last picture in which the robot was found, s since the Unix epoch.
 std::pair<double, double> seen_span(const LogFit& fit, const LinearLog& at);
 

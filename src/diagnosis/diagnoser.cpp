@@ -35,6 +35,7 @@ class Diagnoser {
     progress(0.02);
     search_.start();
     search_.look_for_lost_part();
+    search_.polish(options_.block_s);
     progress(0.2);
     Findings findings(fit_, search_, options_, report_);
     const auto begin = search_.about(options_.block_s);
@@ -43,6 +44,7 @@ class Diagnoser {
       progress(0.2 + 0.1 * static_cast<double>(round + 1));
     }
     while (drop_one()) {}
+    search_.polish(block_s_);
     progress(0.85);
     findings.conclude(search_.about(block_s_), candidates_of_end());
     report_.crowded = crowded_ && report_.causes.empty();
@@ -130,7 +132,7 @@ class Diagnoser {
     for (const auto& candidate : field.candidates) {
       const double z = candidate.z();
       if (round == 0) add_bar(candidate, z);
-      if (z < field.threshold || candidate.scores.independent.maxCoeff() < limits::kIndependent) continue;
+      if (z < field.threshold || candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
       const bool refused = std::find(refused_.begin(), refused_.end(), candidate.cause) != refused_.end();
       if (refused) continue;
       Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0};
@@ -139,12 +141,12 @@ class Diagnoser {
     }
     std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.gain > b.gain; });
     for (std::size_t i = 0; i < std::min<std::size_t>(12, trials.size()) && getenv("DBG"); ++i) {
-      const auto sz = size_of(field.log, *trials[i].candidate, trials[i].heldout.estimate.tail(trials[i].candidate->columns.size()));
+      const auto sz = size_of(field, trials[i]);
       fprintf(stderr, "R%zu thr %.2f blocks %zu %s|%s t %.2f gain %.4g of %.4g est %.4g size %.2f mm %.2f px\n", round, field.threshold, field.log.blocks, trials[i].candidate->cause.text().c_str(), trials[i].candidate->variable.c_str(), trials[i].candidate->z(), trials[i].gain, without.total(), trials[i].heldout.estimate.tail(trials[i].candidate->columns.size())[0], 1e3*sz.metres(), sz.outline_px);
     }
     while (!trials.empty()) {
       const Trial* best = choose(trials);
-      if (matters(field, *best)) {
+      if (size_of(field, *best).metres() >= options_.matters_m) {
         const double c0 = search_.cost();
         const bool taken = take(field, *best);
         if (getenv("DBG")) fprintf(stderr, "take %s: cost %.4f -> %.4f %d\n", best->candidate->cause.text().c_str(), c0, search_.cost(), taken);
@@ -174,23 +176,33 @@ class Diagnoser {
     const auto generic = std::find_if(trials.begin(), trials.end(), [](const Trial& t) { return t.candidate->generic(); });
     if (known == trials.end()) return &*generic;
     if (generic != trials.end() && generic->gain > limits::kGenericGain * known->gain) return &*generic;
-    const auto dof = static_cast<double>(known->heldout.loss.size()) - 1.0;
+    constexpr double kAlike = 0.02;  // of the gain
     const Trial* best = &*known;
     for (const auto& trial : trials) {
-      if (trial.candidate->generic() || trial.candidate->parameters.size() >= best->candidate->parameters.size()) continue;
-      const bool worse = paired_t(trial.heldout.loss, known->heldout.loss) > student_quantile(limits::kRivalTail, dof);
-      if (!worse && trial.gain > (1.0 - 0.5 * limits::kRivalShare) * known->gain) best = &trial;
+      const bool simpler = !trial.candidate->generic() &&
+                           trial.candidate->parameters.size() < best->candidate->parameters.size();
+      if (simpler && trial.gain > (1.0 - kAlike) * known->gain) best = &trial;
     }
     return best;
   }
 
-  bool matters(const Field& field, const Trial& trial) {
-    return size_of(field.log, *trial.candidate, trial.heldout.estimate.tail(trial.candidate->columns.size())).metres() >=
-           options_.matters_m;
-  }
-
-  Size size_of(const LogAbout& log, const Candidate& candidate, const Eigen::VectorXd& amount) {
-    return search_.size_of(log, directions_of(fit_, log, candidate), candidate.scores, amount);
+  /// What it moves, the joints' offsets fitted anew; of a nuisance, all that it departs from what is believed of it.
+  Size size_of(const Field& field, const Trial& trial) {
+    const auto& candidate = *trial.candidate;
+    Eigen::VectorXd amount = trial.heldout.estimate.tail(candidate.columns.size());
+    if (!candidate.generic()) {
+      const auto nuisance = search_.columns_of(candidate.cause);
+      if (!nuisance.empty() && static_cast<Eigen::Index>(nuisance.size()) != amount.size()) return {};
+      if (!nuisance.empty()) amount = search_.state().x()(nuisance);
+    }
+    const auto joints = search_.state().joints();
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(joints, joints), B = Eigen::MatrixXd::Zero(joints, amount.size());
+    for (std::size_t b = 0; b < field.base.blocks(); ++b) {
+      H += field.base.parts()[b].H.topLeftCorner(joints, joints);
+      B += candidate.columns.B[b].topRows(joints);
+    }
+    H.diagonal() += field.base.precision().head(joints);
+    return search_.size_of(field.log, directions_of(fit_, field.log, candidate), amount, -H.ldlt().solve(B * amount));
   }
 
   bool take(const Field& field, const Trial& trial) {
@@ -212,7 +224,7 @@ class Diagnoser {
     std::size_t worst = 0;
     double least = 1e300;
     for (std::size_t c = 0; c < search_.causes().size(); ++c) {
-      const auto [base, own] = without(search_, all, c);
+      const auto [base, own, kept] = without(search_, all, search_.columns_of(c));
       const double t = base.score(own).z();
       const double gain = base.heldout().total() - with;
       const double strength = gain > 0.0 ? t : 0.0;
@@ -257,19 +269,11 @@ class Diagnoser {
     const auto& roles = fit_.log().roles();
     for (const auto& candidate : field.candidates) {
       if (candidate.generic()) continue;
-      if (candidate.scores.independent.maxCoeff() < limits::kIndependent) {
+      if (candidate.scores.independent.maxCoeff() < limits::kRounding) {
         report_.not_testable.push_back({candidate.cause, "joint offsets and usual nuisances make up for it in this log"});
         continue;
       }
-      const auto effect = make_effect(candidate.cause.name, {candidate.cause.joint, candidate.cause.source}, roles);
-      bool told = false;
-      Eigen::Index i = 0;
-      for (const auto& p : std::as_const(*effect).parameters()) {
-        if (!p.fitted) continue;
-        const double t = student_quantile(normal_tail(field.threshold), candidate.scores.dof[i]);
-        told = told || t < limits::kImplausible * p.typical * std::sqrt(candidate.scores.S(i, i));
-        ++i;
-      }
+      const bool told = is_told(candidate, roles, field.threshold);
       if (!told) report_.not_testable.push_back({candidate.cause, fmt::format("not testable with {} postures", field.log.blocks)});
     }
   }

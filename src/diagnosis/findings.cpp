@@ -50,9 +50,8 @@ Eigen::VectorXd values_of(const ModelSearch& search, const std::vector<Eigen::In
 
 }  // namespace
 
-std::pair<BlockRegression, AddedColumns> without(const ModelSearch& search, const BlockRegression& all, std::size_t cause) {
-  const auto out = search.columns_of(cause);
-  const auto kept = all_but(all.size(), out);
+Reduced without(const ModelSearch& search, const BlockRegression& all, const std::vector<Eigen::Index>& out) {
+  auto kept = all_but(all.size(), out);
   const Eigen::VectorXd value = values_of(search, out);
   std::vector<BaseBlock> blocks;
   AddedColumns own(all.blocks(), static_cast<Eigen::Index>(kept.size()), static_cast<Eigen::Index>(out.size()));
@@ -65,7 +64,7 @@ std::pair<BlockRegression, AddedColumns> without(const ModelSearch& search, cons
     own.C[b] = block.H(out, out);
     own.d[b] = g(out);
   }
-  return {BlockRegression(std::move(blocks), all.precision()(kept), all.away()(kept)), std::move(own)};
+  return {BlockRegression(std::move(blocks), all.precision()(kept), all.away()(kept)), std::move(own), std::move(kept)};
 }
 
 std::vector<std::vector<Direction>> directions_of(LogFit& fit, const LogAbout& log, const Candidate& candidate) {
@@ -219,7 +218,8 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, 
     DiagnosedCause cause;
     cause.cause = found.name;
     cause.variable = found.variable;
-    const auto [base, own] = without(search_, all, c);
+    const auto [base, own, kept] = without(search_, all, search_.columns_of(c));
+    static_cast<void>(kept);
     cause.z = base.score(own).z();
     const double lost = base.heldout().loss.sum();
     cause.heldout_gain = lost > 0.0 ? std::max(0.0, 1.0 - loss / lost) : 0.0;
@@ -253,9 +253,8 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, 
 void Findings::find_class(const BlockRegression& all, std::size_t cause, const std::vector<Candidate>& candidates,
                           DiagnosedCause& out) {
   const auto columns = search_.columns_of(cause);
-  const auto kept = all_but(all.size(), columns);
   const Eigen::VectorXd value = values_of(search_, columns);
-  const auto [base, own] = without(search_, all, cause);
+  const auto [base, own, kept] = without(search_, all, columns);
   const auto with = base.heldout(own);
   const double gain = base.heldout().total() - with.total();
   const double dof = static_cast<double>(all.blocks()) - 1.0;
@@ -264,7 +263,7 @@ void Findings::find_class(const BlockRegression& all, std::size_t cause, const s
     if (candidate.generic()) continue;
     const auto rival = beside(candidate.columns, kept, columns, value);
     const auto scores = base.score(rival);
-    if (scores.independent.maxCoeff() < limits::kIndependent) continue;
+    if (scores.independent.maxCoeff() < limits::kRounding) continue;
     const auto other = base.heldout(rival);
     if (base.heldout().total() - other.total() < limits::kRivalShare * gain) continue;
     if (paired_t(other.loss, with.loss) > student_quantile(limits::kRivalTail, dof)) continue;
@@ -341,7 +340,7 @@ void Findings::check_sides(const LogAbout& log) {
 void Findings::exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates) {
   const auto& roles = fit_.log().roles();
   for (const auto& candidate : candidates) {
-    if (candidate.generic() || candidate.scores.independent.maxCoeff() < limits::kIndependent) continue;
+    if (candidate.generic() || candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
     const bool in_class = std::any_of(report_.causes.begin(), report_.causes.end(), [&](const auto& cause) {
       return std::find(cause.same.begin(), cause.same.end(), candidate.cause) != cause.same.end();
     });
@@ -357,7 +356,7 @@ void Findings::exclude(const LogAbout& log, const BlockRegression& all, const st
     }
     for (std::size_t k = 0; k < fitted.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
-      if (candidate.scores.independent[i] < limits::kIndependent) continue;
+      if (candidate.scores.independent[i] < limits::kRounding) continue;
       const double limit = std::abs(estimate[i]) + quantile(log) * std::sqrt(covariance(i, i));
       report_.exclusion_limits.push_back(
           {candidate.cause, fitted[k]->name, fitted[k]->unit, limit / fitted[k]->si_per_unit});

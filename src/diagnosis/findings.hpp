@@ -9,8 +9,14 @@
 
 namespace bodyschema::diagnosis {
 
-/// A model's regression with one of its causes taken out: the base without it, at its value zero, and its columns.
-std::pair<BlockRegression, AddedColumns> without(const ModelSearch& search, const BlockRegression& all, std::size_t cause);
+/// A model's regression with some of its parameters taken out: the base without them, at their value zero, their columns,
+/// and which of the base's parameters stay.
+struct Reduced {
+  BlockRegression base;
+  AddedColumns own;
+  std::vector<Eigen::Index> kept;
+};
+Reduced without(const ModelSearch& search, const BlockRegression& all, const std::vector<Eigen::Index>& out);
 
 /// How a candidate's columns move each picture: [picture][column].
 std::vector<std::vector<Direction>> directions_of(LogFit& fit, const LogAbout& log, const Candidate& candidate);

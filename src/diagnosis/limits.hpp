@@ -19,13 +19,13 @@ constexpr double kLostContrast = 0.5; ///< between the shares of two parts of th
 constexpr double kRivalTail = 0.02;     ///< two-sided, Student's t of paired blocks: clearly worse than the best
 constexpr double kRivalShare = 0.5;     ///< of the best one's gain: less explains something else
 constexpr double kConfidence = 0.05;    ///< two-sided, of intervals
-constexpr double kIndependent = 1e-3;   ///< share of a column that offsets and nuisances cannot make up for
-constexpr double kSameChange = 0.02;    ///< share of a column that another cause cannot make up for: it is the same
+constexpr double kSameChange = 1e-3;    ///< share of a column that another cause cannot make up for: it is the same
 constexpr double kNeighboursAlike = 0.3; ///< correlation of neighbouring blocks: they are made longer
 constexpr double kLeastGain = 1e-3;     ///< share of the misfit: points of an outline come and go
 constexpr double kGenericGain = 2.0;    ///< a free curve must explain so much more than any known cause
 
 // Computational.
+constexpr double kRounding = 1e-7;          ///< share of a column beyond others: less is rounding
 constexpr double kWide = 100.0;             ///< typical sizes: a belief that is none
 constexpr std::size_t kMostCauses = 6;
 constexpr std::size_t kFewestBlocks = 16;   ///< blocks are not made longer where fewer would be left

@@ -1,3 +1,5 @@
+#include <cstdlib>
+#include <cstdio>
 #include "model_search.hpp"
 
 #include <algorithm>
@@ -166,18 +168,19 @@ void ModelSearch::drop(std::size_t cause) {
   state_ = std::move(state);
 }
 
-std::vector<Eigen::Index> ModelSearch::columns_of(std::size_t cause) const {
+std::vector<Eigen::Index> ModelSearch::columns_of(const CauseName& name) const {
   std::vector<Eigen::Index> list;
-  const auto& found = causes_[cause];
-  if (!found.generic()) {
-    for (Eigen::Index i = 0; i < state_.size(); ++i) {
-      const auto& effect = state_.model()[state_.parameters()[static_cast<std::size_t>(i)].ref.effect];
-      if (effect.name() == found.name.name && effect.target() == EffectTarget{found.name.joint, found.name.source}) {
-        list.push_back(i);
-      }
-    }
-    return list;
+  for (Eigen::Index i = 0; i < state_.size(); ++i) {
+    const auto& effect = state_.model()[state_.parameters()[static_cast<std::size_t>(i)].ref.effect];
+    if (effect.name() == name.name && effect.target() == EffectTarget{name.joint, name.source}) list.push_back(i);
   }
+  return list;
+}
+
+std::vector<Eigen::Index> ModelSearch::columns_of(std::size_t cause) const {
+  const auto& found = causes_[cause];
+  if (!found.generic()) return columns_of(found.name);
+  std::vector<Eigen::Index> list;
   Eigen::Index first = state_.size();
   for (std::size_t c = 0; c < cause; ++c) {
     if (causes_[c].generic()) first += static_cast<Eigen::Index>(causes_[c].amounts.size());
@@ -282,9 +285,8 @@ BlockRegression ModelSearch::regression(const LogAbout& log) const {
   return {base_blocks(log), precision, away};
 }
 
-Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Direction>>& columns, const Scores& scores,
-                          const Eigen::VectorXd& amount) {
-  const Eigen::VectorXd back = -scores.Y * amount;
+Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Direction>>& columns, const Eigen::VectorXd& amount,
+                          const Eigen::VectorXd& of_base) {
   Size size;
   double pictures = 0.0, weight = 0.0, depth = 0.0, focal = 0.0;
   auto& measurement = fit_.measurement();
@@ -299,8 +301,8 @@ Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Dir
     for (Eigen::Index k = 0; k < amount.size(); ++k) {
       for (const auto& step : columns[p][static_cast<std::size_t>(k)]) moved[step.coordinate] += amount[k] * step.amount;
     }
-    for (Eigen::Index i = 0; i < back.size(); ++i) {
-      for (const auto& step : log.base[p][static_cast<std::size_t>(i)]) moved[step.coordinate] += back[i] * step.amount;
+    for (Eigen::Index i = 0; i < of_base.size(); ++i) {
+      for (const auto& step : log.base[p][static_cast<std::size_t>(i)]) moved[step.coordinate] += of_base[i] * step.amount;
     }
     const auto& picture = fit_.log().pictures()[p];
     const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera, log.at.coordinates,
@@ -318,6 +320,17 @@ Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Dir
   size.outline_px = std::sqrt(std::max(0.0, size.outline_px / weight));
   size.outline_m = size.outline_px * depth / focal;
   return size;
+}
+
+void ModelSearch::polish(double block_s) {
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds; ++round) {
+    const auto log = about(block_s);
+    const auto base = regression(log);
+    const Eigen::VectorXd step = base.step().head(state_.size());
+    if (getenv("DBG")) { const Eigen::VectorXd sd = base.covariance().diagonal().cwiseSqrt(); fprintf(stderr, "polish %d: largest %.2f sd\n", round, step.cwiseQuotient(sd.head(state_.size())).cwiseAbs().maxCoeff()); }
+    state_.set(state_.x() + step);
+  }
 }
 
 void ModelSearch::look_for_lost_part() {

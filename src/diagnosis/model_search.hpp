@@ -20,7 +20,7 @@ struct FoundCause {
   [[nodiscard]] bool generic() const { return !variable.empty(); }
 };
 
-/// What a cause moves, offsets and nuisances fitted anew, root mean square over the log.
+/// What a cause moves, root mean square over the log.
 struct Size {
   double hand_m = 0.0, outline_px = 0.0;
   double outline_m = 0.0;  ///< at the hand's depth
@@ -46,17 +46,22 @@ class ModelSearch {
   /// Where a part of the log lies out of sight of the model: tries a slip of every joint there.
   void look_for_lost_part();
 
+  /// Moves the state to where all pictures together have it: what a fit along a direction that is hardly told leaves.
+  void polish(double block_s);
+
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const std::vector<FoundCause>& causes() const { return causes_; }
   [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
   [[nodiscard]] double cost() const { return cost_; }
   /// Positions of a cause's parameters in the base.
   [[nodiscard]] std::vector<Eigen::Index> columns_of(std::size_t cause) const;
+  /// Positions of an effect's parameters in the state; empty: it is not estimated.
+  [[nodiscard]] std::vector<Eigen::Index> columns_of(const CauseName& effect) const;
   [[nodiscard]] OutlineSearch search() const;
   [[nodiscard]] const std::vector<std::size_t>& raster() const { return raster_; }
-  /// What a change of the base's parameters and of some columns moves.
+  /// What a change of some columns and of the base's parameters moves.
   [[nodiscard]] Size size_of(const LogAbout& log, const std::vector<std::vector<Direction>>& columns,
-                             const Scores& scores, const Eigen::VectorXd& amount);
+                             const Eigen::VectorXd& amount, const Eigen::VectorXd& of_base);
 
  private:
   [[nodiscard]] State state_with(const std::vector<FoundCause>& causes) const;

@@ -13,8 +13,8 @@ namespace bodyschema {
 struct DiagnosisOptions {
   /// Share of healthy logs in which something may be named, over all candidates together.
   double level = 0.01;
-  /// What matters to a user, m: a cause that moves hand and outlines less than this, joint offsets and nuisances fitted
-  /// anew, is listed among the small ones and not named.
+  /// What matters to a user, m: a cause that moves hand and outlines less than this, the joints' offsets fitted anew, is
+  /// one of several small errors and not named.
   double matters_m = 0.0005;
   double block_s = 1.0;            ///< shortest block; longer ones where neighbours err alike
   double same_posture_rad = 0.05;  ///< a block ends only where the arm has moved by this
