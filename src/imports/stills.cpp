@@ -9,8 +9,8 @@
 #include <fstream>
 #include <set>
 
-#include "bodyschema/camera/camera_info.hpp"
 #include "bodyschema/core/nearest_name.hpp"
+#include "camera_check.hpp"
 #include "csv_table.hpp"
 #include "picture_file.hpp"
 
@@ -136,20 +136,9 @@ class StillsImport {
     const auto file = folder_.camera_infos.find(image_folders_[c]);
     if (file == folder_.camera_infos.end()) return;
     try {
-      const CameraInfo info = CameraInfo::read(file->second);
-      const CameraModel& camera = target_.rig.cameras[c];
-      const auto near = [](const PinholeIntrinsics& a, const PinholeIntrinsics& b) {
-        constexpr double kShare = 0.02, kShift_px = 0.02;  // of the focal length, of the picture's width
-        const double shift_px = kShift_px * a.width;
-        return std::abs(a.fx - b.fx) <= kShare * a.fx && std::abs(a.fy - b.fy) <= kShare * a.fy &&
-               std::abs(a.cx - b.cx) <= shift_px && std::abs(a.cy - b.cy) <= shift_px;
-      };
-      if (near(camera.intrinsics, info.intrinsics) || near(camera.intrinsics, info.rectified)) return;
-      builder_.note(fmt::format(
-          "camera '{}' is configured with fx {:.6g}, fy {:.6g}, cx {:.6g}, cy {:.6g}, but {} has {:.6g}, {:.6g}, "
-          "{:.6g}, {:.6g}",
-          camera.name, camera.intrinsics.fx, camera.intrinsics.fy, camera.intrinsics.cx, camera.intrinsics.cy,
-          file->second.string(), info.intrinsics.fx, info.intrinsics.fy, info.intrinsics.cx, info.intrinsics.cy));
+      const auto difference =
+          camera_difference(target_.rig.cameras[c], CameraInfo::read(file->second), file->second.string());
+      if (difference) builder_.note(*difference);
     } catch (const Error& error) {
       builder_.note(fmt::format("not compared with the configuration: {}", error.what()));
     }
