@@ -18,7 +18,7 @@ import sys
 
 import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin, Writer as Writer2
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
@@ -60,7 +60,7 @@ class Bag:
             plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
             self.writer = Writer2(path, version=9, storage_plugin=plugin)
             if keys.get("compression") == "zstd":
-                self.writer.set_compression(Writer2.CompressionMode.MESSAGE, Writer2.CompressionFormat.ZSTD)
+                self.writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
         self.connections = {}
         self.sequence = 0
 
