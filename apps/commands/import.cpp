@@ -11,6 +11,7 @@
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/core/write_file.hpp"
 #include "bodyschema/imports/camera_pose_file.hpp"
+#include "bodyschema/imports/lerobot.hpp"
 #include "bodyschema/imports/ros_bag.hpp"
 #include "bodyschema/imports/stills.hpp"
 #include "bodyschema/imports/yarp_import.hpp"
@@ -249,6 +250,62 @@ void add_ros_bag(CLI::App& import) {
   command->callback([a] { run_ros_bag(*a); });
 }
 
+void print_lerobot_set(const LerobotSet& set) {
+  std::printf("LeRobot v%s, %lld episodes, %zu of them here\ncolumns:", set.version.c_str(),
+              static_cast<long long>(set.episodes), set.present.size());
+  for (const std::string& column : set.columns) std::printf(" %s", column.c_str());
+  std::printf("\ncameras:");
+  for (const std::string& camera : set.cameras) std::printf(" %s", camera.c_str());
+  std::printf("\nepisodes:");
+  for (const std::int64_t episode : set.present) std::printf(" %lld", static_cast<long long>(episode));
+  std::printf("\n");
+}
+
+void add_lerobot(CLI::App& import) {
+  struct Arguments {
+    Source source;
+    std::string mapping;
+    LerobotOptions options;
+    double recorded_at_s = 0.0;
+    bool list = false;
+  };
+  auto a = std::make_shared<Arguments>();
+  CLI::App* command = import.add_subcommand("lerobot", "Turn episodes of a LeRobot data set into LCM logs");
+  command->footer(
+      "Examples:\n"
+      "  bodyschema import lerobot my_set --list\n"
+      "  bodyschema import lerobot my_set --config my_arm/estimator.yaml --mapping my_arm/lerobot.yaml \\\n"
+      "      --episodes 0-9 --out logs\n\n"
+      "The mapping says which column is which joint, with scale and offset. Python reads the set (PyPI's\n"
+      "pyarrow and av, installed once, in ~/.cache/bodyschema). docs/import_lerobot.md.");
+  a->source.add_to(*command, "Folder of the data set (v2.0, v2.1 or v3.0), with meta/info.json");
+  command->get_option("--config")->required(false);
+  command->get_option("--out")->required(false)->description(
+      "Folder for a log of each episode; or NAME.lcmlog: one log, episodes 10 s apart");
+  command->add_option("--mapping", a->mapping, "File whose section `import` says which column is which joint");
+  command->add_option("--episodes", a->options.episodes, "all, or numbers as 1,3-5");
+  command->add_flag("--raw", a->options.raw, "Pictures as they are decoded, ten times as large as JPEG");
+  command->add_option("--recorded-at", a->recorded_at_s, "When the first episode began, s since 1970")
+      ->check(number_in(0.0, 8e9));
+  command->add_flag("--list", a->list, "Print columns, cameras and episodes and import nothing; needs no --config");
+  command->callback([a] {
+    if (a->list) {
+      set_up_logging(a->source.log_level);
+      return print_lerobot_set(LerobotSet::list(a->source.recording, say_set_up));
+    }
+    if (a->source.config.empty()) throw CLI::RequiredError("--config");
+    if (a->source.out.empty()) throw CLI::RequiredError("--out");
+    a->options.recorded_at = microseconds(a->recorded_at_s);
+    const ImportTarget target =
+        ImportTarget::from(a->source.load(), a->mapping.empty() ? "" : find_data_file(a->mapping));
+    LazyBar bar;
+    const auto result = import_lerobot(a->source.recording, target, a->options, LerobotOutput::of(a->source.out),
+                                       say_set_up, std::ref(bar));
+    bar.end();
+    std::fputs(result.text().c_str(), stdout);
+  });
+}
+
 }  // namespace
 
 void add_import(CLI::App& app) {
@@ -260,6 +317,7 @@ void add_import(CLI::App& app) {
   import->require_subcommand(1);
   add_stills(*import);
   add_ros_bag(*import);
+  add_lerobot(*import);
   add_yarp(*import, "yarp", "Turn a YARP dataplayer recording into an LCM log");
   add_yarp(app, "import-yarp", "The same as `import yarp`");
 }

@@ -182,4 +182,10 @@ std::string PipedProgram::complaint() const {
   return line.empty() ? "it said nothing" : line;
 }
 
+void rethrow_with_complaint(PipedProgram& reader, const std::string& recording, const FileError& error) {
+  if (!std::string(error.what()).ends_with(kReaderEnded)) throw error;
+  const int status = reader.wait();
+  throw FileError(fmt::format("{}: its reader ended with status {}: {}", recording, status, reader.complaint()));
+}
+
 }  // namespace bodyschema

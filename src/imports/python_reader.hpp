@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "bodyschema/core/error.hpp"
 #include "bodyschema/imports/record_stream.hpp"
 
 namespace bodyschema {
@@ -43,5 +44,24 @@ class PipedProgram : public ByteSource {
   int output_ = -1;
   std::FILE* errors_ = nullptr;
 };
+
+/// Throws the FileError about a stream that ended early once more, with what its reader had to say.
+[[noreturn]] void rethrow_with_complaint(PipedProgram& reader, const std::string& recording, const FileError& error);
+
+/// Runs import/READER with the arguments behind it, and `work` on the records that it writes.
+/// @param kind  of python_for; @param arguments  the reader first; @param recording  for errors
+template <class Work>
+auto read_with_python(const std::string& kind, std::vector<std::string> arguments, const std::string& recording,
+                      const std::function<void(const std::string&)>& say, const Work& work) {
+  arguments.front() = import_file(arguments.front()).string();
+  // Not Python's own variables, which lead a sourced ROS workspace to other packages; and no files beside the readers.
+  arguments.insert(arguments.begin(), {python_for(kind, say).string(), "-E", "-B"});
+  PipedProgram reader(arguments);
+  try {
+    return work(reader);
+  } catch (const FileError& error) {
+    rethrow_with_complaint(reader, recording, error);
+  }
+}
 
 }  // namespace bodyschema

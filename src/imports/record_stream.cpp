@@ -58,6 +58,17 @@ std::vector<std::string> Record::texts(const char* name) const {
   return all;
 }
 
+std::vector<std::int64_t> Record::integers(const char* name) const {
+  const auto& value = header_->at(*this, name);
+  if (!value.is_array()) Header::fail(*this, name, "is no list");
+  std::vector<std::int64_t> all;
+  for (const auto& entry : value) {
+    if (!entry.is_number_integer()) Header::fail(*this, name, "holds what is no whole number");
+    all.push_back(entry.get<std::int64_t>());
+  }
+  return all;
+}
+
 std::string Record::json(const char* name) const {
   return header_->at(*this, name).dump();
 }
@@ -75,7 +86,7 @@ std::vector<double> Record::numbers(std::size_t count) const {
 
 bool RecordStream::next(Record& record) {
   std::array<std::uint8_t, 8> sizes{};
-  if (source_.read(sizes) != sizes.size()) throw FileError(name_ + ": its reader ended before the recording did");
+  if (source_.read(sizes) != sizes.size()) throw FileError(name_ + kReaderEnded);
   const auto size_at = [&](std::size_t i) {
     return static_cast<std::uint32_t>(sizes[i] | sizes[i + 1] << 8 | sizes[i + 2] << 16) |
            static_cast<std::uint32_t>(sizes[i + 3]) << 24;
@@ -92,7 +103,7 @@ bool RecordStream::next(Record& record) {
       const std::size_t at = bytes.size(), step = std::min<std::size_t>(kStep, size - at);
       bytes.resize(at + step);
       if (source_.read({bytes.data() + at, step}) != step) {
-        throw FileError(name_ + ": its reader ended before the recording did");
+        throw FileError(name_ + kReaderEnded);
       }
     }
   };

@@ -389,18 +389,6 @@ class BagImport {
   std::uint64_t unstamped_ = 0;
 };
 
-/// What a reader that ended with no word of its own had to say.
-template <class Work>
-auto with_reader(PipedProgram& reader, const std::string& bag, const Work& work) {
-  try {
-    return work();
-  } catch (const FileError& error) {
-    const int status = reader.wait();
-    if (status == 0 || std::string(error.what()).find("its reader ended") == std::string::npos) throw;
-    throw FileError(fmt::format("{}: its reader ended with status {}: {}", bag, status, reader.complaint()));
-  }
-}
-
 }  // namespace
 
 bool BagTopic::is(const char* short_type) const {
@@ -474,9 +462,8 @@ ImportSummary import_bag_records(ByteSource& records, const std::string& bag, co
 
 std::vector<BagTopic> list_bag(const std::filesystem::path& bag, const std::function<void(const std::string&)>& say) {
   if (!std::filesystem::exists(bag)) throw FileError(bag.string() + ": no such bag");
-  const auto python = python_for("ros-bag", say);
-  PipedProgram reader({python.string(), "-E", "-B", import_file(kReader).string(), bag.string(), "list"});
-  return with_reader(reader, bag.string(), [&] { return read_bag_topics(reader, bag.string()); });
+  return read_with_python("ros-bag", {kReader, bag.string(), "list"}, bag.string(), say,
+                          [&](ByteSource& records) { return read_bag_topics(records, bag.string()); });
 }
 
 ImportSummary import_ros_bag(const std::filesystem::path& bag, const ImportTarget& target,
@@ -497,13 +484,13 @@ ImportSummary import_ros_bag(const std::filesystem::path& bag, const ImportTarge
                       std::find(selection.joints.begin(), selection.joints.end(), topic.name) != selection.joints.end();
     if (read) total += static_cast<std::uint64_t>(std::max<std::int64_t>(topic.count, 0));
   }
-  const auto python = python_for("ros-bag", say);
-  PipedProgram reader({python.string(), "-E", "-B", import_file(kReader).string(), bag.string(), "read", wanted.dump()});
   const auto bounded = [&](std::uint64_t done) {
     if (progress) progress(std::min(done, total), total);
   };
-  return with_reader(reader, bag.string(),
-                     [&] { return import_bag_records(reader, bag.string(), selection, target, log, bounded); });
+  return read_with_python("ros-bag", {kReader, bag.string(), "read", wanted.dump()}, bag.string(), say,
+                          [&](ByteSource& records) {
+                            return import_bag_records(records, bag.string(), selection, target, log, bounded);
+                          });
 }
 
 }  // namespace bodyschema

@@ -13,6 +13,7 @@
 #include "camera_check.hpp"
 #include "csv_table.hpp"
 #include "picture_file.hpp"
+#include "row_slopes.hpp"
 
 namespace bodyschema {
 namespace {
@@ -212,19 +213,11 @@ class StillsImport {
     return values;
   }
 
-  /// Of a moving recording: the slopes to the rows before and after, over both where they are alike in length.
+  /// Of a moving recording.
   [[nodiscard]] std::vector<double> velocities(std::size_t i) const {
-    constexpr Microseconds kNear = 500'000;
-    const bool before = i > 0 && postures_[i].utime - postures_[i - 1].utime <= kNear;
-    const bool after = i + 1 < postures_.size() && postures_[i + 1].utime - postures_[i].utime <= kNear;
-    const Posture &a = postures_[before ? i - 1 : i], &b = postures_[after ? i + 1 : i];
-    std::vector<double> slopes(joint_columns_.size(), 0.0);
-    if (!before && !after) return slopes;
-    for (std::size_t k = 0; k < joint_columns_.size(); ++k) {
-      slopes[k] =
-          (b.row->values[joint_columns_[k]] - a.row->values[joint_columns_[k]]) / seconds(b.utime - a.utime);
-    }
-    return slopes;
+    return row_slopes(
+        i, postures_.size(), joint_columns_.size(), [&](std::size_t r) { return postures_[r].utime; },
+        [&](std::size_t r, std::size_t k) { return postures_[r].row->values[joint_columns_[k]]; });
   }
 
   void hold(const Posture& posture) {

@@ -28,6 +28,7 @@ class Record {
   [[nodiscard]] std::int64_t integer(const char* name) const;
   [[nodiscard]] bool boolean(const char* name) const;
   [[nodiscard]] std::vector<std::string> texts(const char* name) const;
+  [[nodiscard]] std::vector<std::int64_t> integers(const char* name) const;
   /// A value of any type as it is written in JSON.
   [[nodiscard]] std::string json(const char* name) const;
   /// The payload as 64-bit floating point numbers, little-endian. Throws FileError for `count` others than these.
@@ -39,6 +40,9 @@ class Record {
   std::shared_ptr<const Header> header_;
   std::string kind_;
 };
+
+/// How the error about a stream that ended early ends.
+inline constexpr const char* kReaderEnded = ": its reader ended before the recording did";
 
 /// Takes records off a stream: two unsigned 32-bit numbers, little-endian, the bytes of header and payload; then a JSON
 /// object with "kind"; then the payload. Sizes are bounded before memory is taken. One thread.
