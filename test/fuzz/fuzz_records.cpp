@@ -1,6 +1,7 @@
-// What a reader of recordings writes: records of a bag, turned into a log. The input is the stream itself.
+// What a reader of recordings writes: records of a bag or of a LeRobot data set, turned into a log. The input is the stream itself.
 #include <cstring>
 
+#include "bodyschema/imports/lerobot.hpp"
 #include "bodyschema/imports/ros_bag.hpp"
 #include "fuzz.hpp"
 
@@ -51,6 +52,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::refuse_or_accept([&] {
     Input records(data, size);
     (void)import_bag_records(records, "bag", selection, target, "/dev/null");
+  });
+  static const LerobotSet set{"2.1", 9, {0}, {"elbow"}, {"cam"}};
+  static const std::vector<std::string> cameras = {"cam"};
+  fuzz::refuse_or_accept([&] {
+    Input records(data, size);
+    (void)LerobotSet::read(records, "set");
+  });
+  fuzz::refuse_or_accept([&] {
+    Input records(data, size);
+    (void)import_lerobot_records(records, "set", set, cameras, target, {}, {"/dev/null", true});
   });
   return 0;
 }
