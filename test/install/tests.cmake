@@ -118,3 +118,12 @@ if(TARGET lcmtypes_jar AND BODYSCHEMA_JAVA)
   set_tests_properties(install.lcm_spy_knows_our_types PROPERTIES LABELS install TIMEOUT ${timeout}
     PASS_REGULAR_EXPRESSION "Found ${type_count} LCM types\n")
 endif()
+
+if(CMAKE_GENERATOR STREQUAL "Ninja" AND BODYSCHEMA_PROGRAMS)
+  add_test(NAME install.demo_builds_the_programs_alone
+    COMMAND ${CMAKE_COMMAND} -D BUILD_DIR=${PROJECT_BINARY_DIR} -D SOURCE_DIR=${PROJECT_SOURCE_DIR}
+      -D NINJA=${CMAKE_MAKE_PROGRAM} -D "PROGRAMS=${BODYSCHEMA_PROGRAMS}"
+      -P ${PROJECT_SOURCE_DIR}/test/install/demo.cmake)
+  bodyschema_patient(timeout 60)
+  set_tests_properties(install.demo_builds_the_programs_alone PROPERTIES LABELS install TIMEOUT ${timeout})
+endif()
