@@ -10,16 +10,14 @@
 #include <thread>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/seeded_random.hpp"
 
 namespace bodyschema {
 namespace {
 
 /// A seed of its own for every trial and purpose.
 std::uint64_t mix(std::uint64_t seed, std::uint64_t n) {
-  std::uint64_t z = seed * 0x9E3779B97F4A7C15ull + n + 0x632BE59BD9B4E019ull;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
-  return z ^ (z >> 31);
+  return mixed_bits(seed * 0x9E3779B97F4A7C15ull + n + 0x632BE59BD9B4E019ull);
 }
 
 class SilhouetteLog final : public TrialLog {
