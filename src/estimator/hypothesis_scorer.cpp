@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "bodyschema/filter/hammoude.hpp"
+#include "bodyschema/search/fastest_engine.hpp"
 #include "bodyschema/search/search_level.hpp"
 
 namespace bodyschema {
@@ -15,14 +16,17 @@ HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& sil
                                    std::size_t slots, bool for_search)
     : model_(model), cameras_(std::move(cameras)), observed_(cameras_.size()), coarse_(cameras_.size()), slots_(slots), X_CB_((slots + 1) * cameras_.size() * model.part_count()), counts_(slots * cameras_.size()),
       distances_(static_cast<Eigen::Index>(slots)), one_distance_(1) {
+  const std::size_t at_once = slots * cameras_.size();
   if (!for_search) {
-    full_ = make_silhouette_scorer(silhouettes, cameras_, options, &engine_reason_);
+    full_ = make_silhouette_scorer(silhouettes, cameras_,
+                                   fastest_engine(silhouettes, cameras_, options, at_once, engine_reason_));
     scorer_ = full_.get();
     return;
   }
   const SearchLevel level = search_level(silhouettes, cameras_);
   step_ = level.step;
-  search_ = make_silhouette_scorer(level.model, level.cameras, options, &engine_reason_);
+  search_ = make_silhouette_scorer(level.model, level.cameras,
+                                   fastest_engine(level.model, level.cameras, options, at_once, engine_reason_));
   // For pictures to look at and specks: the processor is quick enough.
   SilhouetteOptions full = options;
   full.engine = "contour";

@@ -120,7 +120,8 @@ void Pipeline::finish_learning() {
 Estimate Pipeline::process(Observation& observation, const Observation* next) {
   segment(observation);
   if (next == nullptr || vision_.method == SegmentationMethod::kStatistics) return estimate(observation);
-  ahead_ = std::async(std::launch::async, [this, next] { return look(*next); });
+  if (!worker_) worker_ = std::make_unique<BackgroundWorker>();
+  ahead_ = worker_->begin([this, next] { return look(*next); });
   struct Wait {
     const std::future<Looks>& ahead;
     ~Wait() { ahead.wait(); }

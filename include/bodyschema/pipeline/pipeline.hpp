@@ -9,6 +9,7 @@
 #include "bodyschema/bus/bus_options.hpp"
 #include "bodyschema/bus/observation_stream.hpp"
 #include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/core/background_worker.hpp"
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/effects/error_model.hpp"
 #include "bodyschema/estimator/estimator.hpp"
@@ -132,6 +133,7 @@ class Pipeline {
   bool tracking_ = false;  ///< the estimate is good enough to predict where the robot is
   double segmentation_ms_ = 0.0;
   std::future<Looks> ahead_;  ///< at the next observation, where it was known
+  std::unique_ptr<BackgroundWorker> worker_;  ///< looks ahead; made when it is first needed
 };
 
 }  // namespace bodyschema
