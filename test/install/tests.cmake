@@ -43,7 +43,7 @@ if(BODYSCHEMA_DPKG_DEB AND BODYSCHEMA_DPKG_SHLIBDEPS AND BODYSCHEMA_PROGRAMS AND
       -D BUILD_TYPE=${CMAKE_BUILD_TYPE}
       -D SCRATCH_DIR=${PROJECT_BINARY_DIR}/test-package
       -D CPACK=${CMAKE_CPACK_COMMAND} -D DPKG_DEB=${BODYSCHEMA_DPKG_DEB}
-      -D "PROGRAMS=${BODYSCHEMA_PROGRAMS}"
+      -D "PROGRAMS=${BODYSCHEMA_PROGRAMS}" -D JAVA_TYPES=$<TARGET_EXISTS:lcmtypes_jar>
       -P ${PROJECT_SOURCE_DIR}/test/install/package.cmake)
   bodyschema_patient(timeout 300)
   set_tests_properties(install.package PROPERTIES LABELS install TIMEOUT ${timeout})
@@ -126,4 +126,12 @@ if(CMAKE_GENERATOR STREQUAL "Ninja" AND BODYSCHEMA_PROGRAMS)
       -P ${PROJECT_SOURCE_DIR}/test/install/demo.cmake)
   bodyschema_patient(timeout 60)
   set_tests_properties(install.demo_builds_the_programs_alone PROPERTIES LABELS install TIMEOUT ${timeout})
+endif()
+
+if(Python3_FOUND)
+  # Skipped where neither Docker nor Podman works.
+  add_test(NAME install.container
+    COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/install/container.py ${PROJECT_SOURCE_DIR})
+  bodyschema_patient(timeout 3600)
+  set_tests_properties(install.container PROPERTIES LABELS install TIMEOUT ${timeout} SKIP_RETURN_CODE 77)
 endif()
