@@ -302,7 +302,7 @@ struct Estimator::Impl {
 
   /// How the frame agrees with the memory that its fit was held by.
   void judge(const OutlineFit& fit) {
-    near = fitter.fits(fit.evidence);
+    near = fitter.lies_near(fit.evidence);
     innovation = memory.innovation(fit.quadratic);
     const double ratio = innovation.dof > 0.0 ? innovation.nis / innovation.dof : 0.0;
     const double limit = chi_square_quantile(limits::kDoubt_tail, std::max(1.0, innovation.dof)) * usual();
@@ -317,6 +317,10 @@ struct Estimator::Impl {
 
   void learn(const OutlineFit& fit) {
     doubted_since_s = -1.0;
+    if (!fitter.fits(fit.evidence)) {  // too little of the hand to say much
+      settle_on(fit);
+      return;
+    }
     fitter.learn_noise(fit);
     if (const auto block = memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.quadratic, fit.x)) keep_frame(*block);
     look_again();

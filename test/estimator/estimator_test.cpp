@@ -246,6 +246,21 @@ TEST_F(EstimatorOnOwnRobot, ABlindCameraStaysWhereItIsKnownToBe) {
   }
 }
 
+/// At the edge of the picture a hand says little; what is known of it is known all the same.
+TEST_F(EstimatorOnOwnRobot, AHandThatLeavesThePictureContradictsNothing) {
+  Estimator estimator = make_estimator();
+  ASSERT_EQ(follow(estimator, *reach_, 0, 60, 40.0).state, EstimatorState::kConverged);
+  int leaving = 0;
+  for (int frame = 60; frame < 100; ++frame) {
+    const Estimate estimate = follow(estimator, *reach_, frame, frame + 1, 40.0);
+    if (estimate.state == EstimatorState::kHandNotInView) break;
+    ++leaving;
+    EXPECT_EQ(estimate.verdict, FrameVerdict::kAgrees) << frame;
+    EXPECT_LT(position_error_m(estimate, reach_->true_hand(pose(frame / 40.0), 0)), 1e-3) << frame;
+  }
+  EXPECT_GT(leaving, 20);
+}
+
 TEST_F(EstimatorOnOwnRobot, SameSeedSameEstimatesWhateverTheThreads) {
   std::vector<Eigen::VectorXd> results;
   for (const int threads : {1, 1, 3}) {
