@@ -406,7 +406,10 @@ struct Estimator::Impl {
     std::iota(everything.begin(), everything.end(), Eigen::Index{0});
     if (!young()) {
       for (Eigen::Index joint = 0; joint < joints; ++joint) list.push_back(slip(joint, fit));
-      if (const auto camera = camera_parameters(); !camera.empty()) list.push_back({"the cameras were moved", camera, {}});
+      if (const auto camera = camera_parameters(); !camera.empty()) {
+        // From afar: knocked by more than is looked for about a memory.
+        list.push_back({"the cameras were moved", camera, {memory.estimate().x}});
+      }
       if (alternative && now_s - alternative_s < limits::kAlternative_s && !stalled.suspected()) {
         list.push_back({"what was known before holds", {}, {}, &*alternative});
       }

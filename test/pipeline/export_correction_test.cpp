@@ -14,6 +14,7 @@
 #include "bodyschema/effects/corrected_kinematics.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
+#include "effects/own_effect.hpp"
 
 namespace bodyschema {
 namespace {
@@ -263,6 +264,25 @@ TEST_F(ExportCorrection, AnEffectThatTheSummaryMakesUpIsRefused) {
   refuse(R"({"name": "mesh_scale", "parameter": "size", "unit": "%", "value": 1.0, "stddev": 0.2})",
          "no parameter 'size'");
   refuse(R"({"name": "mesh_scale", "parameter": "scale", "unit": "%", "stddev": 0.2})", "value");
+}
+
+/// An effect that the software does not know: what was estimated of it is written, and what to do about it.
+TEST_F(ExportCorrection, HoldsWhatWasEstimatedOfARegisteredEffect) {
+  test::register_own_effect();
+  std::ofstream(folder_ / "summary.json")
+      << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1},
+          "told": ["r_elbow"], "effects": [{"name": ")"
+      << test::kOwnEffect
+      << R"(", "joint": "r_elbow", "parameter": "ripple", "unit": "deg", "value": 1.5, "stddev": 0.2,
+             "prior_stddev": 5.0}]}})";
+  export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+  const std::string applied = content("out/what_was_applied.txt");
+  EXPECT_LT(applied.find("cannot hold"), applied.find(std::string(test::kOwnEffect) + " of r_elbow ripple 1.5 deg"));
+  EXPECT_THAT(applied, ::testing::HasSubstr("correct the reading by the ripple"));
+  const Configuration yaml = Configuration::load(folder_ / "out/offsets.yaml");
+  const auto effect = yaml.section("effects").section(std::string(test::kOwnEffect) + " of r_elbow ripple");
+  EXPECT_DOUBLE_EQ(effect.number("value"), 1.5);
+  EXPECT_DOUBLE_EQ(effect.number("stddev"), 0.2);
 }
 
 /// What the replay estimated beside the offsets goes where it belongs, and the files say where.
