@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
   bodyschema::apps::add_replay(app);
   bodyschema::apps::add_export(app);
   bodyschema::apps::add_evaluate(app);
+  bodyschema::apps::add_calibrate(app);
   bodyschema::apps::add_diagnose(app);
   bodyschema::apps::add_fleet(app);
   bodyschema::apps::add_log(app);

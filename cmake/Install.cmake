@@ -2,8 +2,8 @@
 #   bin/                        every program of apps/
 #   lib/, include/bodyschema/   one static library and one folder of headers per storey
 #   lib/cmake/bodyschema/       find_package(bodyschema COMPONENTS robot silhouette ...)
-#   share/bodyschema/           config/, meshes/ and workflow/, side by side as in the source tree, so that the
-#                               relative paths inside the configurations hold in both places
+#   share/bodyschema/           config/, meshes/, workflow/ and import/, side by side as in the source tree, so that
+#                               the relative paths inside the configurations hold in both places
 # Nothing installed holds an absolute path: the prefix may be moved.
 include(CMakePackageConfigHelpers)
 
@@ -144,7 +144,7 @@ foreach(target IN LISTS targets)
     install(TARGETS ${target} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   endif()
 endforeach()
-foreach(folder IN ITEMS config meshes workflow)
+foreach(folder IN ITEMS config meshes workflow import)
   install(DIRECTORY ${folder} DESTINATION ${BODYSCHEMA_INSTALL_SHAREDIR}
           PATTERN "__pycache__" EXCLUDE PATTERN "service" EXCLUDE)
 endforeach()

@@ -20,7 +20,7 @@ and evaluation of recorded logs, and the libraries to link against.")
 # Needs dpkg-shlibdeps and file (packages dpkg-dev, file).
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "libegl1, libegl-mesa0 | libegl-vendor, libgl1-mesa-dri")
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "liblcm-bin")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "liblcm-bin, python3-venv")
 # For those who link against the libraries.
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS
   "snakemake, libosmesa6, liblcm-java, libeigen3-dev, libopencv-calib3d-dev, libopencv-imgcodecs-dev, liblcm-dev, libyaml-cpp-dev, libspdlog-dev, libassimp-dev, libmeshoptimizer-dev, liburdfdom-dev, liborocos-kdl-dev, libjpeg-dev, nlohmann-json3-dev, libtinyxml2-dev")

@@ -11,6 +11,7 @@ void add_export(CLI::App& app);
 void add_replay(CLI::App& app);
 /// `import` with a subcommand for each kind of recording, and `import-yarp`.
 void add_import(CLI::App& app);
+void add_calibrate(CLI::App& app);
 void add_diagnose(CLI::App& app);
 void add_selftest(CLI::App& app);
 void add_log(CLI::App& app);

@@ -9,8 +9,8 @@
 #include "bodyschema/core/write_file.hpp"
 #include "bodyschema/pipeline/export_correction.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
+#include "bodyschema/pipeline/silhouette_preview.hpp"
 #include "bodyschema/report/report.hpp"
-#include "bodyschema/silhouette/silhouette_scorer.hpp"
 
 namespace bodyschema {
 namespace {
@@ -122,42 +122,6 @@ std::string cameras_yaml(const Calibration& c, const StereoRig& rig) {
   return text;
 }
 
-/// Silhouettes predicted with the fit, and with encoders and model as they are.
-class Outlines {
- public:
-  Outlines(PictureLog& log, const BatchFit& batch)
-      : log_(log), batch_(batch), projection_(log.robot(), log.setup(), log.rig(), log.roles()),
-        nothing_(log.roles().no_corrections()), X_CB_(projection_.part_count()) {
-    SilhouetteOptions options;
-    options.engine = "contour";
-    options.threads = 1;
-    scorer_ = make_silhouette_scorer(silhouette_model(*log.robot(), log.setup()), log.rig().intrinsics(), options);
-  }
-  BinaryMask at(const JointSample& joints, std::size_t camera, bool corrected) {
-    Corrections corrections = nothing_;
-    if (corrected) {
-      Instant at;
-      at.utime = joints.utime;
-      at.camera = camera;
-      at.encoder = joints.q;
-      at.q = joints.q - batch_.state().model().offsets();
-      at.qdot = at.qddot = Eigen::VectorXd::Zero(joints.q.size());
-      batch_.state().model().corrections(at, corrections);
-    }
-    projection_.place(joints.q, corrections, camera);
-    projection_.parts(X_CB_);
-    return scorer_->render(X_CB_, camera);
-  }
-
- private:
-  PictureLog& log_;
-  const BatchFit& batch_;
-  RobotProjection projection_;
-  const Corrections nothing_;
-  std::vector<Eigen::Isometry3f> X_CB_;
-  std::unique_ptr<SilhouetteScorer> scorer_;
-};
-
 void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, const std::vector<Observation>& kept,
                 const CalibrationOptions& options) {
   Report page("Calibration of " + options.log.filename().string());
@@ -206,13 +170,19 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
   }
   page.heading("Pictures");
   page.paragraph("Outlines of encoders and model as they are (red) and of the calibration (green).");
-  Outlines outlines(log, batch);
+  SilhouettePreview preview(log);
+  const Corrections nothing = log.roles().no_corrections();
   for (const auto& observation : kept) {
     std::vector<OverlayView> views;
     for (std::size_t k = 0; k < observation.cameras.size(); ++k) {
       const auto& seen = observation.cameras[k];
       if (!seen || seen->image.empty()) continue;
-      views.push_back({&seen->image, outlines.at(seen->joints, k, false), outlines.at(seen->joints, k, true), {}});
+      const auto picture = std::find_if(log.pictures().begin(), log.pictures().end(), [&](const Picture& p) {
+        return p.camera == k && p.joints.utime == seen->utime;
+      });
+      if (picture == log.pictures().end()) continue;
+      const auto& found = batch.at().corrections[static_cast<std::size_t>(picture - log.pictures().begin())];
+      views.push_back({&seen->image, preview.draw(picture->joints.q, nothing, k), preview.draw(picture->joints.q, found, k), {}});
     }
     if (views.empty()) continue;
     page.picture(draw_overlay(views, fmt::format("{:.1f} s", seconds(observation.utime - kept.front().utime)), 1,

@@ -67,7 +67,10 @@ bool CameraInfo::is_rectified() const {
 }
 
 CameraInfo CameraInfo::read(const std::filesystem::path& path) {
-  const Configuration file = Configuration::load(path);
+  return from(Configuration::load(path), path.string());
+}
+
+CameraInfo CameraInfo::from(const Configuration& file, const std::string& where) {
   const Reader reader(file);
   CameraInfo info;
   const int width = reader.side("width", "image_width"), height = reader.side("height", "image_height");
@@ -86,7 +89,7 @@ CameraInfo CameraInfo::read(const std::filesystem::path& path) {
   const bool fisheye = model == "equidistant" || model == "fisheye";
   if (std::any_of(d.begin(), d.end(), bends)) {
     if (fisheye || std::any_of(d.begin() + std::min<std::ptrdiff_t>(5, std::ssize(d)), d.end(), bends)) {
-      throw FileError(path.string() + ": distortion of model '" + model +
+      throw FileError(where + ": distortion of model '" + model +
                       "' is not one of k1 k2 p1 p2 k3 alone; rectify the pictures first (image_proc) and give the "
                       "camera_info of these");
     }

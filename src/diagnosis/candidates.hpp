@@ -1,51 +1,76 @@
 #pragma once
 
-#include <memory>
+#include <cstdint>
+#include <string>
 #include <utility>
 #include <vector>
 
-#include "bodyschema/diagnosis/diagnoser.hpp"
-#include "bodyschema/diagnosis/selection.hpp"
-#include "regression.hpp"
+#include "block_regression.hpp"
+#include "bodyschema/diagnosis/diagnosis_report.hpp"
+#include "bodyschema/evidence/log_fit.hpp"
+#include "bodyschema/evidence/state.hpp"
 
 namespace bodyschema::diagnosis {
 
-/// Everything that is tested on a log: the columns of the regression and which belong to what.
-struct CandidateSet {
-  std::vector<SparseColumn> columns;
-  Columns offsets;  ///< one per arm joint, always fitted
-  std::vector<Candidate> candidates;
-  [[nodiscard]] std::vector<const SparseColumn*> pointers() const;
+/// What may be wrong: an effect of the catalogue, a nuisance beyond what is believed of it, or a free curve over what a
+/// joint does ("unexplained").
+struct Candidate {
+  CauseName cause;
+  std::string variable;                ///< of a free curve: what it follows
+  std::vector<std::size_t> parameters; ///< positions among the effect's fitted parameters
+  Microseconds from = 0;               ///< of a slip: the first picture after it
+  std::vector<std::vector<double>> amounts{};  ///< of a free curve: [column][picture], rad of the joint
+  AddedColumns columns{};
+  Scores scores{};
+  [[nodiscard]] bool generic() const { return !variable.empty(); }
+  [[nodiscard]] double z() const { return scores.u.rows() == 0 ? 0.0 : scores.z(); }
 };
 
-/// The catalogue but for `excluded` causes, and the generic features per arm joint. Columns of
-/// effects are secants from zero to their typical sizes.
-CandidateSet make_candidates(MeasurementSource& source, const Linearisation& at, const BlockPlan& plan,
-                             const CoordinateLayout& layout, const std::vector<CauseName>& nuisances,
-                             const std::vector<NotTestable>& excluded);
+/// A log about one state: what every picture says about the state's parameters and about everything else that may be
+/// wrong, summed up in blocks.
+struct LogAbout {
+  explicit LogAbout(State s) : state(std::move(s)) {}
+  State state;
+  LinearLog at;                                   ///< over all coordinates
+  std::vector<double> precision;                  ///< per picture: 1 / variance of a residual, 1/px^2; 0: nothing seen
+  /// [picture][column]: the state's parameters, the free curves that were found, and what is not estimated but may be
+  /// wrong within the robot's tolerances or a picture's sharpness.
+  std::vector<std::vector<Direction>> base;
+  std::vector<double> considered_sd;              ///< of the last columns
+  std::vector<std::size_t> block_of;              ///< per picture
+  std::size_t blocks = 0;
+  double block_s = 0.0;
+  std::vector<CauseName> found;                   ///< causes that are in the state already
+};
 
-/// When the hand came into view and when it was last seen, s: a log may begin with an empty room.
-std::pair<double, double> seen_span(const MeasurementSource& source, const Linearisation& at);
+/// Values of a direction against a picture's evidence.
+double gradient(const OutlineEvidence& evidence, const Direction& direction);
+double product(const OutlineEvidence& evidence, const Direction& a, const Direction& b);
 
-/// Takes columns out of candidates that the offsets make up for exactly (one direction of a tilted
-/// axis can be two offsets), so that the rest of the candidate can be tested.
-void drop_aliased_columns(const BlockStatistics& statistics, CandidateSet& set);
+/// Sums over blocks of the base's own directions.
+std::vector<BaseBlock> base_blocks(const LogAbout& log);
+/// Of others. @param directions  [picture][column]
+AddedColumns added_columns(const LogAbout& log, const std::vector<std::vector<Direction>>& directions);
 
-/// What this log cannot test whatever the residuals are: joints that hardly moved or never turned
-/// round, no masses, too slow, one camera, encoders too sparse.
-std::vector<NotTestable> untestable(const MeasurementSource& source, const Linearisation& at);
+/// Every candidate that this log can test beside the state, with its columns.
+/// @param untestable  by the motion alone; left out
+std::vector<Candidate> catalogue_candidates(LogFit& fit, const LogAbout& log, const std::vector<NotTestable>& untestable);
+/// Free curves of every arm joint over time, angle, velocity, acceleration and torque.
+std::vector<Candidate> free_curves(LogFit& fit, const LogAbout& log);
+/// How a joint's correction by these amounts moves the pictures: [picture][column].
+std::vector<std::vector<Direction>> along_joint(const LogFit& fit, Eigen::Index joint,
+                                                const std::vector<std::vector<double>>& amounts);
+/// A slip of every arm joint at every picture, scored. `best` keeps of every joint the time that stands out most.
+struct Slips {
+  std::vector<Scores> all;
+  std::vector<Candidate> best;
+};
+Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<NotTestable>& untestable);
 
-/// Whether the arm passes every posture once: no joint turns round twice. Then whatever follows an angle
-/// follows time as well.
-bool passes_once(const MeasurementSource& source);
+/// Whether a cause would stand out of a log, with this threshold of z, before it is larger than on any robot.
+bool is_told(const Candidate& candidate, const JointRoles& roles, double threshold);
 
-bool is_excluded(const std::vector<NotTestable>& excluded, const CauseName& cause);
-
-/// What a cause looks like in every log of this kind, whatever its numbers say: while the head stands
-/// still, lengths between base and eyes, errors of neck and eye tilt and a common shift of the pictures.
-std::vector<CauseName> lookalikes(const MeasurementSource& source, const CauseName& cause);
-
-/// The motion that would tell the causes of a class apart.
-std::string splitting_motion(const std::vector<CauseName>& same);
+/// First and last picture in which the robot was found, s since the Unix epoch.
+std::pair<double, double> seen_span(const LogFit& fit, const LinearLog& at);
 
 }  // namespace bodyschema::diagnosis

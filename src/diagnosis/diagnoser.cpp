@@ -1,449 +1,303 @@
+#include <cstdlib>
+#include <cstdio>
 #include "bodyschema/diagnosis/diagnoser.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
-#include <optional>
-#include <sstream>
+#include <cmath>
+#include <map>
 #include <utility>
 
+#include "block_regression.hpp"
 #include "bodyschema/core/error.hpp"
-#include "bodyschema/diagnosis/detectable.hpp"
-#include "bodyschema/effects/catalogue.hpp"
+#include "bodyschema/evidence/distributions.hpp"
 #include "candidates.hpp"
-#include "extension.hpp"
 #include "findings.hpp"
-#include "model_fit.hpp"
-#include "nearer_model.hpp"
+#include "limits.hpp"
+#include "log_motion.hpp"
+#include "model_search.hpp"
 #include "verdict.hpp"
 
 namespace bodyschema {
+namespace diagnosis {
 namespace {
-
-using namespace diagnosis;
 
 class Diagnoser {
  public:
-  Diagnoser(MeasurementSource& source, const DiagnosisOptions& options)
-      : source_(source), options_(options), layout_(source.roles()), fitter_(source, layout_, options.block_s) {}
+  Diagnoser(LogFit& fit, const std::vector<Belief>& beliefs, const std::vector<Belief>& tolerances,
+            const DiagnosisOptions& options)
+      : fit_(fit), options_(options), search_(fit, beliefs, tolerances, options) {}
 
   DiagnosisReport run() {
     refuse_unusable();
-    fit_baseline();
-    auto found = search(before_.at, baseline_);
-    // Where counterparts were looked for about a model far from the truth, once more from where the
-    // first answer leads.
-    std::optional<std::pair<Linearisation, ErrorModel>> nearer;
-    if (far_off(found)) {
-      nearer.emplace(std::move(found.after.at), found.extended);
-      found = search(nearer->first, nearer->second);
+    report_.not_testable = untestable(fit_.log().roles(), motion());
+    progress(0.02);
+    search_.start();
+    search_.look_for_lost_part();
+    search_.polish(options_.block_s);
+    progress(0.2);
+    Findings findings(fit_, search_, options_, report_);
+    const auto begin = search_.about(options_.block_s);
+    findings.before(begin);
+    for (std::size_t round = 0; round < limits::kMostCauses && take_one(round); ++round) {
+      progress(0.2 + 0.1 * static_cast<double>(round + 1));
     }
-    look_for_far_slip(found, nearer);
-    // Blocks were as long as the noise in rests of the arm seemed to ask for. A slip or a drift that
-    // falls into a rest looks like slow noise until it is known; then shorter blocks show more.
-    const auto shorter = plan_blocks(source_, found.after.at.views, options_.block_s);
-    if (shorter.length_s < kWorthwhile * fitter_.plan().length_s) {
-      fitter_.set_plan(shorter);
-      fitter_.accumulate_on({}, before_);
-      found = nearer ? search(nearer->first, nearer->second) : search(before_.at, baseline_);
-    }
-    if (searches() && (found.after.at.rms_px() > options_.noise_rms_px || much_at_once(found))) look_nearer(found);
-    leave_out_causes(found);
-    auto report = findings(source_, options_.selection, layout_, fitter_.plan(), found, baseline_, before_, excluded_,
-                           options_.systematic_share, options_.systematic_error);
-    word_verdict(report, options_);
+    while (drop_one()) {}
+    search_.polish(block_s_);
+    progress(0.85);
+    findings.conclude(search_.about(block_s_), candidates_of_end());
+    word_verdict(report_, fit_.log().roles());
     progress(1.0);
-    return report;
+    return std::move(report_);
   }
 
  private:
-  static constexpr double kWorthwhile = 0.8;
-  static constexpr double kFar_px = 1.0;  ///< Huber's cost counts every pixel beyond it less
-  static constexpr double kBetter = 0.8;
-
-  void fit_baseline() {
-    baseline_ = baseline_model();
-    fit_offsets();
-    offsets_alone_ = baseline_;
-    before_ = fitter_.fit(baseline_, {}, {options_.baseline_iterations, between(0.1, 0.5)});
-    if (2 * seen(before_.at) < before_.at.views.size()) {
-      // Parts of another shape: their outlines lie further off, however well they are placed.
-      constexpr double kOtherShape_px = 10.0;
-      other_shape_ = true;
-      fitter_.set_finest(kOtherShape_px);
-      baseline_ = offsets_alone_;
-      before_ = fitter_.fit(baseline_, {}, {options_.baseline_iterations, {}});
-    }
-    check_seen(before_.at);
-    // Once, on the residuals of the fitted baseline.
-    fitter_.set_plan(plan_blocks(source_, before_.at.views, options_.block_s));
-    fitter_.accumulate_on({}, before_);
-    excluded_ = untestable(source_, before_.at);
-    drop_untestable_nuisances();
-  }
-
-  /// A nuisance that this log says nothing about (vergence, of one camera) would end anywhere, unseen.
-  void drop_untestable_nuisances() {
-    const auto effects = baseline_.size();
-    for (const auto& nuisance : options_.nuisances) {
-      if (is_excluded(excluded_, nuisance)) baseline_.remove(nuisance.name, {nuisance.joint, nuisance.source});
-    }
-    if (baseline_.size() == effects) return;
-    before_ = fitter_.fit(baseline_, {}, {.iterations = options_.refit_iterations, .from_afar = false});
-    fitter_.set_plan(plan_blocks(source_, before_.at.views, options_.block_s));
-    fitter_.accumulate_on({}, before_);
-  }
-
-  /// What a cause is worth shows against a model without it: nuisances that are causes go back to zero.
-  void leave_out_causes(const Found& found) {
-    bool changed = false;
-    for (const auto& cause : found.selection.causes) {
-      auto ids = cause.same;
-      ids.insert(ids.end(), cause.replaced.begin(), cause.replaced.end());
-      ids.push_back(cause.candidate);
-      for (const auto c : ids) {
-        const auto& candidate = found.set.candidates[c];
-        if (!candidate.nuisance) continue;
-        baseline_.remove(candidate.name, candidate.target);
-        changed = true;
-      }
-    }
-    for (const auto& cause : options_.fixed_causes.value_or(std::vector<CauseName>{})) {
-      const EffectTarget target{cause.joint, cause.source};
-      if (!contains(options_.nuisances, cause) || baseline_.find(cause.name, target) == nullptr) continue;
-      baseline_.remove(cause.name, target);
-      changed = true;
-    }
-    if (changed) before_ = fitter_.fit(baseline_, {}, {.iterations = options_.refit_iterations, .from_afar = false});
-  }
-
-  /// Where much of the outline stays out of sight: the search once more from a slip that brings it near. Half of it out
-  /// of sight looks like parts of another shape, too.
-  void look_for_far_slip(Found& found, std::optional<std::pair<Linearisation, ErrorModel>>& nearer) {
-    constexpr double kUsuallyFound = 0.85, kUnlike = 6.0;
-    if (!searches()) return;
-    const auto turn = turning(source_, found.after.at);
-    if (found.after.at.rms_px() <= options_.noise_rms_px && outline_found(found.after.at) >= kUsuallyFound &&
-        !(turn && turn->unlike >= kUnlike) && !other_shape_) {
-      return;
-    }
-    const double finest_px = fitter_.finest();
-    fitter_.set_finest(ModelFitter::kFinest_px);
-    if (auto start = slipped_start(source_, fitter_, offsets_)) {
-      // Nuisances beside it from the beginning: their estimates are of use only with the offsets that belong to them.
-      for (std::size_t e = 0; e < baseline_.size(); ++e) {
-        const auto& effect = std::as_const(baseline_)[e];
-        if (effect.name() != "joint_offset") start->add(effect.name(), effect.target());
-      }
-      auto at = fitter_.fit(*start, {}, {.iterations = options_.refit_iterations, .from_afar = false}).at;
-      auto again = search(at, *start);
-      const double outline = outline_points(before_.at);
-      if (plausible(again.extended) && misfit(again.after.at, outline) < kBetter * misfit(found.after.at, outline)) {
-        found = std::move(again);
-        nearer.emplace(std::move(at), std::move(*start));
-        if (other_shape_) before_ = fitter_.about(baseline_, {});
-        other_shape_ = false;
-        return;
-      }
-    }
-    fitter_.set_finest(finest_px);
-    fitter_.look_closely();
-  }
-
-  /// Much is wrong at once: causes that were tried for real, if they are plausible and leave less.
-  void look_nearer(Found& found) {
-    if (other_shape_) return;
-    fitter_.look_closely();
-    // While the head stands still a shifted base stands for whatever lies between base and eyes.
-    const auto excluded = excluded_;
-    std::erase_if(excluded_, [](const auto& item) { return item.cause.name == "base_shift"; });
-    auto again = found_nearer();
-    const double outline = outline_points(before_.at);
-    // What no robot can be gives way to anything plausible that is better than offsets alone.
-    const auto& to_beat = plausible(found.extended) ? found.after.at : before_.at;
-    if (again && plausible(again->extended) && misfit(again->after.at, outline) < misfit(to_beat, outline)) {
-      found = std::move(*again);
-    } else {
-      excluded_ = excluded;
-    }
-  }
-
-  std::optional<Found> found_nearer() {
-    std::vector<CauseName> causes;
-    for (const auto& name : effect_names()) {
-      if (name == "joint_offset" || name == "slip" || name == "drift") continue;  // need a time
-      for (const auto& target : effect_targets(name, source_.roles())) {
-        const CauseName cause{name, target.joint, target.source};
-        // Nuisances are fitted in any case, once the outlines are near.
-        if (!is_excluded(excluded_, cause) && !contains(options_.nuisances, cause)) causes.push_back(cause);
-      }
-    }
-    const auto model = nearer_model(source_, layout_, fitter_, offsets_, causes);
-    fitter_.look_closely();
-    if (!model) return std::nullopt;
-    // What lies between base and eyes is the shift's now; else the head's nuisances share it at will.
-    auto nuisances = options_.nuisances;
-    const auto found_causes = causes_of(*model);
-    if (contains(found_causes, {"base_shift", "", ""})) {
-      std::erase_if(nuisances, [](const auto& nuisance) { return nuisance.name == "head_offset"; });
-    }
-    return search(fitter_.about(*model, {}).at, *model, nuisances, found_causes);
-  }
-
-  static bool contains(const std::vector<CauseName>& causes, const CauseName& cause) {
-    return std::find(causes.begin(), causes.end(), cause) != causes.end();
-  }
-
-  [[nodiscard]] ErrorModel offsets_at(const std::map<std::string, double>& start) const {
-    ErrorModel offsets(source_.roles());
-    for (const auto& target : effect_targets("joint_offset", source_.roles())) {
-      const auto given = start.find(target.joint);
-      offsets.add("joint_offset", target).parameters()[0].value = given == start.end() ? 0.0 : given->second;
-    }
-    return offsets;
-  }
-
-  static std::vector<CauseName> causes_of(const ErrorModel& model) {
-    std::vector<CauseName> causes;
-    for (std::size_t e = 0; e < model.size(); ++e) {
-      if (model[e].name() == "joint_offset") continue;
-      causes.push_back({model[e].name(), model[e].target().joint, model[e].target().source});
-    }
-    return causes;
-  }
-
-  /// Offsets alone before all else: nuisances let loose on outlines tens of pixels away run off.
-  void fit_offsets() {
-    constexpr double kStuck_px = 1.5, kWidest_px = 40.0;
-    const auto from = [&](ErrorModel offsets) {
-      const double left_px = fitter_.approach(offsets, {}, kWidest_px);
-      return std::pair{left_px, std::move(offsets)};
-    };
-    auto best = from(offsets_at(options_.start_offsets));
-    const auto try_from = [&](ErrorModel start) {
-      if (best.first <= kStuck_px) return;
-      auto other = from(std::move(start));
-      if (other.first < best.first) best = std::move(other);
-    };
-    if (!options_.start_offsets.empty()) try_from(offsets_at({}));
-    if (best.first > kStuck_px) {
-      for (auto& start : scattered_starts(source_, best.second)) try_from(std::move(start));
-    }
-    offsets_ = best.second;
-    for (std::size_t e = 0; e < best.second.size(); ++e) {
-      const auto& offset = std::as_const(best.second)[e];
-      baseline_.find("joint_offset", offset.target())->parameters()[0].value = offset.parameters()[0].value;
-    }
-    progress(0.1);
-  }
-
-  /// One pass over the catalogue, linear about `at`, the linearisation of `model`.
-  Found search(const Linearisation& at, const ErrorModel& model) {
-    return search(at, model, options_.nuisances, options_.fixed_causes.value_or(std::vector<CauseName>{}));
-  }
-  /// @param given  causes to begin with
-  Found search(const Linearisation& at, const ErrorModel& model, const std::vector<CauseName>& nuisances,
-               const std::vector<CauseName>& given) {
-    const auto& plan = fitter_.plan();
-    Found found{make_candidates(source_, at, plan, layout_, nuisances, excluded_), {}, baseline_, {}};
-    auto& set = found.set;
-    set_sizes(set);
-    const auto bare = only_offsets(source_, layout_, at, model);
-    const auto statistics = accumulate(bare, plan, set.pointers(), set.offsets.size());
-    progress(0.6);
-    drop_aliased_columns(statistics, set);
-    auto rules = options_.selection;
-    rules.search = searches();
-    rules.one_pass = passes_once(source_);
-    rules.given = candidates_of(set, given);
-    found.selection = select_causes(statistics, set.offsets, set.candidates, rules);
-    progress(0.65);
-
-    auto extension =
-        extend(baseline_with(nuisances, model), found.selection, {source_, layout_, plan, at, bare, set, statistics});
-    found.extended = std::move(extension.model);
-    begin_where_better(model, found.extended);
-    found.after = fitter_.fit(found.extended, extension.generic, {options_.refit_iterations, between(0.65, 0.9)});
-    fitter_.look_closely();
-    if (rules.search && retime_slips(source_, found.extended)) {
-      found.after = fitter_.fit(found.extended, extension.generic, {options_.refit_iterations, {}});
-    }
-    // What looked like a cause only because others were taken for linear is none.
-    while (rules.search && drop_weakest(found.selection, set, found.after, rules, found.extended)) {
-      found.after = fitter_.fit(found.extended, extension.generic, {options_.refit_iterations, {}});
-    }
-    return found;
-  }
-
-  /// The baseline's effects of these nuisances and the offsets of `model`.
-  [[nodiscard]] ErrorModel baseline_with(const std::vector<CauseName>& nuisances, ErrorModel model) const {
-    auto result = baseline_;
-    for (const auto& nuisance : options_.nuisances) {
-      if (!contains(nuisances, nuisance)) result.remove(nuisance.name, {nuisance.joint, nuisance.source});
-    }
-    for (const auto& target : effect_targets("joint_offset", source_.roles())) {
-      auto* offset = model.find("joint_offset", target);
-      if (offset == nullptr) continue;
-      result.find("joint_offset", target)->parameters()[0].value = offset->parameters()[0].value;
-    }
-    return result;
-  }
-
-  /// A linear estimate that leads away from the outlines is taken back towards the model about which it is linear, and
-  /// all the way where they are lost from sight: no fit comes back from there.
-  void begin_where_better(const ErrorModel& about, ErrorModel& extended) {
-    constexpr int kHalvings = 3;
-    auto without = extended, model = about;
-    for (std::size_t e = 0; e < without.size(); ++e) {
-      auto* known = model.find(without[e].name(), without[e].target());
-      for (std::size_t p = 0; p < without[e].parameters().size(); ++p) {
-        auto& parameter = without[e].parameters()[p];
-        if (!parameter.fitted) continue;
-        parameter.value = known != nullptr ? known->parameters()[p].value : 0.0;
-      }
-    }
-    const double outline = outline_points(before_.at);
-    const double least = misfit(before_.at, outline);
-    for (int i = 0; i < kHalvings; ++i) {
-      if (misfit(linearise(source_, extended), outline) <= least) return;
-      go_half_way(without, extended);
-    }
-    if (2 * seen(linearise(source_, extended)) < seen(before_.at)) extended = std::move(without);
-  }
-
-  [[nodiscard]] bool far_off(const Found& found) const {
-    const double outline = outline_points(before_.at);
-    const double before = misfit(before_.at, outline), after = misfit(found.after.at, outline);
-    return searches() && !found.selection.causes.empty() && far(before_.at) && after < kBetter * before;
-  }
-  /// Several large causes, and small ones beside them: they may share what one that was not tried takes away.
-  [[nodiscard]] bool much_at_once(const Found& found) const {
-    return found.selection.crowded && found.selection.causes.size() >= options_.selection.crowd;
-  }
-  [[nodiscard]] bool searches() const { return options_.selection.search && !options_.fixed_causes; }
-  [[nodiscard]] static bool far(const Linearisation& at) {
-    return typical_distance_px(misfit(at, outline_points(at))) > kFar_px;
-  }
-
-  /// Which sizes are worth naming, in units of the candidates' columns.
-  void set_sizes(CandidateSet& set) const {
-    for (auto& candidate : set.candidates) {
-      if (candidate.generic()) continue;
-      const auto effect = make_effect(candidate.name, candidate.target, source_.roles());
-      const auto& p = std::as_const(*effect).parameters()[0];
-      const double column_per_unit = p.si_per_unit / p.typical;
-      candidate.detectable = detectable_size(candidate.name, candidate.target, source_.roles()) * column_per_unit;
-      const auto at = options_.tolerances.find(candidate.name);
-      if (!(candidate.nuisance || candidate.slip) || at == options_.tolerances.end()) continue;
-      candidate.tolerance = at->second * column_per_unit;
-    }
-  }
-
   void progress(double share) const {
     if (options_.progress) options_.progress(share);
   }
-  [[nodiscard]] std::function<void(double)> between(double from, double to) const {
-    return [this, from, to](double share) { progress(from + (to - from) * share); };
+
+  [[nodiscard]] LogMotion motion() const {
+    std::vector<JointSample> joints;
+    std::vector<bool> seen(fit_.log().rig().cameras.size(), false);
+    for (const auto& picture : fit_.log().pictures()) {
+      joints.push_back(picture.joints);
+      seen[picture.camera] = true;
+    }
+    const auto& log = fit_.log();
+    return log_motion(joints, static_cast<std::size_t>(std::count(seen.begin(), seen.end(), true)), log.encoders(),
+                      log.robot(), log.setup(), log.roles());
   }
 
   void refuse_unusable() const {
-    const auto views = source_.views();
-    const char* advice =
-        "; record 60 to 120 s of arm motion before both eyes, slow and fast, the "
-        "same postures in both directions, with 15 s of rest";
-    if (views.empty() || source_.stream().empty()) {
-      throw DataError(std::string("the log holds no usable pictures with encoders") + advice);
+    const auto pictures = fit_.log().pictures();
+    const double length = pictures.empty() ? 0.0 : seconds(pictures.back().joints.utime - pictures.front().joints.utime);
+    std::size_t postures = 0;
+    Eigen::VectorXd last;
+    for (const auto& picture : pictures) {
+      Eigen::VectorXd q(static_cast<Eigen::Index>(fit_.log().roles().arm.size()));
+      Eigen::Index i = 0;
+      for (const auto joint : fit_.log().roles().arm) q[i++] = picture.joints.q[joint];
+      if (last.size() > 0 && (q - last).cwiseAbs().maxCoeff() < limits::kJump_rad) continue;
+      last = q;
+      ++postures;
     }
-    const double span = seconds(views.back().joints.utime - views.front().joints.utime);
-    if (span < options_.shortest_log_s) {
-      std::ostringstream text;
-      text << "the log is too short to be diagnosed: " << span << " s, expected at least " << options_.shortest_log_s
-           << " s" << advice;
-      throw DataError(text.str());
+    if (postures <= 1) {
+      throw DataError("the arm stands still in every picture; move it through its range while recording");
     }
-    for (std::size_t v = 1; v < views.size(); ++v) {
-      if (views[v].joints.utime < views[v - 1].joints.utime) {
-        throw DataError("the log's pictures are not in order of time; record it again or sort it");
+    if (length < options_.shortest_log_s && postures < options_.fewest_postures) {
+      throw DataError(fmt::format("{:.1f} s of pictures in {} postures are too few; record at least {:.0f} s, better 60 s, "
+                                  "or {} postures",
+                                  length, postures, options_.shortest_log_s, options_.fewest_postures));
+    }
+  }
+
+  /// All candidates about the present model, scored, in blocks long enough that neighbours do not err alike.
+  struct Field {
+    LogAbout log;
+    BlockRegression base;
+    std::vector<Candidate> candidates;  ///< the catalogue's, free curves, of each joint the best slip
+    double threshold = 0.0;
+  };
+  Field field() {
+    for (double block_s = std::max(block_s_, options_.block_s);; block_s *= 2.0) {
+      LogAbout log = search_.about(block_s);
+      BlockRegression base = search_.regression(log);
+      auto candidates = catalogue_candidates(fit_, log, report_.not_testable);
+      auto curves = free_curves(fit_, log);
+      std::move(curves.begin(), curves.end(), std::back_inserter(candidates));
+      std::vector<Scores> scores;
+      for (auto& candidate : candidates) {
+        candidate.scores = base.score(candidate.columns);
+        scores.push_back(candidate.scores);
+      }
+      if (neighbours_alike(scores) > limits::kNeighboursAlike && log.blocks >= 2 * limits::kFewestBlocks) continue;
+      block_s_ = block_s;
+      auto slips = diagnosis::slips(log, base, report_.not_testable);
+      std::move(slips.all.begin(), slips.all.end(), std::back_inserter(scores));
+      std::move(slips.best.begin(), slips.best.end(), std::back_inserter(candidates));
+      const double threshold = chance_threshold(scores, options_.level, options_.seed);
+      return {std::move(log), std::move(base), std::move(candidates), threshold};
+    }
+  }
+
+  /// Finds the next cause and takes it into the model; false: there is none.
+  bool take_one(std::size_t round) {
+    Field field = this->field();
+    report_.z_threshold = field.threshold;
+    if (round == 0) leave_out_untold(field);
+    const Heldout without = field.base.heldout();
+    std::vector<Trial> trials;
+    for (const auto& candidate : field.candidates) {
+      const double z = candidate.z();
+      if (round == 0) add_bar(candidate, z);
+      if (z < field.threshold || candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
+      const bool refused = std::find(refused_.begin(), refused_.end(), candidate.cause) != refused_.end();
+      if (refused) continue;
+      Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0, true};
+      trial.gain = without.total() - trial.heldout.total();
+      trial.plausible = is_plausible(candidate, trial.heldout.estimate.tail(candidate.columns.size()));
+      if (trial.gain > 0.0) trials.push_back(std::move(trial));
+    }
+    std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.gain > b.gain; });
+    for (std::size_t i = 0; i < std::min<std::size_t>(12, trials.size()) && getenv("DBG"); ++i) {
+      const auto sz = size_of(field, trials[i]);
+      fprintf(stderr, "R%zu thr %.2f blocks %zu %s|%s t %.2f gain %.4g of %.4g est %.4g size %.2f mm %.2f px\n", round, field.threshold, field.log.blocks, trials[i].candidate->cause.text().c_str(), trials[i].candidate->variable.c_str(), trials[i].candidate->z(), trials[i].gain, without.total(), trials[i].heldout.estimate.tail(trials[i].candidate->columns.size())[0], 1e3*sz.metres(), sz.outline_px);
+    }
+    // What would be larger than on any robot stands in for something else, if anything plausible does as well.
+    std::stable_partition(trials.begin(), trials.end(), [](const Trial& t) { return t.plausible; });
+    while (!trials.empty()) {
+      const Trial* best = choose(trials);
+      const auto cause = best->candidate->cause;
+      if (take(field, *best)) return true;
+      if (!best->candidate->generic()) refused_.push_back(cause);
+      std::erase_if(trials, [&](const Trial& t) { return &t == best || t.candidate->cause == cause; });
+    }
+    return false;
+  }
+
+  struct Trial {
+    const Candidate* candidate;
+    Heldout heldout;
+    double gain;
+    bool plausible;
+  };
+
+  [[nodiscard]] bool is_plausible(const Candidate& candidate, const Eigen::VectorXd& estimate) const {
+    if (candidate.generic()) return true;
+    const auto effect =
+        make_effect(candidate.cause.name, {candidate.cause.joint, candidate.cause.source}, fit_.log().roles());
+    Eigen::Index i = 0;
+    for (const auto& p : std::as_const(*effect).parameters()) {
+      if (p.fitted && std::abs(estimate[i++]) > limits::kImplausible * p.typical) return false;
+    }
+    return true;
+  }
+
+  /// The best known cause, or a free curve where that explains much more than any known one. Of causes that explain
+  /// alike the simplest.
+  static const Trial* choose(const std::vector<Trial>& trials) {
+    const auto known = std::find_if(trials.begin(), trials.end(), [](const Trial& t) { return !t.candidate->generic(); });
+    const auto generic = std::find_if(trials.begin(), trials.end(), [](const Trial& t) { return t.candidate->generic(); });
+    if (known == trials.end()) return &*generic;
+    if (generic != trials.end() && generic->gain > limits::kGenericGain * known->gain) return &*generic;
+    constexpr double kAlike = 0.02;  // of the gain
+    const Trial* best = &*known;
+    for (const auto& trial : trials) {
+      const bool simpler = !trial.candidate->generic() &&
+                           trial.candidate->parameters.size() < best->candidate->parameters.size();
+      if (simpler && trial.gain > (1.0 - kAlike) * known->gain) best = &trial;
+    }
+    return best;
+  }
+
+  /// What it moves, the joints' offsets fitted anew; of a nuisance, all that it departs from what is believed of it.
+  Size size_of(const Field& field, const Trial& trial) {
+    const auto& candidate = *trial.candidate;
+    Eigen::VectorXd amount = trial.heldout.estimate.tail(candidate.columns.size());
+    if (!candidate.generic()) {
+      const auto nuisance = search_.columns_of(candidate.cause);
+      if (!nuisance.empty() && static_cast<Eigen::Index>(nuisance.size()) != amount.size()) return {};
+      if (!nuisance.empty()) amount = search_.state().x()(nuisance);
+    }
+    const auto joints = search_.state().joints();
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(joints, joints), B = Eigen::MatrixXd::Zero(joints, amount.size());
+    for (std::size_t b = 0; b < field.base.blocks(); ++b) {
+      H += field.base.parts()[b].H.topLeftCorner(joints, joints);
+      B += candidate.columns.B[b].topRows(joints);
+    }
+    H.diagonal() += field.base.precision().head(joints);
+    return search_.size_of(field.log, directions_of(fit_, field.log, candidate), amount, -H.ldlt().solve(B * amount));
+  }
+
+  bool take(const Field& field, const Trial& trial) {
+    const auto& candidate = *trial.candidate;
+    FoundCause cause{.name = candidate.cause, .variable = candidate.variable, .from = candidate.from};
+    const auto [begin, end] = seen_span(fit_, field.log.at);
+    cause.begin_s = begin;
+    cause.duration_s = end - begin;
+    cause.amounts = candidate.amounts;
+    cause.small = size_of(field, trial).metres() < options_.matters_m;
+    return search_.add(cause, trial.heldout.estimate, field.base.size());
+  }
+
+  /// Takes out the cause that the log needs least, where it does not need it any more.
+  bool drop_one() {
+    if (search_.causes().empty()) return false;
+    const LogAbout log = search_.about(block_s_);
+    const BlockRegression all = search_.regression(log);
+    const double with = all.heldout().total();
+    std::size_t worst = 0;
+    double least = 1e300;
+    for (std::size_t c = 0; c < search_.causes().size(); ++c) {
+      const auto [base, own, kept] = without(search_, all, search_.columns_of(c));
+      const double t = base.score(own).z();
+      const double gain = base.heldout().total() - with;
+      const double strength = gain > 0.0 ? t : 0.0;
+      if (getenv("DBG")) fprintf(stderr, "drop? %s t %.2f gain %.3g\n", search_.causes()[c].name.text().c_str(), t, gain);
+      if (strength >= least) continue;
+      least = strength;
+      worst = c;
+    }
+    if (least >= report_.z_threshold) return false;
+    refused_.push_back(search_.causes()[worst].name);
+    search_.drop(worst);
+    return true;
+  }
+
+  std::vector<Candidate> candidates_of_end() {
+    Field field = this->field();
+    for (const auto& candidate : field.candidates) {
+      for (auto& bar : report_.bars) {
+        if (bar.label == label_of(candidate)) bar.z_after = std::max(bar.z_after, candidate.z());
       }
     }
+    return std::move(field.candidates);
   }
 
-  static std::size_t seen(const Linearisation& at) {
-    return static_cast<std::size_t>(
-        std::count_if(at.views.begin(), at.views.end(), [](const auto& view) { return view.weight > 0.0; }));
+  static std::string label_of(const Candidate& candidate) {
+    return candidate.generic() ? candidate.cause.joint + " against its " + candidate.variable : candidate.cause.text();
   }
 
-  static double outline_found(const Linearisation& at) {
-    double outline = 0.0, matched = 0.0;
-    for (const auto& view : at.views) {
-      outline += view.outline;
-      matched += view.matched;
+  void add_bar(const Candidate& candidate, double t) {
+    const auto label = label_of(candidate);
+    for (auto& bar : report_.bars) {
+      if (bar.label != label) continue;
+      bar.z_before = std::max(bar.z_before, t);
+      return;
     }
-    return outline > 0.0 ? matched / outline : 1.0;
+    report_.bars.push_back({.label = label, .generic = candidate.generic(), .z_before = t});
   }
 
-  static void check_seen(const Linearisation& at) {
-    if (4 * seen(at) < at.views.size()) {
-      throw DataError("the hand's outline was found in " + std::to_string(seen(at)) + " of " +
-                      std::to_string(at.views.size()) +
-                      " pictures; keep the hand in view of both eyes and check the masks");
-    }
-  }
-
-  [[nodiscard]] ErrorModel baseline_model() const {
-    ErrorModel model(source_.roles());
-    for (const auto& target : effect_targets("joint_offset", source_.roles())) {
-      model.add("joint_offset", target);
-    }
-    for (const auto& nuisance : options_.nuisances) {
-      model.add(nuisance.name, {nuisance.joint, nuisance.source});
-    }
-    return model;
-  }
-
-  static std::vector<std::size_t> candidates_of(const CandidateSet& set, const std::vector<CauseName>& causes) {
-    std::vector<std::size_t> ids;
-    for (const auto& cause : causes) {
-      for (std::size_t c = 0; c < set.candidates.size(); ++c) {
-        if (!set.candidates[c].slip && name_of(set.candidates[c]) == cause) ids.push_back(c);
+  /// What offsets and nuisances make up for in this log, and what so few blocks would show only if it were larger than
+  /// on any robot.
+  void leave_out_untold(const Field& field) {
+    const auto& roles = fit_.log().roles();
+    for (const auto& candidate : field.candidates) {
+      if (candidate.generic()) continue;
+      if (candidate.scores.independent.maxCoeff() < limits::kRounding) {
+        report_.not_testable.push_back({candidate.cause, "joint offsets and usual nuisances make up for it in this log"});
+        continue;
       }
+      const bool told = is_told(candidate, roles, field.threshold);
+      if (!told) report_.not_testable.push_back({candidate.cause, fmt::format("not testable with {} postures", field.log.blocks)});
     }
-    return ids;
   }
 
-  MeasurementSource& source_;
+  LogFit& fit_;
   const DiagnosisOptions& options_;
-  CoordinateLayout layout_;
-  ModelFitter fitter_;
-  ErrorModel baseline_{JointRoles{}};
-  ErrorModel offsets_{JointRoles{}};        ///< offsets and nothing else
-  ErrorModel offsets_alone_{JointRoles{}};  ///< the baseline with its nuisances at zero
-  bool other_shape_ = false;                ///< outlines lie far off however well the parts are placed
-  ModelFit before_;                         ///< about the baseline
-  std::vector<NotTestable> excluded_;
+  ModelSearch search_;
+  DiagnosisReport report_;
+  double block_s_ = 0.0;
+  std::vector<CauseName> refused_;
 };
 
 }  // namespace
+}  // namespace diagnosis
 
-std::string CauseName::text() const {
-  std::string text = name;
-  if (!joint.empty()) text += " of " + joint;
-  if (!source.empty()) text += (joint.empty() ? " " : " with ") + source;
-  return text;
-}
-
-std::vector<CauseName> usual_nuisances(const JointRoles& roles) {
-  std::vector<CauseName> list = {{"mesh_scale", "", ""}, {"silhouette_bias", "", ""}, {"focal_length", "", ""}};
-  if (!roles.fingers.empty()) list.push_back({"finger_posture", "", ""});
-  if (roles.has_pans()) list.push_back({"vergence", "", ""});
-  if (roles.neck.size() >= 4) {
-    for (const std::size_t i : {std::size_t{1}, std::size_t{3}}) {
-      list.push_back({"head_offset", roles.names[static_cast<std::size_t>(roles.neck[i])], ""});
-    }
-  }
-  return list;
-}
-
-DiagnosisReport diagnose(MeasurementSource& source, const DiagnosisOptions& options) {
-  return Diagnoser(source, options).run();
+DiagnosisReport diagnose(LogFit& fit, const std::vector<Belief>& beliefs, const std::vector<Belief>& tolerances,
+                         const DiagnosisOptions& options) {
+  return diagnosis::Diagnoser(fit, beliefs, tolerances, options).run();
 }
 
 }  // namespace bodyschema

@@ -93,6 +93,7 @@ class Page {
 
   Report write(const std::vector<std::pair<Image, std::string>>& pictures) {
     page_.verdict(d_.sentence);
+    if (!d_.side_left_over.empty()) page_.paragraph("Left over: " + d_.side_left_over + ".");
     causes();
     gain();
     if (!pictures.empty()) {
@@ -110,7 +111,7 @@ class Page {
  private:
   static constexpr Which kBefore = &ResidualSample::before, kAfter = &ResidualSample::after;
 
-  static std::string interval(const EstimatedParameter& p) {
+  static std::string interval(const DiagnosedParameter& p) {
     if (!std::isfinite(p.ci95[0]) || !std::isfinite(p.ci95[1])) return "not known";
     return fmt::format("{:.3g} to {:.3g}", p.ci95[0], p.ci95[1]);
   }
@@ -187,34 +188,30 @@ class Page {
   }
 
   void candidates() {
-    std::vector<CandidateBar> bars;
-    for (const auto& bar : d_.bars) {
-      if (bar.testable) bars.push_back(bar);
-    }
+    auto bars = d_.bars;
     if (bars.empty()) return;
     page_.heading("All candidates");
     page_.paragraph(fmt::format(
-        "How much of the residual of held-out blocks each cause of the catalogue takes away when it alone is "
-        "added to the model: before, to the model of offsets and usual nuisances; after, to the extended "
-        "one. A cause must take away {:.1f} %, stand out of the noise by z = {:.1f} (given with its name; "
-        "{:.1f} for a slip, a drift or a curve in time that takes away more than {:.0f} %), and beat the "
-        "others. Free curves (unexplained) must take away 1.5 % and beat every named cause clearly.",
-        100.0 * d_.gain_threshold, d_.z_threshold, d_.z_threshold_large, 100.0 * d_.gain_large));
+        "How far each cause of the catalogue, and each free curve over what a joint does, stands out of the noise when it "
+        "alone is added to the model: before, to the model of offsets and usual nuisances; after, to the extended one. "
+        "The noise is judged by how the blocks of the log differ. Of all candidates together, chance alone reaches "
+        "z = {:.1f} in one log of a hundred; a cause must exceed it, and move the hand or the outlines by what matters.",
+        d_.z_threshold));
     std::stable_sort(bars.begin(), bars.end(),
-                     [](const auto& a, const auto& b) { return a.gain_before > b.gain_before; });
+                     [](const auto& a, const auto& b) { return a.z_before > b.z_before; });
     const auto draw = [&](std::size_t from, std::size_t to, const std::string& title) {
       Chart chart;
       chart.kind = Chart::Kind::kBar;
       chart.horizontal = true;
       chart.title = title;
-      chart.y_label = "held-out gain, %";
-      chart.threshold = 100.0 * d_.gain_threshold;
-      chart.threshold_name = fmt::format("threshold {:.1f} %", 100.0 * d_.gain_threshold);
+      chart.y_label = "z";
+      chart.threshold = d_.z_threshold;
+      chart.threshold_name = fmt::format("threshold {:.1f}", d_.z_threshold);
       chart.series = {{.name = "before", .colour = kRed}, {.name = "after", .colour = kBlue}};
       for (std::size_t i = from; i < to; ++i) {
-        chart.labels.push_back(fmt::format("{}, z {:.1f}", bars[i].label, bars[i].z_before));
-        chart.series[0].y.push_back(100.0 * std::max(0.0, bars[i].gain_before));
-        chart.series[1].y.push_back(100.0 * std::max(0.0, bars[i].gain_after));
+        chart.labels.push_back(bars[i].label);
+        chart.series[0].y.push_back(bars[i].z_before);
+        chart.series[1].y.push_back(bars[i].z_after);
       }
       page_.chart(chart);
     };
@@ -449,10 +446,6 @@ class Page {
     page_.heading("The log");
     std::vector<std::string> items = {fmt::format("{:.1f} s, {} pictures used, {} blocks of {:.1f} s", d_.duration_s,
                                                   d_.views, d_.blocks, d_.block_s)};
-    if (d_.noise_correlation_s > 0.0) {
-      items.push_back(
-          fmt::format("noise stays alike for {:.2f} s (measured while the arm rested)", d_.noise_correlation_s));
-    }
     items.insert(items.end(), d_.warnings.begin(), d_.warnings.end());
     page_.list(items);
     page_.paragraph(

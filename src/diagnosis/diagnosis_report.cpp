@@ -36,7 +36,7 @@ Json json_of(const CauseName& c) {
   return j;
 }
 
-Json json_of(const EstimatedParameter& p) {
+Json json_of(const DiagnosedParameter& p) {
   Json j = {{"parameter", p.parameter},
             {"unit", p.unit},
             {"estimate", number(p.estimate)},
@@ -50,7 +50,7 @@ Json json_of(const DiagnosedCause& c) {
   Json j = json_of(c.cause);
   if (!c.variable.empty()) j["variable"] = c.variable;
   // The parameter that is furthest from zero stands for the cause; all are listed as well.
-  const EstimatedParameter* first = nullptr;
+  const DiagnosedParameter* first = nullptr;
   double best = -1.0;
   for (const auto& p : c.parameters) {
     const double half = 0.5 * (p.ci95[1] - p.ci95[0]);
@@ -64,6 +64,7 @@ Json json_of(const DiagnosedCause& c) {
   j["unit"] = first ? Json(first->unit) : Json(nullptr);
   j["estimate"] = first ? number(first->estimate) : Json(nullptr);
   j["ci95"] = first ? Json{number(first->ci95[0]), number(first->ci95[1])} : Json(nullptr);
+  j["sentence"] = c.sentence;
   j["class"] = Json::array();
   for (const auto& s : c.same) j["class"].push_back(json_of(s));
   j["z"] = number(c.z);
@@ -77,7 +78,14 @@ Json json_of(const DiagnosedCause& c) {
 
 }  // namespace
 
-std::string EstimatedParameter::when(Microseconds log_begin) const {
+std::string CauseName::text() const {
+  std::string text = name;
+  if (!joint.empty()) text += " of " + joint;
+  if (!source.empty()) text += (joint.empty() ? " " : " with ") + source;
+  return text;
+}
+
+std::string DiagnosedParameter::when(Microseconds log_begin) const {
   if (!from) return "";
   const double begin_s = seconds(*from - log_begin);
   if (!duration_s) return fmt::format("{:.1f} s into the log", begin_s);
@@ -117,13 +125,9 @@ std::string DiagnosisReport::to_json() const {
               {"duration_s", number(duration_s)},
               {"views", views},
               {"blocks", blocks},
-              {"block_s", number(block_s)},
-              {"noise_correlation_s", number(noise_correlation_s)}};
+              {"block_s", number(block_s)}};
   j["warnings"] = warnings;
-  j["out_of_sight"] = out_of_sight ? Json{{"from_s", number(out_of_sight->from_s)},
-                                          {"to_s", number(out_of_sight->to_s)},
-                                          {"share", number(out_of_sight->share)}}
-                                   : Json(nullptr);
+  j["side_left_over"] = optional_text(side_left_over);
   return j.dump(2) + "\n";
 }
 

@@ -1,399 +1,378 @@
 #include "findings.hpp"
 
-#include <Eigen/Cholesky>
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
-#include <set>
-#include <span>
-#include <spdlog/fmt/fmt.h>
-#include <utility>
-#include <vector>
+#include <mutex>
 
-#include "exclusion.hpp"
-#include "interval.hpp"
-#include "nearer_model.hpp"
+#include "bodyschema/evidence/distributions.hpp"
+#include "limits.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
 
-constexpr double kDeg = kPi / 180.0;
-
-CauseName cause_of(const Effect& effect) {
-  return {effect.name(), effect.target().joint, effect.target().source};
+Eigen::MatrixXd sum_of(const std::vector<Eigen::MatrixXd>& parts) {
+  Eigen::MatrixXd sum = parts.front();
+  for (std::size_t i = 1; i < parts.size(); ++i) sum += parts[i];
+  return sum;
 }
 
-std::optional<Microseconds> begin_of(const Effect& effect) {
-  if (effect.name() != "slip" && effect.name() != "drift") return std::nullopt;
-  return microseconds(effect.parameters()[1].value);
+/// A candidate's columns beside a base that lacks one of the model's causes, which is at zero in it.
+AddedColumns beside(const AddedColumns& columns, const std::vector<Eigen::Index>& kept, const std::vector<Eigen::Index>& out,
+                    const Eigen::VectorXd& value) {
+  AddedColumns result = columns;
+  for (std::size_t b = 0; b < columns.B.size(); ++b) {
+    result.B[b] = columns.B[b](kept, Eigen::all);
+    result.d[b] += columns.B[b](out, Eigen::all).transpose() * value;
+  }
+  return result;
 }
 
-std::optional<double> duration_of(const Effect& effect) {
-  if (effect.name() != "drift") return std::nullopt;
-  return effect.parameters()[2].value;
+std::vector<Eigen::Index> all_but(Eigen::Index n, const std::vector<Eigen::Index>& out) {
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (std::find(out.begin(), out.end(), i) == out.end()) kept.push_back(i);
+  }
+  return kept;
 }
 
-/// Views [first, last) of one instant, one a camera, in whatever order they are stamped: nearer to each
-/// other than half the time to a camera's next picture.
-std::vector<std::pair<std::size_t, std::size_t>> instants_of(std::span<const ViewInput> views) {
-  constexpr Microseconds kFurthest = 50'000, kRepeated = 5'000;
-  std::map<std::size_t, Microseconds> last_of;
-  std::vector<Microseconds> periods;
-  for (const auto& view : views) {
-    const auto last = last_of.find(view.camera);
-    const auto period = last != last_of.end() ? view.joints.utime - last->second : 0;
-    if (period > kRepeated) periods.push_back(period);
-    last_of[view.camera] = view.joints.utime;
+/// Values of a cause's parameters in the model; a free curve has none: it stands in the regression alone.
+Eigen::VectorXd values_of(const ModelSearch& search, const std::vector<Eigen::Index>& columns) {
+  const Eigen::VectorXd x = search.state().x();
+  Eigen::VectorXd values = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (columns[i] < x.size()) values[static_cast<Eigen::Index>(i)] = x[columns[i]];
   }
-  Microseconds apart = kFurthest;
-  if (!periods.empty()) {
-    const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
-    std::nth_element(periods.begin(), middle, periods.end());
-    apart = std::min(apart, *middle / 2);
-  }
-  std::vector<std::pair<std::size_t, std::size_t>> instants;
-  for (std::size_t first = 0, v = 0; v < views.size(); first = v) {
-    std::set<std::size_t> cameras;
-    while (v < views.size() && views[v].joints.utime - views[first].joints.utime <= apart &&
-           cameras.insert(views[v].camera).second) {
-      ++v;
-    }
-    instants.emplace_back(first, v);
-  }
-  return instants;
+  return values;
 }
-
-class Findings {
- public:
-  Findings(MeasurementSource& source, const SelectionOptions& rules, const CoordinateLayout& layout,
-           const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before,
-           double systematic_share, const std::map<std::string, double>& systematic_error)
-      : source_(source), rules_(rules), layout_(layout), plan_(plan), found_(found), baseline_(baseline),
-        before_(before),
-        rule_(found.after.fit, found.after.statistics->seen_blocks(), systematic_share, systematic_error),
-        jacobians_(source.views().size()) {}
-
-  DiagnosisReport report(const std::vector<NotTestable>& excluded) {
-    DiagnosisReport report;
-    add_facts(report);
-    report.not_testable = excluded;
-    add_uninformed(report);
-    report.crowded = found_.selection.crowded;
-    add_causes(report);
-    add_exclusion_limits(source_, layout_, plan_, found_, rule_, report);
-    add_bars(report);
-    add_offsets(report);
-    report.before = heldout(before_, report, true);
-    report.after = heldout(found_.after, report, false);
-    report.joint_corrections_before = joint_corrections(before_.at);
-    report.joint_corrections_after = joint_corrections(found_.after.at);
-    report.baseline_model = baseline_;
-    report.extended_model = found_.extended;
-    add_part_out_of_sight(report);
-    add_warnings(report);
-    return report;
-  }
-
- private:
-  /// @param common  of the value, what all blocks err in alike
-  [[nodiscard]] std::array<double, 2> interval(Eigen::Index column, const Effect& effect, const EffectParameter& p,
-                                               double common) const {
-    const double placed = rule_.placed(effect.name(), p);
-    const double half = rule_.half(found_.after.fit, column, common / p.typical, placed) * p.typical;
-    return {p.value - half, p.value + half};
-  }
-
-  void add_facts(DiagnosisReport& report) const {
-    report.begin_utime = source_.views().front().joints.utime;
-    report.z_threshold = rules_.z_enter;
-    report.gain_threshold = found_.selection.gain_floor;
-    report.z_threshold_large = rules_.z_large;
-    report.gain_large = rules_.gain_large;
-    report.duration_s = seconds(source_.views().back().joints.utime - source_.views().front().joints.utime);
-    report.block_s = plan_.length_s;
-    report.noise_correlation_s = plan_.correlation_s;
-    report.views = source_.views().size();
-    report.blocks = plan_.block_count();
-    const auto& roles = source_.roles();
-    for (const auto joint : roles.arm) {
-      report.arm_joints.push_back(roles.names[static_cast<std::size_t>(joint)]);
-    }
-  }
-
-  void add_uninformed(DiagnosisReport& report) const {
-    for (const auto c : found_.selection.not_testable) {
-      const auto& candidate = found_.set.candidates[c];
-      if (candidate.generic() || candidate.slip) continue;
-      report.not_testable.push_back(
-          {name_of(candidate), "in this log it looks exactly like the joint offsets or what is fitted already"});
-    }
-  }
-
-  void add_causes(DiagnosisReport& report) const {
-    const auto& candidates = found_.set.candidates;
-    for (const auto& selected : found_.selection.causes) {
-      const auto& candidate = candidates[selected.candidate];
-      DiagnosedCause cause;
-      cause.cause = name_of(candidate);
-      cause.variable = candidate.variable;
-      cause.z = selected.score.z;
-      cause.heldout_gain = selected.score.gain;
-      cause.same.push_back(cause.cause);
-      for (const auto c : selected.same) cause.same.push_back(name_of(candidates[c]));
-      for (const auto& other : lookalikes(source_, cause.cause)) {
-        if (std::find(cause.same.begin(), cause.same.end(), other) == cause.same.end()) cause.same.push_back(other);
-      }
-      if (selected.wanders) cause.same.push_back({"unexplained", cause.cause.joint, ""});
-      if (cause.same.size() > 1) cause.advice = splitting_motion(cause.same);
-      for (std::size_t c = 0; c < found_.after.parameters.size(); ++c) {
-        const auto& ref = found_.after.parameters[c];
-        if (cause_of(found_.extended[ref.effect]) != cause.cause) continue;
-        const auto& p = found_.extended[ref.effect].parameters()[ref.parameter];
-        cause.implausible = !plausible(found_.extended[ref.effect]);
-        const auto ci = interval(static_cast<Eigen::Index>(c), found_.extended[ref.effect], p, std::abs(p.value));
-        cause.parameters.push_back({p.name,
-                                    p.unit,
-                                    p.in_unit(),
-                                    {ci[0] / p.si_per_unit, ci[1] / p.si_per_unit},
-                                    begin_of(found_.extended[ref.effect]),
-                                    duration_of(found_.extended[ref.effect])});
-      }
-      const bool listed = std::any_of(report.causes.begin(), report.causes.end(), [&](const auto& c) {
-        return c.cause == cause.cause && c.variable == cause.variable;
-      });
-      if (!listed) report.causes.push_back(std::move(cause));
-    }
-  }
-
-  void add_bars(DiagnosisReport& report) const {
-    for (std::size_t c = 0; c < found_.set.candidates.size(); ++c) {
-      const auto& first = found_.selection.first_scores[c];
-      const auto& last = found_.selection.last_scores[c];
-      const auto label = found_.set.candidates[c].description();
-      auto bar = std::find_if(report.bars.begin(), report.bars.end(), [&](const auto& b) { return b.label == label; });
-      if (bar == report.bars.end()) {
-        const auto& candidate = found_.set.candidates[c];
-        report.bars.push_back({label, candidate.generic(), candidate.nuisance, first.testable, 0.0, 0.0, 0.0, 0.0});
-        bar = report.bars.end() - 1;
-      }
-      // Slips at other times and other shapes of a generic variable share a bar: the best counts.
-      bar->z_before = std::max(bar->z_before, first.z);
-      // A nuisance is part of the first model: its gain is a share of the loss without it.
-      const double gain =
-          found_.set.candidates[c].nuisance && first.gain > 0.0 ? first.gain / (1.0 + first.gain) : first.gain;
-      bar->gain_before = std::max(bar->gain_before, gain);
-      bar->z_after = std::max(bar->z_after, last.z);
-      bar->gain_after = std::max(bar->gain_after, last.gain);
-    }
-  }
-
-  void add_offsets(DiagnosisReport& report) const {
-    const auto& roles = source_.roles();
-    for (const auto joint : roles.arm) {
-      const auto& name = roles.names[static_cast<std::size_t>(joint)];
-      report.offsets_deg_before[name] = degrees(baseline_.offsets()[joint]);
-      report.offsets_deg_after[name] = degrees(found_.extended.offsets()[joint]);
-    }
-    for (std::size_t c = 0; c < found_.after.parameters.size(); ++c) {
-      const auto& ref = found_.after.parameters[c];
-      const auto& effect = found_.extended[ref.effect];
-      if (effect.name() != "joint_offset") continue;
-      const auto& p = effect.parameters()[ref.parameter];
-      const auto ci = interval(static_cast<Eigen::Index>(c), effect, p, 0.0);
-      report.offsets_ci95_deg[effect.target().joint] = {degrees(ci[0]), degrees(ci[1])};
-    }
-  }
-
-  void add_part_out_of_sight(DiagnosisReport& report) const {
-    constexpr double kUnlike = 8.0, kShare = 0.05;
-    const auto turn = turning(source_, found_.after.at);
-    if (!turn || turn->unlike < kUnlike || turn->worse_share < kShare) return;
-    const double at_s = turn->time_s - seconds(report.begin_utime);
-    report.out_of_sight = turn->later_is_worse ? PartOutOfSight{at_s, report.duration_s, turn->worse_share}
-                                               : PartOutOfSight{0.0, at_s, turn->worse_share};
-    const auto& part = *report.out_of_sight;
-    report.warnings.push_back(
-        fmt::format("from {:.1f} to {:.1f} s ({:.0f} % of the pictures) the outlines are out of the model's sight: "
-                    "something moved further than can be followed, or what is seen there is not the hand; nothing is "
-                    "known of that part",
-                    part.from_s, part.to_s, 100.0 * part.share));
-  }
-
-  void add_warnings(DiagnosisReport& report) const {
-    if (plan_.correlation_s <= 0.0) {
-      report.warnings.push_back(
-          "no rest of 3 s or more in which one camera saw the arm 16 times (repeats of the "
-          "picture before do not count): the noise's correlation time is not measured, blocks "
-          "are " +
-          std::to_string(std::lround(plan_.length_s)) + " s");
-    }
-    std::string list;
-    for (const auto& cause : found_.selection.set_aside) {
-      list += (list.empty() ? "" : ", ") + found_.set.candidates[cause.candidate].description();
-    }
-    if (found_.selection.crowded) {
-      report.warnings.push_back("several small errors share what is left" +
-                                (list.empty() ? "" : "; none stands out among " + list));
-    } else if (!list.empty()) {
-      report.warnings.push_back("too small to be told from what else is slightly wrong: " + list);
-    }
-    if (passes_once(source_)) {
-      report.warnings.push_back(
-          "every joint moved one way only: what follows an angle looks like what follows "
-          "time; pass the same postures several times, in both directions");
-    }
-    if (report.duration_s < 30.0) {
-      report.warnings.push_back("the log is shorter than 30 s: small causes stay hidden");
-    }
-  }
-
-  [[nodiscard]] Eigen::MatrixXd joint_corrections(const Linearisation& at) const {
-    const auto& arm = source_.roles().arm;
-    Eigen::MatrixXd result(static_cast<Eigen::Index>(at.corrections.size()), static_cast<Eigen::Index>(arm.size()));
-    for (Eigen::Index v = 0; v < result.rows(); ++v) {
-      for (Eigen::Index j = 0; j < result.cols(); ++j) {
-        result(v, j) = at.corrections[static_cast<std::size_t>(v)].dq[arm[static_cast<std::size_t>(j)]];
-      }
-    }
-    return result;
-  }
-
-  /// What a fit without its block leaves of a view, by coordinate, and its loss.
-  struct Rest {
-    Eigen::VectorXd vector;
-    double loss;
-  };
-  /// @param with_curves  also without the free curves of an unexplained cause, beside which all else was fitted
-  [[nodiscard]] Rest held_out(const ModelFit& fit, std::size_t v, bool with_curves) const {
-    const auto& view = fit.at.views[v];
-    Eigen::VectorXd x = Eigen::VectorXd::Zero(layout_.size());
-    if (fit.fit.usable) {
-      const auto replica = fit.fit.replicas.col(static_cast<Eigen::Index>(plan_.block_of_view[v]));
-      const std::size_t parameters = fit.columns.size();
-      for (std::size_t c = 0; c < parameters + (with_curves ? fit.extra.size() : 0); ++c) {
-        const auto& column = c < parameters ? fit.columns[c] : fit.extra[c - parameters];
-        for (const auto& e : column.views[v]) {
-          x[static_cast<Eigen::Index>(e.coordinate)] +=
-              static_cast<double>(e.value) * replica[static_cast<Eigen::Index>(c)];
-        }
-      }
-    }
-    Rest rest{view.vector - view.information * x, 0.0};
-    rest.loss = view.square - x.dot(view.vector) - x.dot(rest.vector);
-    return rest;
-  }
-
-  /// @param view  in which something was found
-  [[nodiscard]] Remainder remainder_of(const Rest& rest, const CompressedView& view) const {
-    Remainder remainder;
-    remainder.rms_px = std::sqrt(std::max(0.0, rest.loss / view.weight));
-    remainder.mean_px = rest.vector[layout_.size() - 1] / view.weight;
-    for (std::size_t j = 0; j < source_.roles().arm.size(); ++j) {
-      const auto at = static_cast<Eigen::Index>(j);
-      const double information = view.information(at, at);
-      remainder.apparent_deg.push_back(information > 0.0 ? degrees(rest.vector[at] / information) : 0.0);
-    }
-    return remainder;
-  }
-
-  void describe_view(const ModelFit& fit, std::size_t v, ResidualSample& sample) const {
-    const auto views = source_.views();
-    sample.time_s = seconds(views[v].joints.utime - views.front().joints.utime);
-    sample.camera = views[v].camera;
-    for (const auto joint : source_.roles().arm) {
-      sample.angle_deg.push_back(degrees(fit.at.instants[v].q[joint]));
-      sample.velocity_deg_s.push_back(degrees(fit.at.instants[v].qdot[joint]));
-      sample.acceleration_deg_s2.push_back(degrees(fit.at.instants[v].qddot[joint]));
-      sample.torque_nm.push_back(fit.at.instants[v].gravity_torque.size() > 0 ? fit.at.instants[v].gravity_torque[joint]
-                                                                              : 0.0);
-    }
-  }
-
-  /// Held-out residuals, and the motion of the hand that they ask for.
-  HeldoutError heldout(const ModelFit& fit, DiagnosisReport& report, bool before) {
-    HeldoutError error;
-    const auto views = source_.views();
-    const auto arm = static_cast<Eigen::Index>(source_.roles().arm.size());
-    double square = 0.0, weight = 0.0, mm2 = 0.0, deg2 = 0.0, outline = 0.0, matched = 0.0;
-    double outline_seen = 0.0, matched_seen = 0.0;
-    std::size_t hands = 0;
-    if (before) report.samples.resize(views.size());
-    Eigen::MatrixXd A(arm, arm);
-    Eigen::VectorXd b(arm);
-    for (const auto& [first, last] : instants_of(views)) {
-      A.setZero();
-      b.setZero();
-      std::size_t seen = last;
-      for (auto v = first; v < last; ++v) {
-        const auto& view = fit.at.views[v];
-        auto& sample = report.samples[v];
-        if (before) describe_view(fit, v, sample);
-        auto& remainder = before ? sample.before : sample.after;
-        remainder.apparent_deg.assign(static_cast<std::size_t>(arm), 0.0);
-        if (!before) sample.noise = remainder;
-        outline += view.outline;
-        matched += view.matched;
-        if (view.weight <= 0.0) continue;
-        seen = v;
-        outline_seen += view.outline;
-        matched_seen += view.matched;
-        const auto left = held_out(fit, v, true);
-        square += plan_.weight_of_view[v] * left.loss;
-        weight += plan_.weight_of_view[v] * view.weight;
-        // Charts show what the extended model leaves: a curve that nothing explains stays in sight.
-        remainder = remainder_of(fit.extra.empty() ? left : held_out(fit, v, false), view);
-        if (!before) sample.noise = remainder_of(left, view);
-        A += view.information.topLeftCorner(arm, arm);
-        b += left.vector.head(arm);
-      }
-      if (seen == last) continue;
-      // The correction of all arm joints, held by a weak prior.
-      A.diagonal().array() += 0.25 / (1.0 * kDeg * 1.0 * kDeg);  // (0.5 px)^2 against 1 deg
-      const auto& jacobian = jacobian_at(seen, fit.at.corrections[seen]);
-      const Eigen::VectorXd motion = jacobian.leftCols(arm) * A.ldlt().solve(b);
-      mm2 += motion.head<3>().squaredNorm() * 1e6;
-      deg2 += motion.tail<3>().squaredNorm() / (kDeg * kDeg);
-      ++hands;
-    }
-    error.rms_px = weight > 0.0 ? std::sqrt(std::max(0.0, square / weight)) : 0.0;
-    if (outline > 0.0) error.outline_found = matched / outline;
-    if (outline_seen > 0.0) error.outline_where_seen = matched_seen / outline_seen;
-    if (hands > 0) {
-      error.hand_mm = std::sqrt(mm2 / static_cast<double>(hands));
-      error.hand_deg = std::sqrt(deg2 / static_cast<double>(hands));
-    }
-    return error;
-  }
-
-  const Eigen::MatrixXd& jacobian_at(std::size_t view, const Corrections& corrections) {
-    if (jacobians_[view].size() == 0) jacobians_[view] = source_.hand_jacobian(view, corrections);
-    return jacobians_[view];
-  }
-
-  MeasurementSource& source_;
-  const SelectionOptions& rules_;
-  const CoordinateLayout& layout_;
-  const BlockPlan& plan_;
-  const Found& found_;
-  const ErrorModel& baseline_;
-  const ModelFit& before_;
-  IntervalRule rule_;
-  std::vector<Eigen::MatrixXd> jacobians_;
-};
 
 }  // namespace
 
-CauseName name_of(const Candidate& candidate) {
-  return {candidate.name, candidate.target.joint, candidate.target.source};
+Reduced without(const ModelSearch& search, const BlockRegression& all, const std::vector<Eigen::Index>& out) {
+  auto kept = all_but(all.size(), out);
+  const Eigen::VectorXd value = values_of(search, out);
+  std::vector<BaseBlock> blocks;
+  AddedColumns own(all.blocks(), static_cast<Eigen::Index>(kept.size()), static_cast<Eigen::Index>(out.size()));
+  for (std::size_t b = 0; b < all.blocks(); ++b) {
+    const auto& block = all.parts()[b];
+    const Eigen::VectorXd g = block.g + block.H(Eigen::all, out) * value;
+    blocks.push_back({block.H(kept, kept), g(kept),
+                      block.square + 2.0 * value.dot(block.g(out)) + value.dot(block.H(out, out) * value), block.weight});
+    own.B[b] = block.H(kept, out);
+    own.C[b] = block.H(out, out);
+    own.d[b] = g(out);
+  }
+  return {BlockRegression(std::move(blocks), all.precision()(kept), all.away()(kept)), std::move(own), std::move(kept)};
 }
 
-DiagnosisReport findings(MeasurementSource& source, const SelectionOptions& rules, const CoordinateLayout& layout,
-                         const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before,
-                         const std::vector<NotTestable>& excluded, double systematic_share,
-                         const std::map<std::string, double>& systematic_error) {
-  return Findings(source, rules, layout, plan, found, baseline, before, systematic_share, systematic_error)
-      .report(excluded);
+std::vector<std::vector<Direction>> directions_of(LogFit& fit, const LogAbout& log, const Candidate& candidate) {
+  const auto& roles = log.state.model().roles();
+  if (candidate.generic()) return along_joint(fit, roles.index(candidate.cause.joint), candidate.amounts);
+  ErrorModel model(roles);
+  auto& effect = model.add(candidate.cause.name, {candidate.cause.joint, candidate.cause.source});
+  const auto timing = effect_kind(candidate.cause.name).timing;
+  if (timing == EffectTiming::kFromATime) effect.parameters()[1].value = seconds(candidate.from);
+  if (timing == EffectTiming::kOverTheLog) {
+    const auto [begin, end] = seen_span(fit, log.at);
+    effect.parameters()[1].value = begin;
+    effect.parameters()[2].value = end - begin;
+  }
+  return fit.directions(log.at, model, fitted_parameters(model));
+}
+
+double Findings::quantile(const LogAbout& log) const {
+  return student_quantile(limits::kConfidence, std::max(1.0, static_cast<double>(log.blocks) - 1.0));
+}
+
+void Findings::describe_log(const LogAbout& log) {
+  const auto pictures = fit_.log().pictures();
+  const auto& roles = fit_.log().roles();
+  report_.begin_utime = pictures.front().joints.utime;
+  report_.duration_s = seconds(pictures.back().joints.utime - pictures.front().joints.utime);
+  report_.views = pictures.size();
+  report_.arm_joints.clear();
+  for (const auto joint : roles.arm) report_.arm_joints.push_back(roles.names[static_cast<std::size_t>(joint)]);
+  report_.samples.resize(pictures.size());
+  auto& measurement = fit_.measurement();
+  for (std::size_t p = 0; p < pictures.size(); ++p) {
+    auto& sample = report_.samples[p];
+    const auto& instant = log.at.instants[p];
+    sample.utime = pictures[p].joints.utime;
+    sample.time_s = seconds(sample.utime - report_.begin_utime);
+    sample.camera = pictures[p].camera;
+    for (const auto joint : roles.arm) {
+      sample.angle_deg.push_back(degrees(instant.q[joint]));
+      sample.velocity_deg_s.push_back(degrees(instant.qdot[joint]));
+      sample.acceleration_deg_s2.push_back(degrees(instant.qddot[joint]));
+      sample.torque_nm.push_back(instant.gravity_torque.size() > 0 ? instant.gravity_torque[joint] : 0.0);
+    }
+    measurement.projection().place(pictures[p].joints.q, log.at.corrections[p], sample.camera);
+    const Eigen::Vector3d hand = measurement.projection().hand().translation();
+    if (hand.z() <= 0.0) continue;
+    const auto& k = fit_.log().rig().cameras[sample.camera].intrinsics;
+    sample.depth_m = hand.z();
+    sample.image_radius_px = std::hypot(k.fx * hand.x() / hand.z(), k.fy * hand.y() / hand.z());
+  }
+}
+
+void Findings::before(const LogAbout& log) {
+  describe_log(log);
+  const auto base = search_.regression(log);
+  report_.before = remainders(log, base, &ResidualSample::before);
+  report_.baseline_model = search_.state().model();
+  for (Eigen::Index j = 0; j < search_.state().joints(); ++j) {
+    report_.offsets_deg_before[search_.state().parameters()[static_cast<std::size_t>(j)].name] =
+        degrees(search_.state().x()[j]);
+  }
+}
+
+HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& base, Which which) {
+  const auto held = base.heldout();
+  const auto& coordinates = fit_.coordinates();
+  const auto& roles = fit_.log().roles();
+  std::vector<std::uint32_t> rig;
+  for (const auto kind : {Coordinate::Kind::kRigShift, Coordinate::Kind::kRigTurn}) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) rig.push_back(static_cast<std::uint32_t>(coordinates.find({kind, axis})));
+  }
+  double square = 0.0, weight = 0.0, hand = 0.0, turn = 0.0, pictures = 0.0, found = 0.0, sampled = 0.0, where_seen = 0.0,
+         sampled_seen = 0.0;
+  auto& measurement = fit_.measurement();
+  for (std::size_t p = 0; p < log.base.size(); ++p) {
+    const auto& evidence = log.at.evidence[p];
+    auto& out = report_.samples[p].*which;
+    out = {};
+    out.apparent_deg.assign(roles.arm.size(), 0.0);
+    found += evidence.matched;
+    sampled += evidence.sampled;
+    if (log.precision[p] <= 0.0) continue;
+    where_seen += evidence.matched;
+    sampled_seen += evidence.sampled;
+    const Eigen::VectorXd x = held.replicas.col(static_cast<Eigen::Index>(log.block_of[p]));
+    Eigen::VectorXd c = Eigen::VectorXd::Zero(coordinates.size());
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      for (const auto& step : log.base[p][static_cast<std::size_t>(i)]) c[step.coordinate] += x[i] * step.amount;
+    }
+    const Eigen::VectorXd b = evidence.b - evidence.A * c;
+    const double own = std::max(0.0, evidence.square - c.dot(evidence.b + b));
+    out.rms_px = std::sqrt(own / evidence.weight);
+    square += own;
+    weight += evidence.weight;
+    double outwards = 0.0, outline = 0.0;
+    for (std::size_t s = 0; s < roles.segments.size(); ++s) {
+      const auto at = coordinates.find({Coordinate::Kind::kDilation, static_cast<Eigen::Index>(s)});
+      outwards += b[at];
+      outline += evidence.A(at, at);
+    }
+    out.mean_px = outline > 0.0 ? outwards / outline : 0.0;
+    for (std::size_t j = 0; j < roles.arm.size(); ++j) {
+      const auto at = coordinates.find({Coordinate::Kind::kJoint, roles.arm[j]});
+      if (evidence.A(at, at) > 0.0) out.apparent_deg[j] = degrees(b[at] / evidence.A(at, at));
+    }
+    // The motion of the hand that would explain it: of what is seen as a whole, with beliefs so wide that they only
+    // keep what no single picture tells from running off.
+    constexpr double kShift_m = 0.02, kTurn_rad = 0.1;
+    Eigen::MatrixXd A = evidence.A(rig, rig);
+    A.diagonal().head<3>().array() += 1.0 / (log.precision[p] * kShift_m * kShift_m);
+    A.diagonal().tail<3>().array() += 1.0 / (log.precision[p] * kTurn_rad * kTurn_rad);
+    const Eigen::VectorXd motion = A.ldlt().solve(b(rig));
+    const auto& picture = fit_.log().pictures()[p];
+    const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera, rig,
+                                                    measurement.projection().hand_link());
+    const Eigen::VectorXd moved = jacobian * motion;
+    out.hand_C_m = measurement.projection().hand().translation();
+    hand += moved.head<3>().squaredNorm();
+    turn += moved.tail<3>().squaredNorm();
+    pictures += 1.0;
+  }
+  if (weight <= 0.0 || pictures <= 0.0) return {};
+  return {std::sqrt(square / weight), 1e3 * std::sqrt(hand / pictures), degrees(std::sqrt(turn / pictures)), found / sampled,
+          where_seen / sampled_seen};
+}
+
+void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candidates) {
+  const auto all = search_.regression(log);
+  const auto& state = search_.state();
+  report_.blocks = log.blocks;
+  report_.block_s = log.block_s;
+  report_.after = remainders(log, all, &ResidualSample::after);
+  for (auto& sample : report_.samples) sample.noise = sample.after;
+  report_.extended_model = state.model();
+  covariance_ = all.covariance();
+  for (Eigen::Index j = 0; j < state.joints(); ++j) {
+    const auto& name = state.parameters()[static_cast<std::size_t>(j)].name;
+    const double offset = degrees(state.x()[j]), half = quantile(log) * degrees(std::sqrt(covariance_(j, j)));
+    report_.offsets_deg_after[name] = offset;
+    report_.offsets_ci95_deg[name] = {offset - half, offset + half};
+  }
+  describe_causes(log, all, candidates);
+  check_sides(log);
+  exclude(log, all, candidates);
+}
+
+void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates) {
+  const auto& state = search_.state();
+  const double loss = all.heldout().loss.sum();
+  std::string small;
+  for (std::size_t c = 0; c < search_.causes().size(); ++c) {
+    const auto& found = search_.causes()[c];
+    DiagnosedCause cause;
+    cause.cause = found.name;
+    cause.variable = found.variable;
+    const auto [base, own, kept] = without(search_, all, search_.columns_of(c));
+    static_cast<void>(kept);
+    cause.z = base.score(own).z();
+    const double lost = base.heldout().loss.sum();
+    cause.heldout_gain = lost > 0.0 ? std::max(0.0, 1.0 - loss / lost) : 0.0;
+    cause.same = {found.name};
+    if (!found.generic()) {
+      const auto columns = search_.columns_of(c);
+      for (std::size_t k = 0; k < columns.size(); ++k) {
+        const auto i = columns[k];
+        const auto& p = state.parameters()[static_cast<std::size_t>(i)];
+        const auto& parameter = state.model()[p.ref.effect].parameters()[p.ref.parameter];
+        const double value = state.x()[i], half = quantile(log) * std::sqrt(covariance_(i, i));
+        DiagnosedParameter e{parameter.name, p.unit, value / p.si_per_unit,
+                             {(value - half) / p.si_per_unit, (value + half) / p.si_per_unit}};
+        const auto timing = effect_kind(found.name.name).timing;
+        if (timing == EffectTiming::kFromATime) e.from = found.from;
+        if (timing == EffectTiming::kOverTheLog) {
+          e.from = microseconds(found.begin_s);
+          e.duration_s = found.duration_s;
+        }
+        cause.parameters.push_back(std::move(e));
+        cause.implausible = cause.implausible || std::abs(value) > limits::kImplausible * parameter.typical;
+      }
+      find_class(all, c, candidates, cause);
+    }
+    if (found.small) {
+      report_.crowded = true;
+      small += (small.empty() ? "" : ", ") + cause.cause.text();
+    } else {
+      report_.causes.push_back(std::move(cause));
+    }
+  }
+  if (!small.empty()) {
+    report_.warnings.push_back("in the model, but too small to matter (" +
+                               fmt::format("{:.1f}", 1e3 * options_.matters_m) + " mm at the hand): " + small);
+  }
+  std::stable_sort(report_.causes.begin(), report_.causes.end(),
+                   [](const auto& a, const auto& b) { return a.heldout_gain > b.heldout_gain; });
+}
+
+void Findings::find_class(const BlockRegression& all, std::size_t cause, const std::vector<Candidate>& candidates,
+                          DiagnosedCause& out) {
+  const auto columns = search_.columns_of(cause);
+  const Eigen::VectorXd value = values_of(search_, columns);
+  const auto [base, own, kept] = without(search_, all, columns);
+  const auto with = base.heldout(own);
+  const double gain = base.heldout().total() - with.total();
+  const double dof = static_cast<double>(all.blocks()) - 1.0;
+  const auto own_columns = static_cast<Eigen::Index>(columns.size());
+  for (const auto& candidate : candidates) {
+    if (candidate.generic()) continue;
+    const auto rival = beside(candidate.columns, kept, columns, value);
+    const auto scores = base.score(rival);
+    if (scores.independent.maxCoeff() < limits::kRounding) continue;
+    const auto other = base.heldout(rival);
+    if (base.heldout().total() - other.total() < limits::kRivalShare * gain) continue;
+    if (paired_t(other.loss, with.loss) > student_quantile(limits::kRivalTail, dof)) continue;
+    // One that can say the same and more besides is no other explanation: what is left of the cause beside it?
+    if (rival.size() > own_columns) {
+      Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(own_columns, rival.size());
+      for (std::size_t b = 0; b < all.blocks(); ++b) shared += candidate.columns.B[b](columns, Eigen::all);
+      const auto own_scores = base.score(own);
+      const Eigen::MatrixXd cross = shared - own_scores.Y.transpose() * sum_of(rival.B);
+      const Eigen::MatrixXd left = own_scores.S - cross * scores.S.ldlt().solve(cross.transpose());
+      if (left.diagonal().cwiseQuotient(own_scores.S.diagonal()).maxCoeff() < limits::kSameChange) continue;
+    }
+    out.same.push_back(candidate.cause);
+  }
+  if (out.same.size() < 2) return;
+  std::vector<std::string> motions;
+  for (const auto& name : out.same) {
+    const auto& motion = effect_kind(name.name).splitting_motion;
+    if (!motion.empty() && std::find(motions.begin(), motions.end(), motion) == motions.end()) motions.push_back(motion);
+  }
+  for (const auto& motion : motions) out.advice += (out.advice.empty() ? "" : " ") + motion;
+}
+
+void Findings::check_sides(const LogAbout& log) {
+  const auto& roles = fit_.log().roles();
+  constexpr std::size_t kSides = 4;
+  const std::size_t groups = roles.segments.size() * fit_.log().rig().cameras.size() * kSides;
+  std::vector<Eigen::MatrixXd> sums(2, Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(groups), static_cast<Eigen::Index>(log.blocks)));
+  std::vector<std::size_t> segment_of(fit_.measurement().part_count(), 0);
+  for (std::size_t s = 0; s < roles.segments.size(); ++s) {
+    for (const auto part : roles.segments[s].parts) segment_of[part] = s;
+  }
+  std::mutex mutex;
+  fit_.linearise(log.state.model(), {}, search_.search(), {}, [&](std::size_t p, std::span<const OutlinePoint> points) {
+    const std::scoped_lock lock(mutex);
+    const auto camera = fit_.log().pictures()[p].camera;
+    for (const auto& point : points) {
+      const bool flat = std::abs(point.normal.x()) > std::abs(point.normal.y());
+      const std::size_t side = flat ? (point.normal.x() > 0 ? 0u : 1u) : (point.normal.y() > 0 ? 2u : 3u);
+      const auto row = static_cast<Eigen::Index>(
+          (segment_of[point.part] * fit_.log().rig().cameras.size() + camera) * kSides + side);
+      const auto column = static_cast<Eigen::Index>(log.block_of[p]);
+      sums[0](row, column) += point.weight * point.residual_px;
+      sums[1](row, column) += point.weight;
+    }
+  });
+  static const char* const kNames[] = {"right", "left", "lower", "upper"};
+  // As many comparisons as groups: Bonferroni.
+  const double tail = options_.level / static_cast<double>(groups);
+  double worst = 0.0;
+  for (Eigen::Index row = 0; row < sums[0].rows(); ++row) {
+    const double weight = sums[1].row(row).sum();
+    const auto seen = (sums[1].row(row).array() > 0.0).count();
+    if (seen < 3) continue;
+    const double mean = sums[0].row(row).sum() / weight;
+    const Eigen::RowVectorXd off = sums[0].row(row) - mean * sums[1].row(row);
+    const double sd = std::sqrt(off.squaredNorm() * static_cast<double>(seen) / static_cast<double>(seen - 1)) / weight;
+    const auto group = static_cast<std::size_t>(row);
+    const auto& camera = fit_.log().rig().cameras[(group / kSides) % fit_.log().rig().cameras.size()];
+    const double unit = picture_unit(camera.intrinsics);
+    // Beyond what matters, and beyond what a picture places a flank to.
+    const double depth = report_.samples.empty() ? 0.0 : report_.samples.front().depth_m;
+    const double matters_px = depth > 0.0 ? options_.matters_m * camera.intrinsics.fx / depth : 0.0;
+    const double least = std::max(matters_px, 3.0 * limits::kFloor_px * unit);
+    if (std::abs(mean) < least + student_quantile(tail, static_cast<double>(seen - 1)) * sd || std::abs(mean) <= worst) continue;
+    worst = std::abs(mean);
+    report_.side_left_over = fmt::format("the {} outline of {} lies {:.1f} px {} where the model has it in the pictures of {}",
+                                         kNames[group % kSides],
+                                         roles.segments[group / kSides / fit_.log().rig().cameras.size()].name, std::abs(mean),
+                                         mean > 0.0 ? "outside of" : "inside of", camera.name);
+  }
+}
+
+void Findings::exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates) {
+  const auto& roles = fit_.log().roles();
+  for (const auto& candidate : candidates) {
+    if (candidate.generic() || candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
+    const bool in_class = std::any_of(report_.causes.begin(), report_.causes.end(), [&](const auto& cause) {
+      return std::find(cause.same.begin(), cause.same.end(), candidate.cause) != cause.same.end();
+    });
+    const bool untold = std::any_of(report_.not_testable.begin(), report_.not_testable.end(),
+                                    [&](const auto& n) { return n.cause == candidate.cause; });
+    if (in_class || untold) continue;
+    const Eigen::VectorXd estimate = candidate.scores.estimate();
+    const Eigen::MatrixXd covariance = all.covariance(candidate.scores);
+    const auto effect = make_effect(candidate.cause.name, {candidate.cause.joint, candidate.cause.source}, roles);
+    std::vector<const EffectParameter*> fitted;
+    for (const auto& p : std::as_const(*effect).parameters()) {
+      if (p.fitted) fitted.push_back(&p);
+    }
+    for (std::size_t k = 0; k < fitted.size(); ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      if (candidate.scores.independent[i] < limits::kRounding) continue;
+      const double limit = std::abs(estimate[i]) + quantile(log) * std::sqrt(covariance(i, i));
+      report_.exclusion_limits.push_back(
+          {candidate.cause, fitted[k]->name, fitted[k]->unit, limit / fitted[k]->si_per_unit});
+    }
+  }
 }
 
 }  // namespace bodyschema::diagnosis

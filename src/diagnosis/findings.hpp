@@ -1,29 +1,55 @@
 #pragma once
 
+#include <utility>
 #include <vector>
 
-#include "bodyschema/diagnosis/diagnosis_report.hpp"
-#include "bodyschema/diagnosis/selection.hpp"
+#include "bodyschema/diagnosis/diagnoser.hpp"
 #include "candidates.hpp"
-#include "model_fit.hpp"
+#include "model_search.hpp"
 
 namespace bodyschema::diagnosis {
 
-/// One pass over the catalogue and the model it led to.
-struct Found {
-  CandidateSet set;
-  Selection selection;
-  ErrorModel extended;
-  ModelFit after;
+/// A model's regression with some of its parameters taken out: the base without them, at their value zero, their columns,
+/// and which of the base's parameters stay.
+struct Reduced {
+  BlockRegression base;
+  AddedColumns own;
+  std::vector<Eigen::Index> kept;
 };
+Reduced without(const ModelSearch& search, const BlockRegression& all, const std::vector<Eigen::Index>& out);
 
-CauseName name_of(const Candidate& candidate);
+/// How a candidate's columns move each picture: [picture][column].
+std::vector<std::vector<Direction>> directions_of(LogFit& fit, const LogAbout& log, const Candidate& candidate);
 
-/// The figures of the report: causes with their intervals, limits, bars, offsets, and the errors on
-/// held-out blocks before and after. The verdict is not worded yet.
-DiagnosisReport findings(MeasurementSource& source, const SelectionOptions& rules, const CoordinateLayout& layout,
-                         const BlockPlan& plan, const Found& found, const ErrorModel& baseline, const ModelFit& before,
-                         const std::vector<NotTestable>& excluded, double systematic_share,
-                         const std::map<std::string, double>& systematic_error);
+/// What the answer says of a model: sizes with their intervals, what else would explain the same, what is excluded, and
+/// how well pictures are predicted.
+class Findings {
+ public:
+  Findings(LogFit& fit, ModelSearch& search, const DiagnosisOptions& options, DiagnosisReport& report)
+      : fit_(fit), search_(search), options_(options), report_(report) {}
+  /// The model without any cause.
+  void before(const LogAbout& log);
+  /// The final one. @param candidates  all that are not in it, about it
+  void conclude(const LogAbout& log, const std::vector<Candidate>& candidates);
+
+ private:
+  using Which = Remainder ResidualSample::*;
+  void describe_log(const LogAbout& log);
+  /// What is left of every picture, predicted from the other blocks.
+  HeldoutError remainders(const LogAbout& log, const BlockRegression& base, Which which);
+  void describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
+  void find_class(const BlockRegression& all, std::size_t cause, const std::vector<Candidate>& candidates,
+                  DiagnosedCause& out);
+  void exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
+  /// Where outlines lie off on one side of one part, block after block.
+  void check_sides(const LogAbout& log);
+  [[nodiscard]] double quantile(const LogAbout& log) const;
+
+  LogFit& fit_;
+  ModelSearch& search_;
+  const DiagnosisOptions& options_;
+  DiagnosisReport& report_;
+  Eigen::MatrixXd covariance_;  ///< of the final model's parameters
+};
 
 }  // namespace bodyschema::diagnosis

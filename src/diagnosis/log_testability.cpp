@@ -10,60 +10,42 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/diagnosis/diagnoser.hpp"
-#include "bodyschema/diagnosis/measurement.hpp"
-#include "bodyschema/effects/catalogue.hpp"
-#include "candidates.hpp"
-#include "joint_stream.hpp"
+#include "bodyschema/observation/joint_motion.hpp"
+#include "bodyschema/pipeline/joint_stream.hpp"
+#include "log_motion.hpp"
 
 namespace bodyschema {
 namespace {
 
 constexpr Microseconds kPicturePeriod = 100'000;
 
-/// The motion of a log without its pictures.
-class Motion final : public MeasurementSource {
+/// Joints at the exposures of a log, on the raster that a diagnosis takes.
+class Exposures {
  public:
-  Motion(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup, const StereoRig& rig)
-      : roles_(JointRoles::of(model, setup, rig)), builder_(model, setup.hand_link, setup.gravity_W),
-        no_offsets_(Eigen::VectorXd::Zero(model->joint_count())) {}
-
   void add(const Observation& observation) {
-    if (!views_.empty() && observation.utime < due_) return;
-    // Keep to the raster, as the diagnosis does.
-    due_ = views_.empty() || observation.utime > due_ + kPicturePeriod ? observation.utime + kPicturePeriod
-                                                                       : due_ + kPicturePeriod;
+    if (!samples_.empty() && observation.utime < due_) return;
+    due_ = samples_.empty() || observation.utime > due_ + kPicturePeriod ? observation.utime + kPicturePeriod
+                                                                         : due_ + kPicturePeriod;
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
-      if (observation.cameras[c]) views_.push_back({observation.cameras[c]->joints, c, {}});
+      if (!observation.cameras[c]) continue;
+      samples_.push_back(observation.cameras[c]->joints);
+      seen_.insert(c);
     }
   }
-  void set_stream(std::vector<JointSample> stream) {
-    stream_ = std::move(stream);
-    set_motion(views_, stream_);
+  /// Velocities from the encoder log, as a diagnosis has them.
+  std::span<const JointSample> finish(std::span<const JointSample> encoders) {
+    Eigen::VectorXd qddot;
+    for (auto& sample : samples_) {
+      joint_motion(encoders, sample.utime, sample.qdot, qddot);
+      sample.qdot.conservativeResize(sample.q.size());
+    }
+    return samples_;
   }
-
-  const JointRoles& roles() const override { return roles_; }
-  std::span<const ViewInput> views() const override { return views_; }
-  std::span<const JointSample> stream() const override { return stream_; }
-  void instant(std::size_t view, const Eigen::VectorXd& offsets, Instant& out) override {
-    builder_.build(views_[view].joints, views_[view].camera, offsets, out);
-    out.qddot = views_[view].qddot;
-  }
-  void compress(std::span<const Corrections>, std::vector<CompressedView>& out) override { out.clear(); }
-  Eigen::MatrixXd hand_jacobian(std::size_t, const Corrections&) override { return {}; }
-
-  [[nodiscard]] diagnosis::Linearisation instants() {
-    diagnosis::Linearisation at;
-    at.instants.resize(views_.size());
-    for (std::size_t v = 0; v < views_.size(); ++v) instant(v, no_offsets_, at.instants[v]);
-    return at;
-  }
+  [[nodiscard]] std::size_t cameras() const { return seen_.size(); }
 
  private:
-  JointRoles roles_;
-  InstantBuilder builder_;
-  Eigen::VectorXd no_offsets_;
-  std::vector<ViewInput> views_;
-  std::vector<JointSample> stream_;
+  std::vector<JointSample> samples_;
+  std::set<std::size_t> seen_;
   Microseconds due_ = 0;
 };
 
@@ -82,13 +64,14 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
   configuration.reject_unknown_sections();
   for (const char* read : {"robot", "cameras", "bus"}) configuration.section(read).reject_unknown_keys();
   const auto model = load_robot(setup, rig);
-  Motion motion(model, setup, rig);
-  diagnosis::JointStream joints(*model, setup, bus);
+  const auto roles = JointRoles::of(model, setup, rig);
+  Exposures exposures;
+  JointStream joints(*model, setup, bus);
   ObservationStream stream(model, setup, rig, bus);
   LogReader reader(log);
   ProgressBar bar("motion", reader.size());
   const auto drain = [&] {
-    while (const auto arrived = stream.next()) motion.add(arrived->observation);
+    while (const auto arrived = stream.next()) exposures.add(arrived->observation);
   };
   LogEvent event;
   while (reader.next(event)) {
@@ -98,24 +81,24 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
   }
   stream.finish();
   drain();
-  motion.set_stream(joints.finish());
-
-  const auto views = motion.views();
-  if (views.empty()) {
+  const auto encoders = joints.finish();
+  const auto pictures = exposures.finish(encoders);
+  if (pictures.empty()) {
     throw DataError(fmt::format("{}: no pictures with encoders on {} and {}", log.string(), stream.channels().cameras,
                                 stream.channels().joint_state));
   }
   LogTestability result;
-  result.duration_s = seconds(views.back().joints.utime - views.front().joints.utime);
+  result.duration_s = seconds(pictures.back().utime - pictures.front().utime);
   result.shortest_s = DiagnosisOptions{}.shortest_log_s;
-  result.pictures = views.size();
-  for (const auto joint : motion.roles().arm) {
-    result.arm_joints.push_back(motion.roles().names[static_cast<std::size_t>(joint)]);
+  result.pictures = pictures.size();
+  for (const auto joint : roles.arm) {
+    result.arm_joints.push_back(roles.names[static_cast<std::size_t>(joint)]);
   }
-  result.not_testable = diagnosis::untestable(motion, motion.instants());
+  result.not_testable = diagnosis::untestable(
+      roles, diagnosis::log_motion(pictures, exposures.cameras(), encoders, model, setup, roles));
   for (const auto& name : effect_names()) {
     if (name == "joint_offset") continue;  // always fitted, never a finding
-    for (const auto& target : effect_targets(name, motion.roles())) {
+    for (const auto& target : effect_targets(name, roles)) {
       const CauseName cause{name, target.joint, target.source};
       const bool refused = std::any_of(result.not_testable.begin(), result.not_testable.end(),
                                        [&](const auto& n) { return n.cause == cause; });

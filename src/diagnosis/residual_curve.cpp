@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "interval.hpp"
+#include "bodyschema/evidence/distributions.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
@@ -168,7 +168,7 @@ ResidualCurve residual_curve(std::vector<ResidualPoint> points, const ErrorMemor
     const bool pooled = worth < kFewestIndependent && memory.spread > 0.0;
     const double dof = std::max(kLeastDof, worth - 1.0);
     const double sd = kMedian * (pooled ? memory.spread / std::sqrt(worth) : own / std::sqrt(dof));
-    const double half = (pooled ? student95(static_cast<double>(points.size())) : student95(dof)) * sd;
+    const double half = student_quantile(0.05, std::max(1.0, pooled ? static_cast<double>(points.size()) : dof)) * sd;
     curve.x.push_back(x);
     curve.y.push_back(median);
     curve.low.push_back(median - half);

@@ -5,103 +5,97 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
+
+#include "limits.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
 
-bool is_known(const EstimatedParameter& p) {
-  return std::isfinite(p.ci95[0]) && std::isfinite(p.ci95[1]);
+/// "6.2 mm (5.9 to 6.5)": of a size and its interval, without sign; an interval that reaches over zero says "up to".
+std::string amount_text(const DiagnosedParameter& p) {
+  const std::string unit = p.unit == "1" ? "" : p.unit == "%" ? " %" : " " + p.unit;
+  double low = p.ci95[0], high = p.ci95[1];
+  if (p.estimate < 0.0) std::tie(low, high) = std::pair(-high, -low);
+  if (low < 0.0) return fmt::format("{:.3g}{} (at most {:.3g})", std::abs(p.estimate), unit, high);
+  return fmt::format("{:.3g}{} ({:.3g} to {:.3g})", std::abs(p.estimate), unit, low, high);
 }
 
-std::string text_of(const EstimatedParameter& p, Microseconds begin) {
-  if (!is_known(p)) return fmt::format(" {} of a size that this log does not tell", p.parameter);
-  const auto when = p.when(begin);
-  return fmt::format(" {} {:.3g}{} [{:.3g}, {:.3g}]{}", p.parameter, p.estimate, p.unit == "1" ? "" : " " + p.unit,
-                     p.ci95[0], p.ci95[1], when.empty() ? "" : " " + when);
+std::string capitalised(std::string text) {
+  // A name of the URDF keeps its letters.
+  const auto word = text.substr(0, text.find(' '));
+  if (word.find('_') == std::string::npos && !text.empty()) text[0] = static_cast<char>(std::toupper(text[0]));
+  return text;
 }
 
-std::string text_of(const DiagnosedCause& cause, Microseconds begin) {
+std::string sentence_of(const DiagnosedCause& cause, const DiagnosisReport& report, const JointRoles& roles) {
   if (cause.cause.name == "unexplained") {
-    return fmt::format("something that follows the {} of {} and that no known cause explains", cause.variable,
-                       cause.cause.joint);
+    return fmt::format("something follows the {} of {} that no known cause explains", cause.variable, cause.cause.joint);
   }
-  std::string text = cause.cause.text();
-  for (const auto& p : cause.parameters) text += text_of(p, begin);
+  const auto effect = make_effect(cause.cause.name, {cause.cause.joint, cause.cause.source}, roles);
+  std::vector<std::string> amounts;
+  std::size_t next = 0;
+  std::string when;
+  for (auto& p : effect->parameters()) {
+    if (!p.fitted || next >= cause.parameters.size()) continue;
+    const auto& e = cause.parameters[next++];
+    p.value = e.estimate * p.si_per_unit;
+    amounts.push_back(amount_text(e));
+    if (when.empty()) when = e.when(report.begin_utime);
+  }
+  auto text = effect_kind(cause.cause.name).sentence(*effect, roles, amounts);
+  if (!when.empty()) text += ", " + when;
+  return text;
+}
+
+std::string with_class(const DiagnosedCause& cause) {
+  std::string text = cause.sentence;
   if (cause.same.size() < 2) return text;
   text += " (or";
-  for (std::size_t i = 1; i < cause.same.size(); ++i) {
-    text += (i > 1 ? ", " : " ") + cause.same[i].text();
-  }
+  for (std::size_t i = 1; i < cause.same.size(); ++i) text += (i > 1 ? ", " : " ") + cause.same[i].text();
   return text + ", which this log cannot tell from it)";
 }
 
 }  // namespace
 
-void word_verdict(DiagnosisReport& report, const DiagnosisOptions& options) {
+void word_verdict(DiagnosisReport& report, const JointRoles& roles) {
   const auto is_unexplained = [](const DiagnosedCause& c) { return c.cause.name == "unexplained"; };
-  const auto& causes = report.causes;
   std::string list;
-  for (const auto& cause : causes) list += (list.empty() ? "" : "; ") + text_of(cause, report.begin_utime);
-  const double left = report.after.rms_px;
-
-  if (left > options.trusted_rms_px) {
-    report.verdict = "unexplained";
-    report.sentence = fmt::format(
-        "No cause of the catalogue explains this log: the outlines are missed by {:.1f} px (rms) at best, where "
-        "good meshes and masks leave 0.3 px. The parts probably have another shape, or much is wrong at once.",
-        left);
-    if (!list.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + list + ".";
-    return;
+  for (auto& cause : report.causes) {
+    cause.sentence = sentence_of(cause, report, roles);
+    list += (list.empty() ? "" : "; ") + with_class(cause);
   }
-  if (const double found = report.after.outline_where_seen; found < options.trusted_outline) {
+  const auto& causes = report.causes;
+  const auto unexplained = [&](std::string why) {
     report.verdict = "unexplained";
-    report.sentence = fmt::format(
-        "No cause can be told from this log: only {:.0f} % of the predicted outlines are found in the pictures. The "
-        "parts have another shape, or the masks miss some of them.",
-        100.0 * found);
+    report.sentence = std::move(why);
     if (!list.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + list + ".";
-    return;
+    report.exclusion_limits.clear();
+  };
+  if (const double found = report.after.outline_found; found < limits::kLeastFound) {
+    return unexplained(fmt::format("No cause can be told from this log: only {:.0f} % of the predicted outlines are found in "
+                                   "the pictures. The parts have another shape, or the masks miss some of them.",
+                                   100.0 * found));
   }
   if (std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.implausible; })) {
-    report.verdict = "unexplained";
-    report.sentence =
-        "No cause of the catalogue explains this log: what fits is larger than on any robot, and stands in "
-        "for something else: " +
-        list + ".";
-    return;
+    return unexplained("No known cause explains this log: what fits is larger than on any robot.");
+  }
+  if (!report.side_left_over.empty()) {
+    return unexplained(fmt::format("The model does not explain what is seen: {}.", report.side_left_over));
   }
   if (!causes.empty()) {
-    const bool unexplained = std::any_of(causes.begin(), causes.end(), is_unexplained);
+    report.crowded = false;
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });
-    const bool sized = std::all_of(causes.begin(), causes.end(), [](const auto& c) {
-      return std::all_of(c.parameters.begin(), c.parameters.end(), is_known);
-    });
-    report.verdict = unexplained || !sized ? "unexplained" : several ? "class" : "named";
-    report.sentence = "The log asks for: " + list + ".";
-    if (left > options.noise_rms_px) {
-      report.sentence +=
-          fmt::format(" With it {:.2f} px are left, more than noise: something else is wrong too.", left);
-    }
+    report.verdict = std::any_of(causes.begin(), causes.end(), is_unexplained) ? "unexplained" : several ? "class" : "named";
+    report.sentence = capitalised(list) + ".";
+    if (report.verdict == "unexplained") report.exclusion_limits.clear();
     return;
   }
+  report.crowded = report.crowded && causes.empty();
   report.verdict = "none";
-  if (report.crowded) {
-    report.sentence = "No single cause stands out; several small errors share what the joint offsets leave.";
-  } else if (left > options.noise_rms_px) {
-    report.verdict = "unexplained";
-    report.sentence = fmt::format(
-        "No cause of the catalogue explains what is left: {:.2f} px (rms), more than noise, whatever the joint "
-        "offsets.",
-        left);
-  } else if (const auto& part = report.out_of_sight) {
-    report.verdict = "unexplained";
-    report.sentence = fmt::format(
-        "The model explains a part of the log only: from {:.1f} to {:.1f} s the outlines are out of sight. Something "
-        "moved further than can be followed, or what is seen there is not the hand.",
-        part->from_s, part->to_s);
-  } else {
-    report.sentence = "The model explains the log to its noise: nothing but joint offsets was found.";
-  }
+  report.sentence = report.crowded
+                        ? "No single cause stands out; several small errors share what the joint offsets leave."
+                        : "The model explains the log to its noise: nothing but joint offsets was found.";
 }
 
 }  // namespace bodyschema::diagnosis

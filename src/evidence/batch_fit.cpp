@@ -1,7 +1,6 @@
 #include "bodyschema/evidence/batch_fit.hpp"
 
 #include <algorithm>
-#include <mutex>
 #include <numeric>
 #include <utility>
 
@@ -116,18 +115,8 @@ void BatchFit::run(double from_px, const std::vector<std::size_t>& pictures) {
 }
 
 void BatchFit::measure(const std::vector<std::size_t>& pictures) {
-  noise_.assign(noise_.size(), OutlineNoise(settings_.noise));
-  const auto all = fit_.log().pictures();
-  std::vector<std::vector<OutlinePoint>> points(all.size());
-  double robust_px = 3.0;
-  static_cast<void>(fit_.linearise(state_.model(), {}, {kFinest_px, settings_.spacing_px, robust_px}, pictures,
-                                   [&](std::size_t p, std::span<const OutlinePoint> seen) {
-                                     points[p].assign(seen.begin(), seen.end());
-                                   }));
-  for (std::size_t p = 0; p < all.size(); ++p) {
-    if (points[p].empty()) continue;
-    noise_[all[p].camera].add(points[p], picture_unit(fit_.log().rig().cameras[all[p].camera].intrinsics));
-  }
+  constexpr double kRobust_px = 3.0;
+  noise_ = fit_.noise(state_.model(), {kFinest_px, settings_.spacing_px, kRobust_px}, settings_.noise, pictures);
 }
 
 /// All postures about the state, fused; the state moves to what comes of it until it stays.

@@ -175,6 +175,20 @@ std::vector<StateEvidence> LogFit::project(const LinearLog& at, const ErrorModel
   return result;
 }
 
+std::vector<OutlineNoise> LogFit::noise(const ErrorModel& model, const OutlineSearch& search,
+                                        const OutlineNoise::Prior& prior, std::span<const std::size_t> pictures) {
+  std::vector<std::vector<OutlinePoint>> points(log_.pictures().size());
+  linearise(model, {}, search, pictures, [&](std::size_t p, std::span<const OutlinePoint> seen) {
+    points[p].assign(seen.begin(), seen.end());
+  });
+  std::vector<OutlineNoise> noise(log_.rig().cameras.size(), OutlineNoise(prior));
+  for (std::size_t p = 0; p < points.size(); ++p) {
+    const auto camera = log_.pictures()[p].camera;
+    if (!points[p].empty()) noise[camera].add(points[p], picture_unit(log_.rig().cameras[camera].intrinsics));
+  }
+  return noise;
+}
+
 std::vector<std::uint32_t> LogFit::moved_by(const ErrorModel& model, const std::vector<ParameterRef>& parameters) {
   // What moves where depends on the model alone, but for effects that rest with the arm: all pictures are asked.
   LinearLog at;

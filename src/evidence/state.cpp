@@ -29,6 +29,9 @@ std::string key_of(const EffectParameter& p) {
   return p.unit == "1" ? "sd" : "sd" + p.key().substr(p.name.size());
 }
 
+/// Target of effects by which two cameras differ.
+constexpr const char* kBetweenCameras = "difference";
+
 /// Largest standard deviation that makes sense, in units of the typical size.
 constexpr double kMostTypical = 1e4;
 
@@ -60,8 +63,13 @@ std::string name_of(const Effect& effect, const EffectParameter& parameter) {
 std::vector<Belief> read_beliefs(const Configuration& mapping, const JointRoles& roles) {
   std::vector<Belief> list;
   for (const auto& key : mapping.keys()) {
+    if (!mapping.has(key)) continue;  // null: taken out again
     const auto [name, target] = parse_name(key);
     const Configuration entry = mapping.section(key);
+    if (target.source == kBetweenCameras && roles.cameras.size() < 2) {
+      static_cast<void>(entry.keys());  // what files for every robot say of pairs is nothing about one camera
+      continue;
+    }
     try {
       const auto& kind = effect_kind(name);
       auto targets = kind.targets(roles);

@@ -6,7 +6,9 @@
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "bodyschema/bus/messages.hpp"
 #include "bodyschema/core/error.hpp"
@@ -27,7 +29,7 @@ void check(const PictureSize& size, const std::filesystem::path& file) {
                   " px; expected 1 to " + std::to_string(kMaxSide_px) + " a side");
 }
 
-Image read_png(const std::vector<std::uint8_t>& bytes, const std::filesystem::path& file) {
+Image read_png(std::span<const std::uint8_t> bytes, const std::filesystem::path& file) {
   check(picture_size(bytes).value_or(PictureSize{}), file);
   // Without its last chunk it was cut short, and the decoder may not mind.
   constexpr std::array<std::uint8_t, 4> kEnd = {'I', 'E', 'N', 'D'};
@@ -35,7 +37,7 @@ Image read_png(const std::vector<std::uint8_t>& bytes, const std::filesystem::pa
                                  kEnd.begin(), kEnd.end()) != bytes.end();
   cv::Mat picture;
   try {
-    if (whole) picture = cv::imdecode(bytes, cv::IMREAD_ANYCOLOR);
+    if (whole) picture = cv::imdecode(std::vector<std::uint8_t>(bytes.begin(), bytes.end()), cv::IMREAD_ANYCOLOR);
   } catch (const cv::Exception&) {
     // Said below.
   }
@@ -47,7 +49,7 @@ Image read_png(const std::vector<std::uint8_t>& bytes, const std::filesystem::pa
   return image;
 }
 
-Image read_jpeg(const std::vector<std::uint8_t>& bytes, const std::filesystem::path& file) {
+Image read_jpeg(std::span<const std::uint8_t> bytes, const std::filesystem::path& file) {
   const PictureSize size = picture_size(bytes).value_or(PictureSize{});
   check(size, file);
   ImageView view;
@@ -61,21 +63,33 @@ Image read_jpeg(const std::vector<std::uint8_t>& bytes, const std::filesystem::p
   return image;
 }
 
+bool is_png(std::span<const std::uint8_t> bytes) {
+  return bytes.size() >= kPng.size() && std::equal(kPng.begin(), kPng.end(), bytes.begin());
+}
+
 }  // namespace
+
+bool is_jpeg(std::span<const std::uint8_t> bytes) {
+  return bytes.size() >= 2 && bytes[0] == 0xFF && bytes[1] == 0xD8;
+}
+
+Image read_picture(std::span<const std::uint8_t> bytes, const std::filesystem::path& where) {
+  if (is_png(bytes)) return read_png(bytes, where);
+  if (is_jpeg(bytes)) return read_jpeg(bytes, where);
+  throw FileError(where.string() + ": neither PNG nor JPEG");
+}
 
 Image read_picture_file(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw FileError(file.string() + ": picture cannot be opened");
   std::array<std::uint8_t, 8> begin{};
   in.read(reinterpret_cast<char*>(begin.data()), begin.size());
-  const bool png = begin == kPng;
-  const bool jpeg = begin[0] == 0xFF && begin[1] == 0xD8;
-  if (!png && !jpeg) return read_netpbm(file);
+  if (!is_png(begin) && !is_jpeg(begin)) return read_netpbm(file);
   file_size_at_most(file, kMaxBytes);
   in.clear();
   in.seekg(0);
   const std::vector<std::uint8_t> bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-  return png ? read_png(bytes, file) : read_jpeg(bytes, file);
+  return read_picture(bytes, file);
 }
 
 }  // namespace bodyschema

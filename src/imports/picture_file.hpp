@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <span>
 
 #include "bodyschema/geometry/image.hpp"
 
@@ -10,5 +12,10 @@ namespace bodyschema {
 /// Throws FileError naming the file and what is wrong with it; sizes are checked before memory for
 /// pixels is taken, and a file cut short is an error.
 Image read_picture_file(const std::filesystem::path& file);
+
+/// The same for the bytes of a PNG or JPEG file. @param where  begins the error
+Image read_picture(std::span<const std::uint8_t> bytes, const std::filesystem::path& where);
+/// Whether a file of these bytes would be a JPEG.
+bool is_jpeg(std::span<const std::uint8_t> bytes);
 
 }  // namespace bodyschema

@@ -9,10 +9,11 @@
 #include <fstream>
 #include <set>
 
-#include "bodyschema/camera/camera_info.hpp"
 #include "bodyschema/core/nearest_name.hpp"
+#include "camera_check.hpp"
 #include "csv_table.hpp"
 #include "picture_file.hpp"
+#include "row_slopes.hpp"
 
 namespace bodyschema {
 namespace {
@@ -136,20 +137,9 @@ class StillsImport {
     const auto file = folder_.camera_infos.find(image_folders_[c]);
     if (file == folder_.camera_infos.end()) return;
     try {
-      const CameraInfo info = CameraInfo::read(file->second);
-      const CameraModel& camera = target_.rig.cameras[c];
-      const auto near = [](const PinholeIntrinsics& a, const PinholeIntrinsics& b) {
-        constexpr double kShare = 0.02, kShift_px = 0.02;  // of the focal length, of the picture's width
-        const double shift_px = kShift_px * a.width;
-        return std::abs(a.fx - b.fx) <= kShare * a.fx && std::abs(a.fy - b.fy) <= kShare * a.fy &&
-               std::abs(a.cx - b.cx) <= shift_px && std::abs(a.cy - b.cy) <= shift_px;
-      };
-      if (near(camera.intrinsics, info.intrinsics) || near(camera.intrinsics, info.rectified)) return;
-      builder_.note(fmt::format(
-          "camera '{}' is configured with fx {:.6g}, fy {:.6g}, cx {:.6g}, cy {:.6g}, but {} has {:.6g}, {:.6g}, "
-          "{:.6g}, {:.6g}",
-          camera.name, camera.intrinsics.fx, camera.intrinsics.fy, camera.intrinsics.cx, camera.intrinsics.cy,
-          file->second.string(), info.intrinsics.fx, info.intrinsics.fy, info.intrinsics.cx, info.intrinsics.cy));
+      const auto difference =
+          camera_difference(target_.rig.cameras[c], CameraInfo::read(file->second), file->second.string());
+      if (difference) builder_.note(*difference);
     } catch (const Error& error) {
       builder_.note(fmt::format("not compared with the configuration: {}", error.what()));
     }
@@ -223,19 +213,11 @@ class StillsImport {
     return values;
   }
 
-  /// Of a moving recording: the slopes to the rows before and after, over both where they are alike in length.
+  /// Of a moving recording.
   [[nodiscard]] std::vector<double> velocities(std::size_t i) const {
-    constexpr Microseconds kNear = 500'000;
-    const bool before = i > 0 && postures_[i].utime - postures_[i - 1].utime <= kNear;
-    const bool after = i + 1 < postures_.size() && postures_[i + 1].utime - postures_[i].utime <= kNear;
-    const Posture &a = postures_[before ? i - 1 : i], &b = postures_[after ? i + 1 : i];
-    std::vector<double> slopes(joint_columns_.size(), 0.0);
-    if (!before && !after) return slopes;
-    for (std::size_t k = 0; k < joint_columns_.size(); ++k) {
-      slopes[k] =
-          (b.row->values[joint_columns_[k]] - a.row->values[joint_columns_[k]]) / seconds(b.utime - a.utime);
-    }
-    return slopes;
+    return row_slopes(
+        i, postures_.size(), joint_columns_.size(), [&](std::size_t r) { return postures_[r].utime; },
+        [&](std::size_t r, std::size_t k) { return postures_[r].row->values[joint_columns_[k]]; });
   }
 
   void hold(const Posture& posture) {

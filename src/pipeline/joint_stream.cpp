@@ -1,4 +1,4 @@
-#include "joint_stream.hpp"
+#include "bodyschema/pipeline/joint_stream.hpp"
 
 namespace bodyschema {
 

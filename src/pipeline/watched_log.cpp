@@ -6,7 +6,7 @@
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
-#include "joint_stream.hpp"
+#include "bodyschema/pipeline/joint_stream.hpp"
 
 namespace bodyschema {
 namespace {

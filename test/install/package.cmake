@@ -18,6 +18,9 @@ foreach(path IN ITEMS
     usr/share/bodyschema/meshes/icub_right/icub_right.urdf
     usr/share/bodyschema/lcmtypes/bodyschema_joint_offsets_t.lcm
     usr/share/bodyschema/python/bodyschema/joint_offsets_t.py
+    usr/share/bodyschema/import/framing.py usr/share/bodyschema/import/read_ros_bag.py
+    usr/share/bodyschema/import/ros-bag.txt usr/share/bodyschema/import/read_lerobot.py
+    usr/share/bodyschema/import/lerobot.txt usr/share/bodyschema/config/g1/lerobot.yaml
     usr/lib/cmake/bodyschema/bodyschemaConfig.cmake
     usr/include/bodyschema/robot/robot_model.hpp
     usr/share/doc/bodyschema/README.md usr/share/doc/bodyschema/SECURITY.md

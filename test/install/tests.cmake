@@ -97,6 +97,33 @@ if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
   set_tests_properties(install.help_has_examples PROPERTIES LABELS install TIMEOUT ${timeout}
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 
+  # Skipped where PyPI's rosbags, which writes the bags, cannot be installed.
+  foreach(bag IN ITEMS bag real_bag)
+    string(REGEX MATCH "^real" real ${bag})
+    add_test(NAME imports.ros_${bag}
+      COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/imports/ros_bag_import.py
+        $<TARGET_FILE:bodyschema> ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/venv-ros-bag
+        ${PROJECT_BINARY_DIR}/test-ros-${bag} ${real})
+    bodyschema_patient(timeout 600)
+    set_tests_properties(imports.ros_${bag} PROPERTIES LABELS integration TIMEOUT ${timeout}
+      SKIP_RETURN_CODE 77 RESOURCE_LOCK venv-ros-bag ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+  endforeach()
+
+  # Skipped where PyPI's pyarrow and av, which write the data sets, cannot be installed.
+  if(TARGET lcmtypes_python)
+    foreach(set IN ITEMS set real_set)
+      string(REGEX MATCH "^real" real ${set})
+      add_test(NAME imports.lerobot_${set}
+        COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/imports/lerobot_import.py
+          $<TARGET_FILE:bodyschema> ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/venv-lerobot
+          ${PROJECT_BINARY_DIR}/test-lerobot-${set} ${real})
+      bodyschema_patient(timeout 600)
+      set_tests_properties(imports.lerobot_${set} PROPERTIES LABELS integration TIMEOUT ${timeout}
+        SKIP_RETURN_CODE 77 RESOURCE_LOCK venv-lerobot
+        ENVIRONMENT "PYTHONDONTWRITEBYTECODE=1;BODYSCHEMA_LCM_TYPES=${PROJECT_BINARY_DIR}/lcmtypes-python")
+    endforeach()
+  endif()
+
   # Skipped where snakemake is not installed.
   add_test(NAME fleet.workflow
     COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/fleet/workflow.py

@@ -65,6 +65,25 @@ TEST_F(StarterConfiguration, FindsTheArmBetweenRootAndHand) {
 }
 
 /// As in a ROS workspace: package://NAME/ stands for a folder above the URDF.
+// What config/estimator.yaml says of pairs of cameras once stopped every robot with one.
+TEST_F(StarterConfiguration, OneCameraIsEnough) {
+  auto o = options();
+  o.camera_links = {"camera_left_optical"};
+  o.width = 320;
+  o.height = 240;
+  o.focal_px = 420.0;
+  write_starter_configuration(o);
+  const Configuration configuration = Configuration::load(o.out / "estimator.yaml");
+  Pipeline pipeline(configuration);
+  const auto roles = JointRoles::of(pipeline.shared_robot(), pipeline.setup(), pipeline.rig());
+  const auto beliefs = Beliefs::from(configuration, roles, pipeline.rig(), EstimatorOptions::from(configuration));
+  const auto has = [&](const char* effect) {
+    return std::any_of(beliefs.state.begin(), beliefs.state.end(), [&](const Belief& b) { return b.effect == effect; });
+  };
+  EXPECT_TRUE(has("focal_length"));
+  EXPECT_FALSE(has("principal_point"));
+}
+
 TEST_F(StarterConfiguration, FindsTheFolderOfThePackageThatHoldsTheMeshes) {
   const fs::path package = folder_ / "src/lab/pointer_description";
   fs::create_directories(package / "urdf");

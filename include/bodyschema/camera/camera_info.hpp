@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include "bodyschema/core/configuration.hpp"
 #include "bodyschema/geometry/pinhole.hpp"
 #include "bodyschema/geometry/pose.hpp"
 
@@ -24,6 +25,8 @@ struct CameraInfo {
   /// writes it (camera_matrix, distortion_coefficients, ...). Throws ConfigurationError naming file, key and what was
   /// expected, FileError for a lens that five coefficients do not describe (fisheye, or k4 to k6 that are not 0).
   static CameraInfo read(const std::filesystem::path& file);
+  /// The same for what is read already. @param where  begins the error about a lens
+  static CameraInfo from(const Configuration& file, const std::string& where);
 };
 
 /// Where a camera sits in the frame of the one it was calibrated with as a stereo pair (OpenCV axes); identity where

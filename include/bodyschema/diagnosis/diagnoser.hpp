@@ -1,56 +1,43 @@
 #pragma once
 
 #include <functional>
-#include <map>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "bodyschema/diagnosis/diagnosis_report.hpp"
-#include "bodyschema/diagnosis/measurement.hpp"
-#include "bodyschema/diagnosis/selection.hpp"
+#include "bodyschema/evidence/log_fit.hpp"
+#include "bodyschema/evidence/outline_noise.hpp"
+#include "bodyschema/evidence/state.hpp"
 
 namespace bodyschema {
 
 struct DiagnosisOptions {
-  double block_s = 2.0;          ///< shortest block of the cross-validation
-  double shortest_log_s = 10.0;  ///< below it the log is refused
-  SelectionOptions selection;
-  int baseline_iterations = 8;
-  int refit_iterations = 4;
-  /// Effects that every real robot has and that the baseline fits beside the offsets.
-  std::vector<CauseName> nuisances;
-  /// Sizes of nuisances and of slips, by effect name in the unit of its parameter, that are put up with: a
-  /// picture's blur and threshold alone make a mask 0.1 px fatter, and not everywhere alike. The same
-  /// 0.1 px at the fingertips, a hand's length from the origin of their link at 0.3 m, is 0.1 % of the
-  /// mesh, at a forearm's flanks 0.4 %. (Detectable is 0.6 %.)
-  std::map<std::string, double> tolerances = {{"silhouette_bias", 0.1}, {"mesh_scale", 0.2}};
-  /// Instead of searching: exactly these causes are fitted (to measure what a known one is worth).
-  std::optional<std::vector<CauseName>> fixed_causes;
-  /// Where the fit of the offsets starts, rad by joint (encoder = true + offset); others at zero.
-  std::map<std::string, double> start_offsets;
-  /// Rms that noise alone leaves, px, and above which no name is trusted; the defaults are for
-  /// sources whose noise is not known.
-  double noise_rms_px = 1e9, trusted_rms_px = 1e9;
-  /// Share of the outline that must have been found, below which no name is trusted.
-  double trusted_outline = 0.0;
-  /// One sigma, as a share of an estimate, of errors that all blocks have in common and that therefore
-  /// do not show between them: how a picture's blur and threshold place an outline, what encoders did
-  /// between two readings. Widens the intervals of causes.
-  double systematic_share = 0.0;
-  /// The same whatever the cause's size is, for those that masks imitate: by effect, one sigma in the unit of its
-  /// parameter.
-  std::map<std::string, double> systematic_error;
-  std::function<void(double)> progress;  ///< called with the share done
+  /// Share of healthy logs in which something may be named, over all candidates together.
+  double level = 0.01;
+  /// What matters to a user, m: a cause that moves hand and outlines less than this, the joints' offsets fitted anew, is
+  /// one of several small errors and not named.
+  double matters_m = 0.0005;
+  double block_s = 1.0;            ///< shortest block; longer ones where neighbours err alike
+  double same_posture_rad = 0.05;  ///< a block ends only where the arm has moved by this
+  double shortest_log_s = 10.0;    ///< of moving pictures; fewer postures than `fewest_postures` and shorter: refused
+  std::size_t fewest_postures = 5;
+  double spacing_px = 3.0;         ///< of outline samples, px of a 320x240 picture
+  OutlineNoise::Prior noise;       ///< of outlines, before any was seen
+  std::size_t most_pictures = 400; ///< that a fit looks at; tests look at all
+  std::uint64_t seed = 1;          ///< of the sign flips
+  /// Where the search for joint offsets starts besides zero, rad (encoder = true + offset), RobotModel order.
+  std::vector<Eigen::VectorXd> start_offsets{};
+  std::function<void(double)> progress{};  ///< called with the share done
 };
 
-/// The usual nuisances for a robot: finger curl, mesh scale, mask dilation, vergence, neck roll,
-/// eye tilt and focal length.
-std::vector<CauseName> usual_nuisances(const JointRoles& roles);
-
-/// Says what the model gets wrong, from residuals. Steps: fit offsets and nuisances; compress;
-/// test the catalogue on blocks; refit with the causes found; measure the gain on held-out blocks.
+/// Says what the model of a robot gets wrong, from the outlines in a log's pictures. One loop: fit what is believed
+/// uncertain anyway (offsets, nuisances); ask of every cause of the catalogue, and of free curves over what a joint
+/// does, whether the blocks of the log agree that it is there (sign flips of blocks, the largest of all candidates at
+/// `level`: Westfall and Young 1993); take the one that predicts blocks best which its fit has not seen; fit again with
+/// it; until nothing is left. What it rests on is measured on the log itself.
+/// @param beliefs  the state's: offsets and nuisances with their standard deviations
+/// @param tolerances  of the robot: considered in every interval
 /// Throws DataError saying what to record when the log cannot be used at all.
-DiagnosisReport diagnose(MeasurementSource& source, const DiagnosisOptions& options);
+DiagnosisReport diagnose(LogFit& fit, const std::vector<Belief>& beliefs, const std::vector<Belief>& tolerances,
+                         const DiagnosisOptions& options);
 
 }  // namespace bodyschema

@@ -20,7 +20,7 @@ struct CauseName {
   [[nodiscard]] std::string text() const;
 };
 
-struct EstimatedParameter {
+struct DiagnosedParameter {
   std::string parameter;
   std::string unit;
   double estimate = 0.0;
@@ -36,7 +36,8 @@ struct EstimatedParameter {
 struct DiagnosedCause {
   CauseName cause;       ///< name is "unexplained" for structure that no effect explains
   std::string variable;  ///< unexplained: what the residual follows
-  std::vector<EstimatedParameter> parameters;
+  std::string sentence;  ///< "pictures arrive 58 ms (57 to 59) late against the encoders"
+  std::vector<DiagnosedParameter> parameters;
   /// Causes that this log cannot tell apart from it, itself first. One entry: named.
   std::vector<CauseName> same;
   std::string advice;  ///< the motion that would tell them apart; empty for a class of one
@@ -72,14 +73,12 @@ struct HeldoutError {
   double outline_where_seen = 1.0;  ///< the same in those pictures where enough of it was found to count
 };
 
-/// One bar of the chart of all candidates.
+/// One bar of the chart of all candidates: the largest |z| of it.
 struct CandidateBar {
   std::string label;
   bool generic = false;
-  bool nuisance = false;
-  bool testable = true;
-  double z_before = 0.0, gain_before = 0.0;  ///< against the baseline
-  double z_after = 0.0, gain_after = 0.0;    ///< against the extended model
+  double z_before = 0.0;  ///< beside offsets and nuisances
+  double z_after = 0.0;   ///< beside the extended model
 };
 
 /// What a model leaves of one picture, held out.
@@ -87,6 +86,7 @@ struct Remainder {
   double rms_px = 0.0;               ///< along the outline's normals; 0 where nothing was found
   double mean_px = 0.0;              ///< mean along the outward normal
   std::vector<double> apparent_deg;  ///< correction of each arm joint alone that it asks for
+  Eigen::Vector3d hand_C_m = Eigen::Vector3d::Zero();  ///< where the model has the hand in the camera, m
 };
 
 /// One exposure, for the charts of structure.
@@ -102,13 +102,6 @@ struct ResidualSample {
   double depth_m = 0.0;
 };
 
-/// A part of the log, up to its end or from its beginning, whose outlines lie many times further off than the rest's,
-/// so that nothing is known of it.
-struct PartOutOfSight {
-  double from_s = 0.0, to_s = 0.0;  ///< from the first picture
-  double share = 0.0;               ///< of the pictures in which an outline is predicted
-};
-
 /// The answer to "what does the model of this robot get wrong?".
 struct DiagnosisReport {
   std::string verdict;   ///< "none", "named", "class" or "unexplained"
@@ -116,27 +109,24 @@ struct DiagnosisReport {
   std::vector<DiagnosedCause> causes;
   std::vector<NotTestable> not_testable;
   std::vector<ExclusionLimit> exclusion_limits;
+  /// What is left on one side of one part, in block after block: "the left outline of r_hand lies 0.8 px outside of where
+  /// the model has it in the pictures of left". Empty: nothing.
+  std::string side_left_over;
   bool crowded = false;  ///< several small errors share what is left, none of them a cause by itself
   /// Before: offsets and those nuisances that are not themselves found to be causes.
   HeldoutError before, after;
   std::map<std::string, double> offsets_deg_before, offsets_deg_after;
   std::map<std::string, std::array<double, 2>> offsets_ci95_deg;
   std::vector<std::string> warnings;
-  std::optional<PartOutOfSight> out_of_sight;
 
   // For charts.
   std::vector<std::string> arm_joints;
   std::vector<CandidateBar> bars;
-  double z_threshold = 0.0, gain_threshold = 0.0;
-  double z_threshold_large = 0.0, gain_large = 0.0;  ///< of a cause in time that takes away more than `gain_large`
+  double z_threshold = 0.0;  ///< the largest |z| of all candidates that chance alone reaches in one log of a hundred
   std::vector<ResidualSample> samples;
   Microseconds begin_utime = 0;  ///< first picture
-  double duration_s = 0.0, block_s = 0.0, noise_correlation_s = 0.0;
+  double duration_s = 0.0, block_s = 0.0;
   std::size_t views = 0, blocks = 0;
-
-  /// What the models say the arm's joints are, minus the encoders, rad: views x arm joints. Causes
-  /// may trade a constant with the offsets; these sums do not.
-  Eigen::MatrixXd joint_corrections_before, joint_corrections_after;
 
   /// Offsets, nuisances and causes with their estimates: the extended model.
   std::optional<ErrorModel> extended_model;

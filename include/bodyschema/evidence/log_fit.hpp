@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "bodyschema/evidence/outline_noise.hpp"
 #include "bodyschema/evidence/picture_log.hpp"
 #include "bodyschema/evidence/state.hpp"
 #include "bodyschema/outline/outline_measurement.hpp"
@@ -39,7 +40,6 @@ struct FitSettings {
   double finest_px = 6.0;      ///< and this far in the end
   double robust_px = 3.0;      ///< robust scale in the end; from afar it is half of how far is looked
   double spacing_px = 3.0;     ///< between the points of an outline
-  std::size_t every = 1;       ///< every n-th picture of a camera only
   double variance_px2 = 1.0;   ///< of a residual, what neighbours share counted in: weighs pictures against beliefs
   std::function<void(double)> progress{};
 };
@@ -77,6 +77,10 @@ class LogFit {
   /// Fits the state; @return the mean cost of an outline point at the end, px^2 of a 320x240 picture.
   /// @param free  positions of parameters that may move; empty: all
   double fit(State& state, const FitSettings& settings, std::span<const std::size_t> pictures = {});
+
+  /// How outlines err in each camera's pictures, measured on what a model leaves.
+  std::vector<OutlineNoise> noise(const ErrorModel& model, const OutlineSearch& search, const OutlineNoise::Prior& prior,
+                                  std::span<const std::size_t> pictures = {});
 
   /// Coordinates that some of these parameters move in some picture.
   std::vector<std::uint32_t> moved_by(const ErrorModel& model, const std::vector<ParameterRef>& parameters);

@@ -1,0 +1,402 @@
+#include "model_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "bodyschema/evidence/batch_fit.hpp"
+#include "limits.hpp"
+
+namespace bodyschema::diagnosis {
+namespace {
+
+std::vector<ParameterRef> refs_of(const State& state) {
+  std::vector<ParameterRef> refs;
+  for (const auto& p : state.parameters()) refs.push_back(p.ref);
+  return refs;
+}
+
+/// Every n-th observation, so that at most so many pictures are looked at.
+std::vector<std::size_t> raster_of(const PictureLog& log, std::size_t most) {
+  const auto pictures = log.pictures();
+  const std::size_t every = (pictures.size() + most - 1) / std::max<std::size_t>(1, most);
+  std::vector<std::size_t> list, seen(log.rig().cameras.size(), 0);
+  for (std::size_t p = 0; p < pictures.size(); ++p) {
+    if (seen[pictures[p].camera]++ % std::max<std::size_t>(1, every) == 0) list.push_back(p);
+  }
+  return list;
+}
+
+}  // namespace
+
+Belief wide_belief(const CauseName& cause, const JointRoles& roles) {
+  const EffectTarget target{cause.joint, cause.source};
+  const auto effect = make_effect(cause.name, target, roles);
+  std::vector<double> sd;
+  for (const auto& p : std::as_const(*effect).parameters()) {
+    if (p.fitted) sd.push_back(limits::kWide * p.typical);
+  }
+  return {cause.name, target, sd};
+}
+
+ModelSearch::ModelSearch(LogFit& fit, const std::vector<Belief>& beliefs, const std::vector<Belief>& tolerances,
+                         const DiagnosisOptions& options)
+    : fit_(fit), beliefs_(beliefs), tolerances_(tolerances), options_(options), raster_(raster_of(fit.log(), options.most_pictures)),
+      state_(fit.log().roles(), beliefs), noise_(fit.log().rig().cameras.size(), OutlineNoise(options.noise)) {}
+
+OutlineSearch ModelSearch::search() const {
+  double robust_px = 0.0;
+  for (const auto& noise : noise_) robust_px = std::max(robust_px, noise.robust_px());
+  return {limits::kSearch_px, options_.spacing_px, robust_px};
+}
+
+void ModelSearch::measure_noise() {
+  constexpr double kRobust_px = 3.0;
+  noise_ = fit_.noise(state_.model(), {limits::kSearch_px, options_.spacing_px, kRobust_px}, options_.noise, raster_);
+}
+
+double ModelSearch::fit(State& state, double from_px) {
+  double variance = 0.0;
+  for (const auto& noise : noise_) variance += noise.variance_px2() / static_cast<double>(noise_.size());
+  return fit_.fit(state,
+                  {.iterations = 12,
+                   .from_px = from_px,
+                   .finest_px = limits::kSearch_px,
+                   .robust_px = search().robust_px,
+                   .spacing_px = options_.spacing_px,
+                   .variance_px2 = variance},
+                  raster_);
+}
+
+void ModelSearch::start() {
+  std::vector<Eigen::VectorXd> starts = options_.start_offsets;
+  starts.insert(starts.begin(), Eigen::VectorXd());
+  std::optional<State> best;
+  for (const auto& offsets : starts) {
+    State state(fit_.log().roles(), beliefs_);
+    Eigen::VectorXd x = state.x();
+    for (Eigen::Index j = 0; j < state.joints() && offsets.size() > 0; ++j) {
+      x[j] = offsets[state.parameters()[static_cast<std::size_t>(j)].joint];
+    }
+    state.set(x);
+    const double cost = fit(state, limits::kFrom_px);
+    if (best && cost >= cost_) continue;
+    cost_ = cost;
+    best = std::move(state);
+  }
+  state_ = std::move(*best);
+  measure_noise();
+  cost_ = fit(state_, 0.0);
+  measure_noise();
+}
+
+State ModelSearch::state_with(const std::vector<FoundCause>& causes) const {
+  auto beliefs = beliefs_;
+  for (const auto& cause : causes) {
+    if (cause.generic()) continue;
+    const auto wide = wide_belief(cause.name, fit_.log().roles());
+    std::erase_if(beliefs, [&](const Belief& b) { return b.effect == wide.effect && b.target == wide.target; });
+    beliefs.push_back(wide);
+  }
+  State state(fit_.log().roles(), beliefs);
+  for (const auto& cause : causes) {
+    if (cause.generic()) continue;
+    auto* effect = state.model().find(cause.name.name, {cause.name.joint, cause.name.source});
+    const auto timing = effect_kind(cause.name.name).timing;
+    if (timing == EffectTiming::kFromATime) effect->parameters()[1].value = seconds(cause.from);
+    if (timing != EffectTiming::kOverTheLog) continue;
+    effect->parameters()[1].value = cause.begin_s;
+    effect->parameters()[2].value = cause.duration_s;
+  }
+  return state;
+}
+
+void ModelSearch::take_over(State& to, const State& from) {
+  Eigen::VectorXd x = to.x();
+  const Eigen::VectorXd values = from.x();
+  for (Eigen::Index i = 0; i < from.size(); ++i) {
+    const auto& ref = from.parameters()[static_cast<std::size_t>(i)].ref;
+    const auto& effect = from.model()[ref.effect];
+    if (const auto at = to.find(effect.name(), effect.target(), ref.parameter); at >= 0) x[at] = values[i];
+  }
+  to.set(x);
+}
+
+bool ModelSearch::add(const FoundCause& cause, const Eigen::VectorXd& estimate, Eigen::Index base) {
+  auto causes = causes_;
+  causes.push_back(cause);
+  if (cause.generic()) {
+    causes_ = std::move(causes);
+    return true;
+  }
+  State stepped = state_;
+  stepped.set(state_.x() + estimate.head(state_.size()));
+  State state = state_with(causes);
+  take_over(state, stepped);
+  Eigen::VectorXd x = state.x();
+  const EffectTarget target{cause.name.joint, cause.name.source};
+  Eigen::Index column = base;
+  const auto parameters = std::as_const(*state.model().find(cause.name.name, target)).parameters();
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    if (!parameters[p].fitted) continue;
+    if (const auto at = state.find(cause.name.name, target, p); at >= 0) x[at] += estimate[column];
+    ++column;
+  }
+  state.set(x);
+  const double cost = fit(state, 0.0);
+  if (cost >= cost_ * (1.0 - limits::kLeastGain)) return false;
+  cost_ = cost;
+  causes_ = std::move(causes);
+  state_ = std::move(state);
+  measure_noise();
+  cost_ = fit(state_, 0.0);
+  return true;
+}
+
+void ModelSearch::drop(std::size_t cause) {
+  auto causes = causes_;
+  const bool generic = causes[cause].generic();
+  causes.erase(causes.begin() + static_cast<std::ptrdiff_t>(cause));
+  causes_ = causes;
+  if (generic) return;
+  State state = state_with(causes);
+  take_over(state, state_);
+  // A nuisance that was let loose is held by its belief again.
+  cost_ = fit(state, 0.0);
+  state_ = std::move(state);
+}
+
+std::vector<Eigen::Index> ModelSearch::columns_of(const CauseName& name) const {
+  std::vector<Eigen::Index> list;
+  for (Eigen::Index i = 0; i < state_.size(); ++i) {
+    const auto& effect = state_.model()[state_.parameters()[static_cast<std::size_t>(i)].ref.effect];
+    if (effect.name() == name.name && effect.target() == EffectTarget{name.joint, name.source}) list.push_back(i);
+  }
+  return list;
+}
+
+std::vector<Eigen::Index> ModelSearch::columns_of(std::size_t cause) const {
+  const auto& found = causes_[cause];
+  if (!found.generic()) return columns_of(found.name);
+  std::vector<Eigen::Index> list;
+  Eigen::Index first = state_.size();
+  for (std::size_t c = 0; c < cause; ++c) {
+    if (causes_[c].generic()) first += static_cast<Eigen::Index>(causes_[c].amounts.size());
+  }
+  for (std::size_t k = 0; k < found.amounts.size(); ++k) list.push_back(first + static_cast<Eigen::Index>(k));
+  return list;
+}
+
+LogAbout ModelSearch::about(double block_s) {
+  std::vector<std::uint32_t> all(static_cast<std::size_t>(fit_.coordinates().size()));
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint32_t>(i);
+  LogAbout log(state_);
+  log.at = fit_.linearise(state_.model(), all, search());
+  log.base = fit_.directions(log.at, state_.model(), refs_of(state_));
+  add_free_curves(log);
+  add_considered(log);
+  for (std::size_t p = 0; p < log.base.size(); ++p) {
+    const auto camera = fit_.log().pictures()[p].camera;
+    const double unit = picture_unit(fit_.log().rig().cameras[camera].intrinsics);
+    const bool seen = log.at.evidence[p].weight > 0.0;
+    log.precision.push_back(seen ? 1.0 / (unit * unit * noise_[camera].variance_px2()) : 0.0);
+  }
+  log.block_s = block_s;
+  group_blocks(log);
+  return log;
+}
+
+void ModelSearch::add_free_curves(LogAbout& log) const {
+  for (const auto& cause : causes_) {
+    if (!cause.generic()) {
+      log.found.push_back(cause.name);
+      continue;
+    }
+    const auto more = along_joint(fit_, state_.model().roles().index(cause.name.joint), cause.amounts);
+    for (std::size_t p = 0; p < more.size(); ++p) log.base[p].insert(log.base[p].end(), more[p].begin(), more[p].end());
+  }
+}
+
+void ModelSearch::add_considered(LogAbout& log) const {
+  const auto& roles = state_.model().roles();
+  ErrorModel model(roles);
+  for (const auto& belief : tolerances_) {
+    const CauseName cause{belief.effect, belief.target.joint, belief.target.source};
+    if (std::find(log.found.begin(), log.found.end(), cause) != log.found.end()) continue;
+    model.add(belief.effect, belief.target);
+    log.considered_sd.insert(log.considered_sd.end(), belief.sd.begin(), belief.sd.end());
+  }
+  std::vector<std::vector<Direction>> directions(log.base.size());
+  if (model.size() > 0) directions = fit_.directions(log.at, model, fitted_parameters(model));
+  // How far pictures place a whole flank: each camera's outlines as a whole, and each part's to the outside.
+  const auto& cameras = fit_.log().rig().cameras;
+  const auto coordinate = [&](Coordinate::Kind kind, std::size_t index) {
+    return static_cast<std::uint32_t>(fit_.coordinates().find({kind, static_cast<Eigen::Index>(index)}));
+  };
+  for (std::size_t p = 0; p < directions.size(); ++p) {
+    for (std::size_t c = 0; c < cameras.size(); ++c) {
+      for (const auto kind : {Coordinate::Kind::kCx, Coordinate::Kind::kCy}) {
+        const bool own = fit_.log().pictures()[p].camera == c;
+        directions[p].push_back(own ? Direction{{coordinate(kind, 0), 1.0}} : Direction{});
+      }
+    }
+    for (std::size_t s = 0; s < roles.segments.size(); ++s) {
+      directions[p].push_back({{coordinate(Coordinate::Kind::kDilation, s), 1.0}});
+    }
+    log.base[p].insert(log.base[p].end(), directions[p].begin(), directions[p].end());
+  }
+  for (const auto& camera : cameras) {
+    log.considered_sd.insert(log.considered_sd.end(), 2, limits::kFloor_px * picture_unit(camera.intrinsics));
+  }
+  log.considered_sd.insert(log.considered_sd.end(), roles.segments.size(),
+                           limits::kFloor_px * picture_unit(cameras.front().intrinsics));
+}
+
+void ModelSearch::group_blocks(LogAbout& log) const {
+  Eigen::VectorXd begin, last;
+  double begin_s = 0.0;
+  for (const auto& picture : fit_.log().pictures()) {
+    const Eigen::VectorXd q = posture_of(picture.joints.q, state_.model().roles());
+    const double t = seconds(picture.joints.utime);
+    const bool jumped = last.size() > 0 && (q - last).cwiseAbs().maxCoeff() > limits::kJump_rad;
+    const bool moved = begin.size() == 0 || (q - begin).cwiseAbs().maxCoeff() > options_.same_posture_rad;
+    if (begin.size() == 0 || jumped || (moved && t - begin_s >= log.block_s)) {
+      begin = q;
+      begin_s = t;
+      ++log.blocks;
+    }
+    last = q;
+    log.block_of.push_back(log.blocks - 1);
+  }
+}
+
+BlockRegression ModelSearch::regression(const LogAbout& log) const {
+  const auto n = static_cast<Eigen::Index>(log.base.front().size());
+  const auto considered = static_cast<Eigen::Index>(log.considered_sd.size());
+  Eigen::VectorXd precision = Eigen::VectorXd::Zero(n), away = precision;
+  precision.head(state_.size()) = state_.prior_sd().array().square().inverse();
+  away.head(state_.size()) = state_.x() - state_.prior_mean();
+  for (Eigen::Index i = 0; i < considered; ++i) {
+    const double sd = log.considered_sd[static_cast<std::size_t>(i)];
+    precision[n - considered + i] = 1.0 / std::max(1e-300, sd * sd);
+  }
+  return {base_blocks(log), precision, away};
+}
+
+Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Direction>>& columns, const Eigen::VectorXd& amount,
+                          const Eigen::VectorXd& of_base) {
+  Size size;
+  double pictures = 0.0, weight = 0.0, depth = 0.0, focal = 0.0;
+  auto& measurement = fit_.measurement();
+  std::vector<std::size_t> some;
+  for (std::size_t i = 0; i < raster_.size(); i += std::max<std::size_t>(1, raster_.size() / limits::kPicturesForSize)) {
+    some.push_back(raster_[i]);
+  }
+  Eigen::VectorXd moved(fit_.coordinates().size());
+  for (const auto p : some) {
+    if (log.precision[p] <= 0.0) continue;
+    moved.setZero();
+    for (Eigen::Index k = 0; k < amount.size(); ++k) {
+      for (const auto& step : columns[p][static_cast<std::size_t>(k)]) moved[step.coordinate] += amount[k] * step.amount;
+    }
+    for (Eigen::Index i = 0; i < of_base.size(); ++i) {
+      for (const auto& step : log.base[p][static_cast<std::size_t>(i)]) moved[step.coordinate] += of_base[i] * step.amount;
+    }
+    const auto& picture = fit_.log().pictures()[p];
+    const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera, log.at.coordinates,
+                                                    measurement.projection().hand_link());
+    const auto& evidence = log.at.evidence[p];
+    size.hand_m += (jacobian.topRows<3>() * moved).squaredNorm();
+    size.outline_px += moved.dot(evidence.A * moved);
+    weight += evidence.weight;
+    depth += measurement.projection().hand().translation().z();
+    focal += fit_.log().rig().cameras[picture.camera].intrinsics.fx;
+    pictures += 1.0;
+  }
+  if (pictures <= 0.0 || weight <= 0.0) return {};
+  size.hand_m = std::sqrt(size.hand_m / pictures);
+  size.outline_px = std::sqrt(std::max(0.0, size.outline_px / weight));
+  size.outline_m = size.outline_px * depth / focal;
+  return size;
+}
+
+void ModelSearch::polish(double block_s) {
+  constexpr int kRounds = 3;
+  double misfit = 0.0, points = 0.0;
+  Eigen::VectorXd before = state_.x();
+  for (int round = 0; round <= kRounds; ++round) {
+    const auto log = about(block_s);
+    if (round == 0) points = log.at.sampled();
+    const double own = fit_.misfit(log.at, points);
+    if (round > 0 && own > misfit * (1.0 + limits::kLeastGain)) {
+      state_.set(before);
+      return;
+    }
+    misfit = own;
+    before = state_.x();
+    if (round == kRounds) return;
+    const auto base = regression(log);
+    const Eigen::VectorXd step = base.step().head(state_.size());
+    const Eigen::VectorXd sd = base.covariance().diagonal().head(state_.size()).cwiseSqrt();
+    constexpr double kNegligible_sd = 0.05;
+    if (step.cwiseQuotient(sd.cwiseMax(1e-300)).cwiseAbs().maxCoeff() < kNegligible_sd) return;
+    state_.set(before + step);
+  }
+}
+
+void ModelSearch::look_for_lost_part() {
+  const auto pictures = fit_.log().pictures();
+  const auto at = fit_.linearise(state_.model(), {}, search());
+  // Seen from the beginning up to some picture, and hardly from there on; or the other way round.
+  std::vector<double> seen(pictures.size() + 1, 0.0);
+  for (std::size_t p = 0; p < pictures.size(); ++p) seen[p + 1] = seen[p] + (at.evidence[p].weight > 0.0 ? 1.0 : 0.0);
+  std::size_t split = 0;
+  double most = 0.0;
+  for (std::size_t p = 1; p < pictures.size(); ++p) {
+    const double before = seen[p] / static_cast<double>(p);
+    const double after = (seen.back() - seen[p]) / static_cast<double>(pictures.size() - p);
+    const double contrast = std::abs(before - after) * std::sqrt(static_cast<double>(p * (pictures.size() - p)));
+    if (contrast <= most) continue;
+    most = contrast;
+    split = p;
+  }
+  const auto count = static_cast<double>(pictures.size());
+  const double before = seen[split] / std::max(1.0, static_cast<double>(split));
+  const double after = (seen.back() - seen[split]) / std::max(1.0, count - static_cast<double>(split));
+  if (split == 0 || std::abs(before - after) < limits::kLostContrast) return;
+  std::vector<std::size_t> lost;
+  for (const auto p : raster_) {
+    if ((p < split) == (before < after)) lost.push_back(p);
+  }
+  if (lost.size() < 2 * static_cast<std::size_t>(state_.size())) return;
+  State there = state_;
+  fit_.fit(there, {.iterations = 12, .from_px = limits::kFrom_px, .finest_px = limits::kSearch_px, .spacing_px = options_.spacing_px}, lost);
+  const Eigen::VectorXd change = there.x() - state_.x();
+  const double sign = before < after ? 1.0 : -1.0;  // a slip moves the joint against its offset, from its time on
+  std::optional<State> best;
+  FoundCause found;
+  double cost = cost_ * (1.0 - limits::kLeastGain);
+  for (Eigen::Index j = 0; j < state_.joints(); ++j) {
+    const FoundCause slip{.name = {"slip", state_.parameters()[static_cast<std::size_t>(j)].name, ""},
+                          .variable = {}, .from = pictures[split].joints.utime};
+    State state = state_with({slip});
+    take_over(state, before < after ? there : state_);
+    Eigen::VectorXd x = state.x();
+    const auto step = state.find("slip", {slip.name.joint, ""}, 0);
+    if (step < 0) continue;
+    x[step] = sign * change[j];
+    state.set(x);
+    const double own = fit(state, limits::kFrom_px);
+    if (own >= cost) continue;
+    cost = own;
+    found = slip;
+    best = std::move(state);
+  }
+  if (!best) return;
+  state_ = std::move(*best);
+  causes_ = {found};
+  measure_noise();
+  cost_ = fit(state_, 0.0);
+}
+
+}  // namespace bodyschema::diagnosis

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "block_regression.hpp"
+#include "bodyschema/diagnosis/diagnoser.hpp"
+#include "candidates.hpp"
+
+namespace bodyschema::diagnosis {
+
+/// A cause that was found.
+struct FoundCause {
+  CauseName name;
+  std::string variable;                       ///< of a free curve
+  Microseconds from = 0;                      ///< of a slip
+  double begin_s = 0.0, duration_s = 0.0;     ///< of a drift
+  std::vector<std::vector<double>> amounts{}; ///< of a free curve
+  bool small = false;                         ///< it moves less than what matters: not named, but in the model
+  [[nodiscard]] bool generic() const { return !variable.empty(); }
+};
+
+/// What a cause moves, root mean square over the log.
+struct Size {
+  double hand_m = 0.0, outline_px = 0.0;
+  double outline_m = 0.0;  ///< at the hand's depth
+  [[nodiscard]] double metres() const { return std::max(hand_m, outline_m); }
+};
+
+/// The model of a log as it grows: a state with beliefs, and the causes that were found.
+class ModelSearch {
+ public:
+  ModelSearch(LogFit& fit, const std::vector<Belief>& beliefs, const std::vector<Belief>& tolerances,
+              const DiagnosisOptions& options);
+
+  /// Fits the state from all starts.
+  void start();
+  /// The log about the present model, in blocks of at least `block_s`.
+  [[nodiscard]] LogAbout about(double block_s);
+  [[nodiscard]] BlockRegression regression(const LogAbout& log) const;
+
+  /// Takes a cause in and fits again. False, and nothing changes, where that is no better.
+  /// @param estimate  of the base's parameters (steps), then of the cause's columns
+  bool add(const FoundCause& cause, const Eigen::VectorXd& estimate, Eigen::Index base);
+  void drop(std::size_t cause);
+  /// Where a part of the log lies out of sight of the model: tries a slip of every joint there.
+  void look_for_lost_part();
+
+  /// Moves the state to where all pictures together have it: what a fit along a direction that is hardly told leaves.
+  void polish(double block_s);
+
+  [[nodiscard]] const State& state() const { return state_; }
+  [[nodiscard]] const std::vector<FoundCause>& causes() const { return causes_; }
+  [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
+  [[nodiscard]] double cost() const { return cost_; }
+  /// Positions of a cause's parameters in the base.
+  [[nodiscard]] std::vector<Eigen::Index> columns_of(std::size_t cause) const;
+  /// Positions of an effect's parameters in the state; empty: it is not estimated.
+  [[nodiscard]] std::vector<Eigen::Index> columns_of(const CauseName& effect) const;
+  [[nodiscard]] OutlineSearch search() const;
+  [[nodiscard]] const std::vector<std::size_t>& raster() const { return raster_; }
+  /// What a change of some columns and of the base's parameters moves.
+  [[nodiscard]] Size size_of(const LogAbout& log, const std::vector<std::vector<Direction>>& columns,
+                             const Eigen::VectorXd& amount, const Eigen::VectorXd& of_base);
+
+ private:
+  [[nodiscard]] State state_with(const std::vector<FoundCause>& causes) const;
+  /// Values of the parameters that two states share.
+  static void take_over(State& to, const State& from);
+  void add_free_curves(LogAbout& log) const;
+  void add_considered(LogAbout& log) const;
+  void group_blocks(LogAbout& log) const;
+  double fit(State& state, double from_px);
+  void measure_noise();
+
+  LogFit& fit_;
+  std::vector<Belief> beliefs_, tolerances_;
+  const DiagnosisOptions& options_;
+  std::vector<std::size_t> raster_;  ///< pictures that a fit looks at
+  State state_;
+  std::vector<FoundCause> causes_;
+  std::vector<OutlineNoise> noise_;
+  double cost_ = 0.0;
+};
+
+/// A belief about an effect so wide that it is none.
+Belief wide_belief(const CauseName& cause, const JointRoles& roles);
+
+}  // namespace bodyschema::diagnosis
