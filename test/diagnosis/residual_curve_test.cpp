@@ -6,7 +6,8 @@
 #include <functional>
 #include <random>
 
-#include "diagnosis_trials/trial_robot.hpp"
+#include "bodyschema/geometry/pose.hpp"
+#include "random_seed.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
