@@ -69,7 +69,32 @@ std::optional<Pose> camera_motion(const std::shared_ptr<const RobotModel>& robot
   return X;
 }
 
+/// Else it is a frame that only the configuration knows.
+bool is_link_of_urdf(const CameraModel& camera) {
+  return !camera.mount.relative && camera.link == camera.mount.parent;
+}
+
 }  // namespace
+
+StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                        const StereoRig& rig) {
+  StereoRig result = model.corrected(rig);
+  std::vector<Pose> moved(rig.cameras.size(), Pose::Identity());
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    Corrections change = model.roles().no_corrections();
+    model.corrections(at_rest(robot->joint_count(), c), change);
+    const auto motion = camera_motion(robot, setup, rig, c, change);
+    if (motion) moved[c] = *motion;
+    if (is_link_of_urdf(rig.cameras[c])) continue;
+    CameraMount& mount = result.cameras[c].mount;
+    mount.X_PC = mount.X_PC * moved[c];
+    if (mount.relative) mount.X_PC = moved.front().inverse(Eigen::Isometry) * mount.X_PC;
+    if (motion || (mount.relative && !moved.front().isApprox(Pose::Identity(), 1e-12))) {
+      mount.knowledge = PlaceKnowledge::kKnown;
+    }
+  }
+  return result;
+}
 
 std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
                                               const RobotSetup& setup, const StereoRig& rig, Correction& correction) {
@@ -88,7 +113,11 @@ std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::share
         Corrections change = model.roles().no_corrections();
         effect.apply(at_rest(joints, c), change);
         if (auto moved = camera_motion(robot, setup, rig, c, change)) {
-          correction.camera_motions.emplace_back(rig.cameras[c].link, *moved);
+          if (is_link_of_urdf(rig.cameras[c])) {
+            correction.camera_motions.emplace_back(rig.cameras[c].link, *moved);
+          } else {
+            entry.applied = "cameras.yaml";
+          }
         }
         if (c > 0) continue;  // the rest changes for all cameras alike
         if (change.base_shift_m.norm() > 0.0) {
