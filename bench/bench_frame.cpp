@@ -5,6 +5,7 @@
 #include <benchmark/benchmark.h>
 
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,10 +17,25 @@ namespace {
 
 using namespace bodyschema;
 
-Configuration configuration(const std::string& engine, const std::string& mode, int particles) {
+struct Size {
+  int width, height;
+  [[nodiscard]] std::string text() const { return std::to_string(width) + "x" + std::to_string(height); }
+};
+
+Configuration configuration(const std::string& engine, const std::string& mode, Size size, int particles) {
   const std::filesystem::path file = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml";
-  return Configuration::load(
-      file, {"silhouette.engine=" + engine, "estimator.mode=" + mode, "filter.particles=" + std::to_string(particles)});
+  std::vector<std::string> overrides{"silhouette.engine=" + engine, "estimator.mode=" + mode,
+                                     "filter.particles=" + std::to_string(particles)};
+  const double focal_px = 257.34 * size.width / 320.0;
+  for (const std::string camera : {"cameras.left.", "cameras.right."}) {
+    overrides.push_back(camera + "width=" + std::to_string(size.width));
+    overrides.push_back(camera + "height=" + std::to_string(size.height));
+    overrides.push_back(camera + "fx=" + std::to_string(focal_px));
+    overrides.push_back(camera + "fy=" + std::to_string(focal_px));
+    overrides.push_back(camera + "cx=" + std::to_string(0.5 * (size.width - 1)));
+    overrides.push_back(camera + "cy=" + std::to_string(0.5 * (size.height - 1)));
+  }
+  return Configuration::load(file, overrides);
 }
 
 /// A reach and the empty frames before it, drawn once. Masks are filled in by whoever uses it.
@@ -28,9 +44,11 @@ struct Reach {
   std::vector<Observation> motion;
 };
 
-const Reach& reach() {
-  static const Reach made = [] {
-    const Configuration c = configuration("contour", "best", 200);
+const Reach& reach(Size size) {
+  static std::map<std::string, Reach> all;
+  if (const auto found = all.find(size.text()); found != all.end()) return found->second;
+  const auto made = [&] {
+    const Configuration c = configuration("contour", "best", size, 200);
     const RobotSetup setup = RobotSetup::from(c.section("robot"));
     auto settings = simulator::SimulatorSettings::from(c.section("simulator"));
     settings.background_frames = 25;
@@ -48,18 +66,18 @@ const Reach& reach() {
       list.push_back(simulator::to_observation(*frame, history));
     }
     return result;
-  }();
-  return made;
+  };
+  return all.emplace(size.text(), made()).first->second;
 }
 
 /// Frames of the reach in turn, as the service gets them.
-void whole_frame(benchmark::State& state, const std::string& engine, const std::string& mode, int particles,
-                 bool ahead) {
-  Pipeline pipeline(configuration(engine, mode, particles));
-  for (Observation observation : reach().background) pipeline.process(observation);
+void whole_frame(benchmark::State& state, const std::string& engine, const std::string& mode, Size size,
+                 int particles, bool ahead) {
+  Pipeline pipeline(configuration(engine, mode, size, particles));
+  for (Observation observation : reach(size).background) pipeline.process(observation);
   // The first frames search; what counts is the frame of a running service.
   constexpr std::size_t kWarmUp = 30;
-  const auto& motion = reach().motion;
+  const auto& motion = reach(size).motion;
   for (std::size_t i = 0; i < kWarmUp; ++i) {
     Observation observation = motion[i];
     pipeline.process(observation);
@@ -102,15 +120,19 @@ void whole_frame(benchmark::State& state, const std::string& engine, const std::
 void register_all() {
   for (const std::string engine : {"contour", "atlas"}) {
     for (const std::string mode : {"best", "paper"}) {
-      for (const int particles : {50, 200, 1000, 10000}) {
-        if (engine == "atlas" && particles > 1000) continue;  // seconds a frame in software
-        for (const bool ahead : {false, true}) {
-          benchmark::RegisterBenchmark(
-              (engine + (ahead ? "+ahead/" : "/") + mode + "/8k/320x240/" + std::to_string(particles)).c_str(),
-              [=](benchmark::State& state) { whole_frame(state, engine, mode, particles, ahead); })
-              ->MeasureProcessCPUTime()
-              ->UseRealTime()
-              ->Unit(benchmark::kMillisecond);
+      for (const Size size : {Size{320, 240}, Size{640, 480}, Size{1280, 720}}) {
+        for (const int particles : {50, 200, 1000, 10000}) {
+          if (engine == "atlas" && particles > 1000) continue;  // seconds a frame in software
+          if (size.width > 320 && particles != 200) continue;
+          for (const bool ahead : {false, true}) {
+            benchmark::RegisterBenchmark(
+                (engine + (ahead ? "+ahead/" : "/") + mode + "/8k/" + size.text() + "/" + std::to_string(particles))
+                    .c_str(),
+                [=](benchmark::State& state) { whole_frame(state, engine, mode, size, particles, ahead); })
+                ->MeasureProcessCPUTime()
+                ->UseRealTime()
+                ->Unit(benchmark::kMillisecond);
+          }
         }
       }
     }

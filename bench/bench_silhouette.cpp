@@ -13,6 +13,9 @@
 #include <vector>
 
 #include "atlas_scorer.hpp"
+#ifdef BODYSCHEMA_BENCH_SEARCH
+#include "bodyschema/search/search_level.hpp"
+#endif
 #include "bodyschema/silhouette/contour_points.hpp"
 #include "naive_scorer.hpp"
 #include "scene_file.hpp"
@@ -52,8 +55,9 @@ std::vector<PinholeIntrinsics> resized(const Scene& scene, Size size) {
   std::vector<PinholeIntrinsics> cameras;
   for (const auto& k : scene.cameras) {
     const double scale = size.width / static_cast<double>(k.width);
-    cameras.push_back(
-        {size.width, size.height, scale * k.fx, scale * k.fy, scale * (k.cx + 0.5) - 0.5, scale * (k.cy + 0.5) - 0.5});
+    const double cut = 0.5 * (scale * k.height - size.height);  // 16:9 shows less above and below
+    cameras.push_back({size.width, size.height, scale * k.fx, scale * k.fy, scale * (k.cx + 0.5) - 0.5,
+                       scale * (k.cy + 0.5) - 0.5 - cut});
   }
   return cameras;
 }
@@ -66,6 +70,28 @@ std::unique_ptr<SilhouetteScorer> make(const std::string& engine, const Silhouet
   AtlasOptions options;
   if (engine == "atlas_raster") options.pass = AtlasPass::kRaster;
   return make_atlas_scorer(model, cameras, std::move(context), options);
+}
+
+// Scenes hold a thousand particles; more are the same again.
+std::vector<Eigen::Isometry3f> poses_of(const Scene& scene, std::size_t particles) {
+  const std::size_t per_particle = scene.cameras.size() * scene.model.parts.size();
+  std::vector<Eigen::Isometry3f> X_CB;
+  for (std::size_t i = 0; i < particles; ++i) {
+    const auto first = scene.X_CB.begin() + static_cast<std::ptrdiff_t>(i % scene.particles() * per_particle);
+    X_CB.insert(X_CB.end(), first, first + static_cast<std::ptrdiff_t>(per_particle));
+  }
+  return X_CB;
+}
+
+// What the cameras saw: the last particle of the scene.
+std::vector<ObservedSilhouette> observed_in(const Scene& scene, std::span<const PinholeIntrinsics> cameras) {
+  const std::size_t parts = scene.model.parts.size();
+  std::vector<ObservedSilhouette> observed(cameras.size());
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    observed[c].mask = reference::silhouette(
+        scene.model, cameras[c], std::span(scene.X_CB).last(cameras.size() * parts).subspan(c * parts, parts));
+  }
+  return observed;
 }
 
 // Whether counts are within 3 px or 0.1 % of the brute-force reference, for a few particles.
@@ -90,17 +116,36 @@ bool agrees(const Scene& scene, std::span<const PinholeIntrinsics> cameras,
   return true;
 }
 
+#ifdef BODYSCHEMA_BENCH_SEARCH
+
+// Engine "contour+search": as hypotheses are scored whose best is refined afterwards. Counts of every step-th pixel,
+// times step^2, are within 1 % of brute force on all pixels and the full mesh.
+bool agrees_at_level(const Scene& scene, const SearchLevel& level, std::span<const PinholeIntrinsics> cameras,
+                     std::span<const ObservedSilhouette> observed, std::span<const SilhouetteCounts> counts) {
+  const double pixels = level.step * level.step;
+  for (std::size_t i = 0; i < std::min(4 * cameras.size(), counts.size()); ++i) {
+    const std::size_t c = i % cameras.size();
+    const auto mask = reference::silhouette(
+        scene.model, cameras[c], std::span(scene.X_CB).subspan(i * scene.model.parts.size(), scene.model.parts.size()));
+    const auto expected = reference::compare(mask, observed[c]);
+    if (std::abs(pixels * counts[i].predicted - expected.predicted) > 0.01 * expected.predicted ||
+        std::abs(pixels * counts[i].intersection - expected.intersection) > 0.01 * expected.predicted) {
+      std::fprintf(stderr, "image %zu: predicted %.0f, intersection %.0f; reference %u, %u\n", i,
+                   pixels * counts[i].predicted, pixels * counts[i].intersection, expected.predicted,
+                   expected.intersection);
+      return false;
+    }
+  }
+  return true;
+}
+
+#endif
+
 void score(benchmark::State& state, const std::string& engine, const std::string& triangles, Size size,
            std::size_t particles) {
   const Scene& scene = scene_of(triangles);
   const auto cameras = resized(scene, size);
-  const std::size_t per_particle = cameras.size() * scene.model.parts.size();
-  // Scenes hold a thousand particles; more are the same again.
-  std::vector<Eigen::Isometry3f> X_CB;
-  for (std::size_t i = 0; i < particles; ++i) {
-    const auto first = scene.X_CB.begin() + static_cast<std::ptrdiff_t>(i % scene.particles() * per_particle);
-    X_CB.insert(X_CB.end(), first, first + static_cast<std::ptrdiff_t>(per_particle));
-  }
+  const auto X_CB = poses_of(scene, particles);
   std::unique_ptr<SilhouetteScorer> scorer;
   try {
     scorer = make(engine, scene.model, cameras);
@@ -108,13 +153,7 @@ void score(benchmark::State& state, const std::string& engine, const std::string
     state.SkipWithError(error.what());
     return;
   }
-  // What the cameras saw: the last particle of the scene.
-  std::vector<ObservedSilhouette> observed(cameras.size());
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
-    const std::size_t parts = scene.model.parts.size();
-    observed[c].mask = reference::silhouette(scene.model, cameras[c],
-                                             std::span(scene.X_CB).last(per_particle).subspan(c * parts, parts));
-  }
+  const auto observed = observed_in(scene, cameras);
   scorer->set_observation(observed);
   std::vector<SilhouetteCounts> counts(particles * cameras.size());
   scorer->score(X_CB, counts);
@@ -145,9 +184,40 @@ void extract(benchmark::State& state, const std::string& triangles) {
   state.counters["points"] = static_cast<double>(points);
 }
 
+#ifdef BODYSCHEMA_BENCH_SEARCH
+
+void score_at_level(benchmark::State& state, const std::string& triangles, Size size, std::size_t particles) {
+  const Scene& scene = scene_of(triangles);
+  const auto cameras = resized(scene, size);
+  const SearchLevel level = search_level(scene.model, cameras);
+  const auto scorer = make("contour", level.model, level.cameras);
+  const auto X_CB = poses_of(scene, particles);
+  const auto observed = observed_in(scene, cameras);
+  std::vector<ObservedSilhouette> coarse(cameras.size());
+  std::vector<SilhouetteCounts> counts(particles * cameras.size());
+  const auto run = [&] {
+    for (std::size_t c = 0; c < cameras.size(); ++c) coarse[c].mask = every_nth_pixel(observed[c].mask, level.step);
+    scorer->set_observation(coarse);
+    scorer->score(X_CB, counts);
+    benchmark::DoNotOptimize(counts.data());
+  };
+  run();
+  if (!agrees_at_level(scene, level, cameras, observed, counts)) {
+    state.SkipWithError("counts differ from the reference");
+    return;
+  }
+  for (auto _ : state) run();
+  std::size_t drawn = 0;
+  for (const auto& part : level.model.parts) drawn += part.triangles.size();
+  state.counters["step"] = level.step;
+  state.counters["drawn"] = static_cast<double>(drawn);
+}
+
+#endif
+
 void register_all() {
   const bool has_63k = std::getenv("BODYSCHEMA_BENCH_SCENE") != nullptr;
-  for (const Size size : {Size{320, 240}, Size{160, 120}, Size{640, 480}}) {
+  for (const Size size : {Size{320, 240}, Size{160, 120}, Size{640, 480}, Size{1280, 720}}) {
     for (const std::string triangles : {"2k", "8k", "30k", "63k"}) {
       if (triangles == "63k" && !has_63k) continue;
       for (const std::size_t particles : {50u, 200u, 1000u, 10000u}) {
@@ -160,6 +230,15 @@ void register_all() {
               ->MeasureProcessCPUTime()
               ->Unit(benchmark::kMillisecond);
         }
+#ifdef BODYSCHEMA_BENCH_SEARCH
+        benchmark::RegisterBenchmark(
+            ("contour+search/" + triangles + "/" + std::to_string(size.width) + "x" + std::to_string(size.height) + "/" +
+             std::to_string(particles))
+                .c_str(),
+            [=](benchmark::State& state) { score_at_level(state, triangles, size, particles); })
+            ->MeasureProcessCPUTime()
+            ->Unit(benchmark::kMillisecond);
+#endif
       }
     }
   }

@@ -45,5 +45,5 @@ if(BODYSCHEMA_JAVAC AND BODYSCHEMA_JAR AND BODYSCHEMA_LCM_JAR)
   install(FILES ${types_jar} DESTINATION ${CMAKE_INSTALL_DATADIR}/java)
 else()
   message(STATUS "No JDK or no lcm.jar: the message types for Java (lcm-spy) are not built "
-                 "(scripts/setup --all installs both)")
+                 "(scripts/setup --tests installs both)")
 endif()

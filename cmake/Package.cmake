@@ -23,7 +23,7 @@ set(CPACK_DEBIAN_PACKAGE_DEPENDS "libegl1, libegl-mesa0 | libegl-vendor, libgl1-
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "liblcm-bin, python3-venv")
 # For those who link against the libraries.
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS
-  "snakemake, libosmesa6, liblcm-java, libeigen3-dev, libopencv-dev, liblcm-dev, libyaml-cpp-dev, libspdlog-dev, libassimp-dev, liburdfdom-dev, liborocos-kdl-dev, libjpeg-dev, nlohmann-json3-dev, libtinyxml2-dev")
+  "snakemake, libosmesa6, liblcm-java, libeigen3-dev, libopencv-calib3d-dev, libopencv-imgcodecs-dev, liblcm-dev, libyaml-cpp-dev, libspdlog-dev, libassimp-dev, libmeshoptimizer-dev, liburdfdom-dev, liborocos-kdl-dev, libjpeg-dev, nlohmann-json3-dev, libtinyxml2-dev")
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA
   ${PROJECT_SOURCE_DIR}/cmake/package/postinst ${PROJECT_SOURCE_DIR}/cmake/package/prerm
   ${PROJECT_SOURCE_DIR}/cmake/package/postrm ${PROJECT_SOURCE_DIR}/cmake/package/conffiles)

@@ -4,7 +4,9 @@
 #include <optional>
 
 #include "bodyschema/bus/lcm_link.hpp"
+#include "bodyschema/core/installation.hpp"
 #include "bodyschema/core/logging.hpp"
+#include "bodyschema/selftest/engine_table.hpp"
 #include "bodyschema/selftest/self_test.hpp"
 #include "commands.hpp"
 
@@ -14,6 +16,7 @@ void add_selftest(CLI::App& app) {
   struct Arguments {
     std::string config;
     std::optional<std::string> lcm_url;
+    bool bench = false;
   };
   auto a = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand(
@@ -22,14 +25,22 @@ void add_selftest(CLI::App& app) {
       "Examples:\n"
       "  bodyschema selftest\n"
       "  bodyschema selftest --config my_robot/estimator.yaml\n"
+      "  bodyschema selftest --bench --config config/icub_right/estimator.yaml\n"
       "One line for each check: OK, WARN (works, with something to look at) or FAIL. Exit status: "
       "0\n"
       "without a FAIL, else 1.");
   command->add_option("-c,--config", a->config,
                       "Check this configuration too; default: /etc/bodyschema/estimator.yaml where there is one");
   command->add_option("-l,--lcm-url", a->lcm_url, "LCM network; default: $LCM_DEFAULT_URL, else this machine only");
+  command->add_flag("--bench", a->bench,
+                    "Print what the silhouette engines take here for this robot (default: our own), and nothing else");
   command->callback([a] {
     set_up_logging("error");
+    if (a->bench) {
+      std::fputs(engine_table(find_data_file(a->config.empty() ? "config/icub_right/estimator.yaml" : a->config)).c_str(),
+                 stdout);
+      return;
+    }
     SelfTestOptions options;
     options.version = BODYSCHEMA_VERSION;
     options.lcm_url = resolve_lcm_url(a->lcm_url);

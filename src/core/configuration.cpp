@@ -11,6 +11,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "bodyschema/core/digest.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/installation.hpp"
 #include "bodyschema/core/nearest_name.hpp"
@@ -663,13 +664,7 @@ std::string Configuration::print() const {
 }
 
 std::string Configuration::hash() const {
-  std::uint64_t digest = 14695981039346656037ull;  // FNV-1a
-  for (const char c : print()) {
-    digest = (digest ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-  }
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(digest));
-  return text;
+  return Digest().add(print()).text();
 }
 
 }  // namespace bodyschema

@@ -47,7 +47,6 @@ class Diagnoser {
     search_.polish(block_s_);
     progress(0.85);
     findings.conclude(search_.about(block_s_), candidates_of_end());
-    report_.crowded = crowded_ && report_.causes.empty();
     word_verdict(report_, fit_.log().roles());
     progress(1.0);
     return std::move(report_);
@@ -135,8 +134,9 @@ class Diagnoser {
       if (z < field.threshold || candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
       const bool refused = std::find(refused_.begin(), refused_.end(), candidate.cause) != refused_.end();
       if (refused) continue;
-      Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0};
+      Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0, true};
       trial.gain = without.total() - trial.heldout.total();
+      trial.plausible = is_plausible(candidate, trial.heldout.estimate.tail(candidate.columns.size()));
       if (trial.gain > 0.0) trials.push_back(std::move(trial));
     }
     std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.gain > b.gain; });
@@ -144,21 +144,14 @@ class Diagnoser {
       const auto sz = size_of(field, trials[i]);
       fprintf(stderr, "R%zu thr %.2f blocks %zu %s|%s t %.2f gain %.4g of %.4g est %.4g size %.2f mm %.2f px\n", round, field.threshold, field.log.blocks, trials[i].candidate->cause.text().c_str(), trials[i].candidate->variable.c_str(), trials[i].candidate->z(), trials[i].gain, without.total(), trials[i].heldout.estimate.tail(trials[i].candidate->columns.size())[0], 1e3*sz.metres(), sz.outline_px);
     }
+    // What would be larger than on any robot stands in for something else, if anything plausible does as well.
+    std::stable_partition(trials.begin(), trials.end(), [](const Trial& t) { return t.plausible; });
     while (!trials.empty()) {
       const Trial* best = choose(trials);
-      if (size_of(field, *best).metres() >= options_.matters_m) {
-        const double c0 = search_.cost();
-        const bool taken = take(field, *best);
-        if (getenv("DBG")) fprintf(stderr, "take %s: cost %.4f -> %.4f %d\n", best->candidate->cause.text().c_str(), c0, search_.cost(), taken);
-        if (taken) return true;
-      } else {
-        crowded_ = true;
-      }
       const auto cause = best->candidate->cause;
+      if (take(field, *best)) return true;
       if (!best->candidate->generic()) refused_.push_back(cause);
-      std::erase_if(trials, [&](const Trial& t) {
-        return &t == best || t.candidate->cause == cause;
-      });
+      std::erase_if(trials, [&](const Trial& t) { return &t == best || t.candidate->cause == cause; });
     }
     return false;
   }
@@ -167,7 +160,19 @@ class Diagnoser {
     const Candidate* candidate;
     Heldout heldout;
     double gain;
+    bool plausible;
   };
+
+  [[nodiscard]] bool is_plausible(const Candidate& candidate, const Eigen::VectorXd& estimate) const {
+    if (candidate.generic()) return true;
+    const auto effect =
+        make_effect(candidate.cause.name, {candidate.cause.joint, candidate.cause.source}, fit_.log().roles());
+    Eigen::Index i = 0;
+    for (const auto& p : std::as_const(*effect).parameters()) {
+      if (p.fitted && std::abs(estimate[i++]) > limits::kImplausible * p.typical) return false;
+    }
+    return true;
+  }
 
   /// The best known cause, or a free curve where that explains much more than any known one. Of causes that explain
   /// alike the simplest.
@@ -212,6 +217,7 @@ class Diagnoser {
     cause.begin_s = begin;
     cause.duration_s = end - begin;
     cause.amounts = candidate.amounts;
+    cause.small = size_of(field, trial).metres() < options_.matters_m;
     return search_.add(cause, trial.heldout.estimate, field.base.size());
   }
 
@@ -283,7 +289,6 @@ class Diagnoser {
   ModelSearch search_;
   DiagnosisReport report_;
   double block_s_ = 0.0;
-  bool crowded_ = false;
   std::vector<CauseName> refused_;
 };
 

@@ -181,6 +181,7 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
     const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera, rig,
                                                     measurement.projection().hand_link());
     const Eigen::VectorXd moved = jacobian * motion;
+    out.hand_C_m = measurement.projection().hand().translation();
     hand += moved.head<3>().squaredNorm();
     turn += moved.tail<3>().squaredNorm();
     pictures += 1.0;
@@ -213,6 +214,7 @@ void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candi
 void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates) {
   const auto& state = search_.state();
   const double loss = all.heldout().loss.sum();
+  std::string small;
   for (std::size_t c = 0; c < search_.causes().size(); ++c) {
     const auto& found = search_.causes()[c];
     DiagnosedCause cause;
@@ -244,7 +246,16 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, 
       }
       find_class(all, c, candidates, cause);
     }
-    report_.causes.push_back(std::move(cause));
+    if (found.small) {
+      report_.crowded = true;
+      small += (small.empty() ? "" : ", ") + cause.cause.text();
+    } else {
+      report_.causes.push_back(std::move(cause));
+    }
+  }
+  if (!small.empty()) {
+    report_.warnings.push_back("in the model, but too small to matter (" +
+                               fmt::format("{:.1f}", 1e3 * options_.matters_m) + " mm at the hand): " + small);
   }
   std::stable_sort(report_.causes.begin(), report_.causes.end(),
                    [](const auto& a, const auto& b) { return a.heldout_gain > b.heldout_gain; });

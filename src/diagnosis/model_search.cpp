@@ -1,5 +1,3 @@
-#include <cstdlib>
-#include <cstdio>
 #include "model_search.hpp"
 
 #include <algorithm>
@@ -324,12 +322,25 @@ Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Dir
 
 void ModelSearch::polish(double block_s) {
   constexpr int kRounds = 3;
-  for (int round = 0; round < kRounds; ++round) {
+  double misfit = 0.0, points = 0.0;
+  Eigen::VectorXd before = state_.x();
+  for (int round = 0; round <= kRounds; ++round) {
     const auto log = about(block_s);
+    if (round == 0) points = log.at.sampled();
+    const double own = fit_.misfit(log.at, points);
+    if (round > 0 && own > misfit * (1.0 + limits::kLeastGain)) {
+      state_.set(before);
+      return;
+    }
+    misfit = own;
+    before = state_.x();
+    if (round == kRounds) return;
     const auto base = regression(log);
     const Eigen::VectorXd step = base.step().head(state_.size());
-    if (getenv("DBG")) { const Eigen::VectorXd sd = base.covariance().diagonal().cwiseSqrt(); fprintf(stderr, "polish %d: largest %.2f sd\n", round, step.cwiseQuotient(sd.head(state_.size())).cwiseAbs().maxCoeff()); }
-    state_.set(state_.x() + step);
+    const Eigen::VectorXd sd = base.covariance().diagonal().head(state_.size()).cwiseSqrt();
+    constexpr double kNegligible_sd = 0.05;
+    if (step.cwiseQuotient(sd.cwiseMax(1e-300)).cwiseAbs().maxCoeff() < kNegligible_sd) return;
+    state_.set(before + step);
   }
 }
 

@@ -84,12 +84,14 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles) {
     return unexplained(fmt::format("The model does not explain what is seen: {}.", report.side_left_over));
   }
   if (!causes.empty()) {
+    report.crowded = false;
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });
     report.verdict = std::any_of(causes.begin(), causes.end(), is_unexplained) ? "unexplained" : several ? "class" : "named";
     report.sentence = capitalised(list) + ".";
     if (report.verdict == "unexplained") report.exclusion_limits.clear();
     return;
   }
+  report.crowded = report.crowded && causes.empty();
   report.verdict = "none";
   report.sentence = report.crowded
                         ? "No single cause stands out; several small errors share what the joint offsets leave."

@@ -101,7 +101,8 @@ struct Estimator::Impl {
         model(robot, setup, rig, known.roles(), State(without_offsets(known), beliefs.state),
               effects_of(beliefs.tolerances, known.roles())),
         joints(model.state().joints()),
-        scorer(model, silhouette_model(*robot, setup), rig.intrinsics(), options.silhouette, options.filter.particles),
+        scorer(model, silhouette_model(*robot, setup), rig.intrinsics(), options.silhouette, options.filter.particles,
+               !particles_only()),
         filter(joints, options.filter),
         memory(memory_layout(model.state(), beliefs.tolerances), options.memory),
         fitter(model, scorer, options, rig.cameras.size()), state(model.state().prior_mean()), in_frame(memory.estimate()),
@@ -198,7 +199,7 @@ struct Estimator::Impl {
     Eigen::VectorXd result = Eigen::VectorXd::Zero(offsets.cols());
     Eigen::VectorXd x = model.state().prior_mean();
     frame = model.take(observation, x);
-    if (!scorer.observe(observation, frame, options.min_mask_share)) return result;
+    if (!scorer.observe(observation, frame, options.min_mask_share, true)) return result;
     model.settle(frame, x);
     const auto batch = static_cast<Eigen::Index>(options.filter.particles);
     for (Eigen::Index begin = 0; begin < offsets.cols(); begin += batch) {

@@ -23,6 +23,7 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
   o.silhouette.engine = silhouette.choice_or("engine", o.silhouette.engine, {"auto", "atlas", "contour"});
   o.silhouette.gl_platform = silhouette.choice_or("gl_platform", o.silhouette.gl_platform,
                                                   {"auto", "egl_device", "egl_surfaceless", "osmesa"});
+  o.silhouette.gl_pass = silhouette.choice_or("gl_pass", o.silhouette.gl_pass, {"auto", "raster", "compute"});
   o.silhouette.threads = static_cast<int>(silhouette.integer_or("threads", o.silhouette.threads, 0, 1024));
 
   const Configuration estimator = configuration.section("estimator");

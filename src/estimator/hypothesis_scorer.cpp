@@ -1,21 +1,45 @@
 #include "hypothesis_scorer.hpp"
 
+#include <fmt/core.h>
+
 #include <chrono>
 #include <utility>
 
 #include "bodyschema/filter/hammoude.hpp"
+#include "bodyschema/search/fastest_engine.hpp"
+#include "bodyschema/search/search_level.hpp"
 
 namespace bodyschema {
 
 HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes,
                                    std::vector<PinholeIntrinsics> cameras, const SilhouetteOptions& options,
-                                   std::size_t slots)
-    : model_(model), cameras_(std::move(cameras)),
-      scorer_(make_silhouette_scorer(silhouettes, cameras_, options, &engine_reason_)), observed_(cameras_.size()),
-      slots_(slots), X_CB_((slots + 1) * cameras_.size() * model.part_count()), counts_(slots * cameras_.size()),
-      distances_(static_cast<Eigen::Index>(slots)), one_distance_(1) {}
+                                   std::size_t slots, bool for_search)
+    : model_(model), cameras_(std::move(cameras)), observed_(cameras_.size()), coarse_(cameras_.size()), slots_(slots), X_CB_((slots + 1) * cameras_.size() * model.part_count()), counts_(slots * cameras_.size()),
+      distances_(static_cast<Eigen::Index>(slots)), one_distance_(1) {
+  const std::size_t at_once = slots * cameras_.size();
+  if (!for_search) {
+    full_ = make_silhouette_scorer(silhouettes, cameras_,
+                                   fastest_engine(silhouettes, cameras_, options, at_once, engine_reason_));
+    scorer_ = full_.get();
+    return;
+  }
+  const SearchLevel level = search_level(silhouettes, cameras_);
+  step_ = level.step;
+  search_ = make_silhouette_scorer(level.model, level.cameras,
+                                   fastest_engine(level.model, level.cameras, options, at_once, engine_reason_));
+  // For pictures to look at and specks: the processor is quick enough.
+  SilhouetteOptions full = options;
+  full.engine = "contour";
+  full_ = make_silhouette_scorer(silhouettes, cameras_, full);
+  scorer_ = search_.get();
+  std::size_t triangles = 0, drawn = 0;
+  for (const auto& part : silhouettes.parts) triangles += part.triangles.size();
+  for (const auto& part : level.model.parts) drawn += part.triangles.size();
+  level_text_ = fmt::format(", 1/{} of the pictures' rows and columns, {} of {} triangles", step_, drawn, triangles);
+}
 
-bool HypothesisScorer::observe(const Observation& observation, const Frame& frame, double min_share) {
+bool HypothesisScorer::observe(const Observation& observation, const Frame& frame, double min_share,
+                               bool every_pixel) {
   frame_ = &frame;
   camera_mask_ = 0;
   double seen_px = 0.0, pixels = 0.0;
@@ -34,7 +58,15 @@ bool HypothesisScorer::observe(const Observation& observation, const Frame& fram
     }
   }
   if (camera_mask_ == 0 || seen_px < min_share * pixels) return false;
-  scorer_->set_observation(observed_);
+  // The counts of so few pixels would hold more chance than silhouette.
+  constexpr double kFewest_px = 800.0;
+  const bool coarse = search_ && !every_pixel && seen_px >= kFewest_px * step_ * step_;
+  scorer_ = coarse ? search_.get() : full_.get();
+  for (std::size_t c = 0; coarse && c < cameras_.size(); ++c) {
+    coarse_[c].mask = every_nth_pixel(observed_[c].mask, step_);
+    coarse_[c].valid = every_nth_pixel(observed_[c].valid, step_);
+  }
+  scorer_->set_observation(coarse ? coarse_ : observed_);
   return true;
 }
 
@@ -79,7 +111,8 @@ bool HypothesisScorer::can_be_exchanged() const {
 }
 
 std::string HypothesisScorer::description() const {
-  return scorer_->description() + (engine_reason_.empty() ? "" : ": " + engine_reason_);
+  return (search_ ? search_ : full_)->description() + level_text_ +
+         (engine_reason_.empty() ? "" : ": " + engine_reason_);
 }
 
 double HypothesisScorer::take_scoring_ms() {

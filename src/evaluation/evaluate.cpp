@@ -81,7 +81,7 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   if (wanted("ablation")) run_ablations(context);
   if (wanted("reach")) run_reach(context);
   if (wanted("recording")) run_recording(context);
-  //TEMP if (options.experiment == "diagnosis") run_diagnosis(context);
+  if (options.experiment == "diagnosis") run_diagnosis(context);
   summary["trials_asked_for"] = options.trials;
   summary["seed"] = options.seed;
   write_file(file, summary.dump(2) + '\n');

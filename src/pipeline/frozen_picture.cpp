@@ -3,20 +3,21 @@
 #include <algorithm>
 #include <cstring>
 
+#include "bodyschema/core/digest.hpp"
+
 namespace bodyschema {
 namespace {
 
-/// FNV-1a over words.
 std::uint64_t digest_of(const Image& image) {
-  std::uint64_t state = 0xcbf29ce484222325ull;
+  Digest digest;  // over words, as it is of every picture
   std::size_t i = 0;
   for (; i + sizeof(std::uint64_t) <= image.data.size(); i += sizeof(std::uint64_t)) {
     std::uint64_t word = 0;
     std::memcpy(&word, image.data.data() + i, sizeof word);
-    state = (state ^ word) * 0x100000001b3ull;
+    digest.add_word(word);
   }
-  for (; i < image.data.size(); ++i) state = (state ^ image.data[i]) * 0x100000001b3ull;
-  return state;
+  digest.add(image.data.data() + i, image.data.size() - i);
+  return digest.value();
 }
 
 }  // namespace

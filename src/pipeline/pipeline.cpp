@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <chrono>
+#include <exception>
 #include <stdexcept>
 
 #include "bodyschema/imports/joint_mapping.hpp"
@@ -120,7 +121,7 @@ void Pipeline::finish_learning() {
 Estimate Pipeline::process(Observation& observation, const Observation* next) {
   segment(observation);
   if (next == nullptr || vision_.method == SegmentationMethod::kStatistics) return estimate(observation);
-  ahead_ = std::async(std::launch::async, [this, next] { return look(*next); });
+  ahead_ = worker_->begin([this, next] { return look(*next, false); });
   struct Wait {
     const std::future<Looks>& ahead;
     ~Wait() { ahead.wait(); }
@@ -145,39 +146,63 @@ void Pipeline::Look::leave_out_all_but(const BinaryMask& seen) {
   }
 }
 
+/// Each camera by itself: the other thread takes the second's share where it has nothing else to do.
+template <class OfCamera>
+void Pipeline::for_each_eye(const OfCamera& of_camera) {
+  std::future<void> second;
+  if (eyes_.size() > 1) second = worker_->begin([&] { of_camera(std::size_t{1}); });
+  std::exception_ptr failed;
+  try {
+    of_camera(std::size_t{0});
+  } catch (...) {
+    failed = std::current_exception();  // the other thread is still at work on what is ours
+  }
+  if (second.valid()) second.wait();
+  if (failed) std::rethrow_exception(failed);
+  if (second.valid()) second.get();
+}
+
 /// All that can be done before the estimate of the observation before is known; asks nothing of the
 /// estimator but for `statistics`.
-Pipeline::Looks Pipeline::look(const Observation& observation) {
+Pipeline::Looks Pipeline::look(const Observation& observation, bool alone) {
   Looks looks{observation.utime, std::vector<std::optional<Look>>(eyes_.size())};
-  for (std::size_t c = 0; c < eyes_.size(); ++c) {
-    if (!observation.cameras[c]) continue;
-    const CameraObservation& seen = *observation.cameras[c];
-    Eye& eye = eyes_[c];
-    Look& look = looks.of[c].emplace();
-    look.change = eye.picture.look(seen.image, seen.joints.q);
-    if (frozen(look.change)) continue;
-    if (eye.undistorter) look.straightened = eye.undistorter->apply(seen.image);
-    if (vision_.method == SegmentationMethod::kGiven) {
-      if (seen.given_mask.empty()) continue;  // as if it had seen nothing
-      eye.given.read(seen.given_mask, eye.undistorter ? &*eye.undistorter : nullptr, look.mask, look.valid,
-                     look.coverage);
-      if (!eye.seen.empty()) look.leave_out_all_but(eye.seen);
-      continue;
-    }
-    std::optional<BinaryMask> predicted;
-    if (vision_.method == SegmentationMethod::kStatistics) {
-      predicted = estimator_.predicted_silhouette(observation, c, true);
-    }
-    eye.segmenter.segment(look.straightened ? *look.straightened : seen.image, look.mask, look.valid, look.coverage,
-                          predicted ? &*predicted : nullptr);
-    if (!eye.seen.empty()) look.leave_out_all_but(eye.seen);
-    look.learning = !eye.segmenter.ready();
+  std::vector<std::optional<BinaryMask>> predicted(eyes_.size());
+  for (std::size_t c = 0; vision_.method == SegmentationMethod::kStatistics && c < eyes_.size(); ++c) {
+    if (observation.cameras[c]) predicted[c] = estimator_.predicted_silhouette(observation, c, true);
+  }
+  const auto of_camera = [&](std::size_t c) {
+    if (observation.cameras[c]) looks.of[c] = look_with(eyes_[c], *observation.cameras[c], predicted[c]);
+  };
+  if (alone) {
+    for_each_eye(of_camera);
+  } else {
+    for (std::size_t c = 0; c < eyes_.size(); ++c) of_camera(c);
   }
   return looks;
 }
 
+Pipeline::Look Pipeline::look_with(Eye& eye, const CameraObservation& seen,
+                                   const std::optional<BinaryMask>& predicted) const {
+  Look look;
+  look.change = eye.picture.look(seen.image, seen.joints.q);
+  if (frozen(look.change)) return look;
+  if (eye.undistorter) look.straightened = eye.undistorter->apply(seen.image);
+  if (vision_.method == SegmentationMethod::kGiven) {
+    if (seen.given_mask.empty()) return look;  // as if it had seen nothing
+    eye.given.read(seen.given_mask, eye.undistorter ? &*eye.undistorter : nullptr, look.mask, look.valid,
+                   look.coverage);
+    if (!eye.seen.empty()) look.leave_out_all_but(eye.seen);
+    return look;
+  }
+  eye.segmenter.segment(look.straightened ? *look.straightened : seen.image, look.mask, look.valid, look.coverage,
+                        predicted ? &*predicted : nullptr);
+  if (!eye.seen.empty()) look.leave_out_all_but(eye.seen);
+  look.learning = !eye.segmenter.ready();
+  return look;
+}
+
 Pipeline::Looks Pipeline::looks_at(const Observation& observation) {
-  if (!ahead_.valid()) return look(observation);
+  if (!ahead_.valid()) return look(observation, true);
   Looks looks = ahead_.get();
   if (looks.utime != observation.utime) {
     throw std::logic_error("Pipeline: another observation comes than was announced");
@@ -189,6 +214,8 @@ bool Pipeline::segment(Observation& observation) {
   const auto start = std::chrono::steady_clock::now();
   Looks looks = looks_at(observation);
   learning_ = false;
+  std::vector<std::optional<BinaryMask>> predicted(eyes_.size());
+  std::vector<bool> adapts(eyes_.size(), false);
   for (std::size_t c = 0; c < eyes_.size(); ++c) {
     if (!looks.of[c]) continue;
     Look& look = *looks.of[c];
@@ -201,12 +228,16 @@ bool Pipeline::segment(Observation& observation) {
     learning_ = learning_ || look.learning;
     if (frozen(look.change)) continue;
     watch_background(observation, c, look.learning);
-    std::optional<BinaryMask> predicted;
+    adapts[c] = true;
     if (tracking_ && vision_.method == SegmentationMethod::kLearnedBackground) {
-      predicted = estimator_.predicted_silhouette(observation, c, true);
+      predicted[c] = estimator_.predicted_silhouette(observation, c, true);
     }
-    eyes_[c].segmenter.adapt(seen.image, seen.mask, predicted ? &*predicted : nullptr);
   }
+  for_each_eye([&](std::size_t c) {
+    if (!adapts[c]) return;
+    const CameraObservation& seen = *observation.cameras[c];
+    eyes_[c].segmenter.adapt(seen.image, seen.mask, predicted[c] ? &*predicted[c] : nullptr);
+  });
   if (learning_) {
     for (auto& seen : observation.cameras) {
       if (seen) seen->mask = BinaryMask();

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "bodyschema/core/seeded_random.hpp"
+
 namespace bodyschema {
 namespace {
 
@@ -17,10 +19,8 @@ struct Cell {
 };
 struct CellHash {
   std::size_t operator()(const Cell& c) const {
-    auto h = static_cast<std::uint64_t>(c.x) * 0x9E3779B97F4A7C15ull;
-    h = (h ^ (h >> 29) ^ static_cast<std::uint64_t>(c.y)) * 0xBF58476D1CE4E5B9ull;
-    h = (h ^ (h >> 32) ^ static_cast<std::uint64_t>(c.z)) * 0x94D049BB133111EBull;
-    return static_cast<std::size_t>(h ^ (h >> 31));
+    const auto x = static_cast<std::uint64_t>(c.x), y = static_cast<std::uint64_t>(c.y);
+    return static_cast<std::size_t>(mixed_bits(mixed_bits(mixed_bits(x) + y) + static_cast<std::uint64_t>(c.z)));
   }
 };
 

@@ -15,9 +15,14 @@ std::unique_ptr<SilhouetteScorer> make_silhouette_scorer(const SilhouetteModel& 
     if (reason != nullptr) *reason = std::move(why);
   };
   const auto atlas = [&](std::unique_ptr<gl::Context> context) {
-    return with_contour_to_fall_back_on(make_atlas_scorer(model, cameras, std::move(context)), model, cameras,
-                                        options.threads);
+    AtlasOptions atlas_options;
+    if (options.gl_pass == "raster") atlas_options.pass = AtlasPass::kRaster;
+    return with_contour_to_fall_back_on(make_atlas_scorer(model, cameras, std::move(context), atlas_options), model,
+                                        cameras, options.threads);
   };
+  if (options.gl_pass != "auto" && options.gl_pass != "raster" && options.gl_pass != "compute") {
+    throw std::invalid_argument("silhouette gl_pass '" + options.gl_pass + "', expected auto, raster or compute");
+  }
   if (options.engine == "contour") {
     because("the configuration asks for contour");
     return make_contour_scorer(model, cameras, options.threads);

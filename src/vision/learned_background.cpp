@@ -14,7 +14,9 @@ namespace {
 constexpr float kGateSigma = 4.5f;
 // Sightings are counted up to here: about two seconds at 30 Hz, then old and new weigh the same.
 constexpr std::uint16_t kMostSupport = 60;
-constexpr int kUpkeepRows = 8;
+// While the robot is in view, this many rows are kept up to date in each frame; of small pictures an eighth.
+constexpr int kUpkeepRows = 60;
+constexpr int kLeastUpkeepStep = 8;
 // The noise of one pixel is believed as if it had been seen this often before.
 constexpr float kPriorSightings = 20.0f;
 constexpr std::size_t kStillFrames = 12;
@@ -398,8 +400,9 @@ void LearnedBackground::update(const Image& frame, const BinaryMask* robot, bool
     innovation_sum_ = innovation_count_ = 0.0;
   }
   const int first_row = full ? 0 : upkeep_row_;
-  const int step = full ? 1 : kUpkeepRows;
-  if (!full) upkeep_row_ = (upkeep_row_ + 1) % kUpkeepRows;
+  const int upkeep = std::max(kLeastUpkeepStep, model_.height / kUpkeepRows);
+  const int step = full ? 1 : upkeep;
+  if (!full) upkeep_row_ = (upkeep_row_ + 1) % upkeep;
   for (int v = first_row; v < model_.height; v += step) {
     model_.channels == 1 ? update_row<1>(frame, v, robot) : update_row<3>(frame, v, robot);
   }

@@ -77,9 +77,25 @@ joint_offsets_t joint_offsets() {
   }
   m.num_parameters = 1;
   m.parameter_name = {"vergence"};
-  m.parameter_unit = {"rad"};
-  m.parameter_value = {0.01};
-  m.parameter_stddev = {0.002};
+  m.parameter_unit = {"deg"};
+  m.parameter_value = {0.5};
+  m.parameter_stddev = {0.1};
+  m.parameter_prior_stddev = {2.0};
+  m.told = {1, 0};
+  m.hand_stddev_m = 6e-4;
+  m.verdict = "agrees";
+  m.innovation = 7.5;
+  m.innovation_dof = 8.0;
+  m.innovation_usual = 1.1;
+  m.postures = 5;
+  m.posture_stddev_rad = 0.001;
+  m.outline_stddev_px = 0.3;
+  m.outline_points_alike = 4.0;
+  m.changed = "r_elbow slipped by 4.9 deg";
+  m.misfit = "";
+  m.stalled_joint = "r_elbow";
+  m.stalled_motion_rad = 0.1;
+  m.cameras_swapped = 0;
   m.model_hash = "abc";
   m.config_hash = "def";
   return m;

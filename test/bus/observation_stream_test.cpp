@@ -9,7 +9,8 @@
 #include "bodyschema/bus/lcm_link.hpp"
 #include "bodyschema/bus/observation_queue.hpp"
 #include "bodyschema/core/error.hpp"
-#include "bodyschema/effects/online_error_model.hpp"
+#include "bodyschema/effects/encoder_track.hpp"
+#include "bodyschema/effects/error_model.hpp"
 #include "robot/temporary_folder.hpp"
 
 namespace bodyschema {
@@ -144,9 +145,9 @@ TEST(ObservationStream, PicturesBelongToTheCameraOfTheirNumberWhateverItsName) {
   EXPECT_THROW(ObservationStream({"arm"}, {}, cameras, {}), ConfigurationError);
 }
 
-/// What the extended model, a backlash of the elbow that is known, says of four exposures: two cameras, on the
-/// way up and down again. The link first lags below the encoder, then above it. A picture that comes after its
-/// encoders have gone on must not see the later ones.
+/// What a backlash of the elbow that is known says of four exposures, from the encoder samples that observations
+/// carry: two cameras, on the way up and down again. The link first lags below the encoder, then above it. A picture
+/// that comes after its encoders have gone on must not see the later ones.
 /// @param publish  sends the readings of an instant, given the elbow's
 std::vector<double> elbow_dq(
     const std::function<void(ObservationStream& stream, Microseconds now, float elbow_rad)>& publish) {
@@ -162,7 +163,7 @@ std::vector<double> elbow_dq(
   std::map<std::string, double> resting;
   for (const auto& name : roles.names) resting[name] = 0.0;
   ObservationStream stream(roles.names, resting, rig(), {});
-  stream.set_follower(std::make_unique<OnlineErrorModel>(robot, setup, model));
+  EncoderTrack track(robot, setup);
 
   std::vector<double> dq;
   for (int i = 0; i <= 40; ++i) {
@@ -170,10 +171,21 @@ std::vector<double> elbow_dq(
     publish(stream, now, 0.01F * static_cast<float>(i <= 20 ? i : 40 - i));
     if (i == 20 || i == 40) stream.receive("ICUB_CAMERAS", encode(pictures(now - 45 * kMs)));
     while (const auto arrived = stream.next()) {
-      for (const auto& camera : arrived->observation.cameras) {
-        EXPECT_TRUE(camera && camera->corrections);
-        dq.push_back(camera->corrections->dq[elbow]);
-        EXPECT_EQ(camera->corrections->dq.cwiseAbs().sum(), std::abs(dq.back())) << "the elbow alone";
+      const Observation& observation = arrived->observation;
+      if (observation.encoders_begin_anew) {
+        track.forget();
+        model.forget();
+      }
+      track.add(observation.encoders);
+      for (std::size_t c = 0; c < 2; ++c) {
+        EXPECT_TRUE(observation.cameras[c]);
+        track.advance(observation.cameras[c]->utime, [&](const JointSample& sample) { model.observe(sample); });
+        Instant at;
+        track.instant(observation.cameras[c]->joints, c, Eigen::VectorXd::Zero(robot->joint_count()), at);
+        Corrections corrections = roles.no_corrections();
+        model.corrections(at, corrections);
+        dq.push_back(corrections.dq[elbow]);
+        EXPECT_EQ(corrections.dq.cwiseAbs().sum(), std::abs(dq.back())) << "the elbow alone";
       }
     }
   }
@@ -195,7 +207,7 @@ void expect_lag_up_and_down(const std::vector<double>& dq) {
 }
 
 /// Arm and head published apart, as many robots do, with a backlash that is known.
-TEST(ObservationStream, CarriesWhatTheExtendedModelKnowsAtEachExposure) {
+TEST(ObservationStream, CarriesTheEncodersOnWhichAMemoryLives) {
   expect_lag_up_and_down(elbow_dq([](ObservationStream& stream, Microseconds now, float elbow_rad) {
     read_joint(stream, "r_elbow", now, elbow_rad);
     read_joint(stream, "neck_pitch", now, 0.1F);
@@ -214,6 +226,36 @@ TEST(ObservationStream, OneStampFarAheadOfAJointThatThenFallsSilentStopsNothing)
     read_joint(stream, "r_elbow", now, elbow_rad);
     if (now == 50 * kMs) read_joint(stream, "torso_yaw", now + 3'600'000 * kMs, 0.1F);
   }));
+}
+
+/// Every sample comes with one observation, in order, and what came before another clock is not of it.
+TEST(ObservationStream, CarriesEveryEncoderSampleOnceAndSaysWhereTheyBeginAnew) {
+  ObservationStream stream({"arm"}, {}, rig(), {});
+  std::vector<Microseconds> seen;
+  int anew = 0;
+  const auto receive = [&](Microseconds begin) {
+    for (int i = 0; i <= 30; ++i) {
+      stream.receive("ICUB_JOINT_STATE", encode(arm(begin + 10 * i * kMs, 0.01F * static_cast<float>(i))));
+      if (i % 10 == 5) stream.receive("ICUB_CAMERAS", encode(pictures(begin + 10 * i * kMs - 15 * kMs)));
+      while (const auto arrived = stream.next()) {
+        const Observation& observation = arrived->observation;
+        if (observation.encoders_begin_anew) {
+          seen.clear();
+          ++anew;
+        }
+        for (const auto& sample : observation.encoders) seen.push_back(sample.utime);
+        EXPECT_GE(seen.back(), observation.utime) << "no sample after the exposure, though there were";
+      }
+    }
+  };
+  receive(0);
+  EXPECT_EQ(anew, 0);
+  ASSERT_GE(seen.size(), 25u);
+  for (std::size_t i = 0; i < seen.size(); ++i) EXPECT_EQ(seen[i], static_cast<Microseconds>(i) * 10 * kMs);
+  constexpr Microseconds kAnHour = 3'600'000 * kMs;
+  receive(-kAnHour);  // the clock steps back
+  EXPECT_EQ(anew, 1);
+  EXPECT_EQ(seen.front(), -kAnHour);
 }
 
 TEST(ObservationStream, ALegThatFallsSilentIsNotMissed) {
@@ -415,6 +457,35 @@ TEST(ObservationQueue, ShedsTheOldestWhenFull) {
   EXPECT_FALSE(queue.pop(std::chrono::milliseconds(1)));
   queue.close();
   EXPECT_FALSE(queue.pop(std::chrono::hours(1)));
+}
+
+TEST(ObservationQueue, WhatIsShedLeavesItsEncodersToTheNext) {
+  const auto with_samples = [](Microseconds from, bool anew) {
+    ArrivedObservation arrived;
+    arrived.observation.encoders_begin_anew = anew;
+    for (const Microseconds t : {from, from + 1}) {
+      JointSample sample;
+      sample.utime = t;
+      arrived.observation.encoders.push_back(sample);
+    }
+    return arrived;
+  };
+  for (const std::size_t capacity : {1u, 2u}) {
+    ObservationQueue queue(capacity);
+    queue.push(with_samples(0, true));
+    for (int i = 1; i < 4; ++i) queue.push(with_samples(2 * i, false));
+    const auto first = queue.pop(std::chrono::milliseconds(0));
+    ASSERT_TRUE(first);
+    EXPECT_TRUE(first->observation.encoders_begin_anew);
+    const auto& kept = first->observation.encoders;
+    ASSERT_EQ(kept.size(), 2 * (4 - capacity + 1));
+    for (std::size_t i = 0; i < kept.size(); ++i) EXPECT_EQ(kept[i].utime, static_cast<Microseconds>(i));
+  }
+  // Those of another clock are no part of what comes after it.
+  ObservationQueue queue(1);
+  queue.push(with_samples(100, false));
+  queue.push(with_samples(0, true));
+  EXPECT_EQ(queue.pop(std::chrono::milliseconds(0))->observation.encoders.size(), 2u);
 }
 
 }  // namespace

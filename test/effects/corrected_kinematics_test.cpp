@@ -113,8 +113,63 @@ TEST_F(CorrectedKinematicsTest, AdjustmentsOfTwoJointsCompose) {
 
 TEST_F(CorrectedKinematicsTest, CameraShiftMovesTheWorldTheOtherWay) {
   const auto plain = tip(corrections);
-  corrections.camera.shift_x_m = 0.001;
+  corrections.camera.shift_m.x() = 0.001;
   EXPECT_LT((tip(corrections) - plain + Eigen::Vector3d(0.001, 0, 0)).norm(), 1e-12);
+}
+
+TEST_F(CorrectedKinematicsTest, ATurnOfTheCameraTurnsTheWorldTheOtherWay) {
+  const auto plain = tip(corrections);
+  corrections.camera.turn_rad = {0.02, -0.01, 0.03};
+  const Eigen::AngleAxisd turn(corrections.camera.turn_rad.norm(), corrections.camera.turn_rad.normalized());
+  EXPECT_LT((tip(corrections) - turn.inverse() * plain).norm(), 1e-12);
+}
+
+/// Two cameras half a metre apart, the second turned by a quarter about their common z; a torso carries both.
+class CorrectedRigTest : public testing::Test {
+ protected:
+  /// Where the second camera is in the first, and the first in the root.
+  std::pair<Pose, Pose> rig(const Corrections& c) {
+    std::vector<Pose> X(1);
+    kinematics.compute(q, c, 0, X);
+    const Pose X_WF = kinematics.X_WC();
+    kinematics.compute(q, c, 1, X);
+    return {X_WF.inverse() * kinematics.X_WC(), X_WF};
+  }
+  std::shared_ptr<const RobotModel> model = load(R"(<robot name="two"><link name="root"/><link name="torso"/>
+    <link name="arm"/><link name="first"/><link name="second"/>
+    <joint name="t" type="revolute"><parent link="root"/><child link="torso"/><axis xyz="0 0 1"/>
+      <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+    <joint name="a" type="revolute"><parent link="root"/><child link="arm"/><axis xyz="0 1 0"/>
+      <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+    <joint name="f" type="fixed"><parent link="torso"/><child link="first"/><origin xyz="0.1 0 0"/></joint>
+    <joint name="s" type="fixed"><parent link="torso"/><child link="second"/>
+      <origin xyz="0.1 0.5 0" rpy="0 0 1.57079632679"/></joint></robot>)");
+  CorrectedKinematics kinematics{model, {"arm"}, {"first", "second"}};
+  Eigen::VectorXd q = Eigen::Vector2d(0.3, -0.2);
+  Corrections corrections{2};
+};
+
+TEST_F(CorrectedRigTest, TheRigMovesAsOneAboutItsFirstCamerasAxes) {
+  const auto [pair_before, first_before] = rig(corrections);
+  corrections.camera.rig_shift_m = {0.01, -0.02, 0.03};
+  corrections.camera.rig_turn_rad = {0.0, 0.0, 0.1};
+  const auto [pair, first] = rig(corrections);
+  EXPECT_LT((pair.matrix() - pair_before.matrix()).norm(), 1e-12);
+  const Pose moved = first_before.inverse() * first;
+  EXPECT_LT((moved.translation() - corrections.camera.rig_shift_m).norm(), 1e-12);
+  EXPECT_LT((moved.linear() - Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ()).toRotationMatrix()).norm(), 1e-12);
+}
+
+TEST_F(CorrectedRigTest, ACamerasOwnCorrectionIsAboutItsOwnAxesAndLeavesTheOtherAlone) {
+  std::vector<Pose> X(1);
+  kinematics.compute(q, corrections, 1, X);
+  const Pose before = kinematics.X_WC();
+  corrections.camera.shift_m = {0.01, 0.0, 0.0};
+  corrections.camera.turn_rad = {0.0, 0.05, 0.0};
+  kinematics.compute(q, corrections, 1, X);
+  const Pose moved = before.inverse() * kinematics.X_WC();
+  EXPECT_LT((moved.translation() - corrections.camera.shift_m).norm(), 1e-12);
+  EXPECT_LT((moved.linear() - Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitY()).toRotationMatrix()).norm(), 1e-12);
 }
 
 TEST_F(CorrectedKinematicsTest, BaseShiftMovesEveryLinkAlikeInTheRootFrame) {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "bodyschema/core/error.hpp"
-#include "bodyschema/effects/catalogue.hpp"
+#include "bodyschema/effects/effect_kind.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "effects/roles.hpp"
 
@@ -21,18 +21,38 @@ constexpr Eigen::Index kElbow = 9;
 /// The corrections of one effect whose first fitted parameter is `value` in its own unit.
 Corrections corrections(Effect& effect, double value, const Instant& at) {
   effect.parameters()[0].value = value * effect.parameters()[0].si_per_unit;
-  Corrections c(at.q.size());
+  Corrections c = roles().no_corrections();
   effect.apply(at, c);
   return c;
+}
+
+/// The catalogue without what tests of this program have registered.
+std::vector<std::string> shipped_effects() {
+  auto names = effect_names();
+  std::erase_if(names, [](const std::string& name) { return name.starts_with("own_"); });
+  return names;
 }
 
 double dq_deg(const Corrections& c, Eigen::Index joint) {
   return degrees(c.dq[joint]);
 }
 
+/// Sum of the sizes of all numbers.
+double size_of(const Corrections& c) {
+  double sum = c.dq.lpNorm<1>() + c.base_shift_m.lpNorm<1>();
+  for (const auto& a : c.adjustments) {
+    for (const double x : {a.along_m, a.tilt_1_rad, a.tilt_2_rad, a.shift_1_m, a.shift_2_m}) sum += std::abs(x);
+  }
+  for (const auto& s : c.shapes) sum += std::abs(s.scale) + std::abs(s.dilation_px);
+  const auto& k = c.camera;
+  for (const auto& v : {k.rig_shift_m, k.rig_turn_rad, k.shift_m, k.turn_rad}) sum += v.lpNorm<1>();
+  for (const double x : {k.focal_scale, k.cx_px, k.cy_px, k.k1}) sum += std::abs(x);
+  return sum;
+}
+
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
-  EXPECT_EQ(effect_names().size(), 24u);
+  EXPECT_EQ(shipped_effects().size(), 26u);
   auto at = instant(r);
   at.q.setConstant(0.7);
   at.encoder.setConstant(0.8);
@@ -41,20 +61,15 @@ TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   at.payload_torque.setConstant(3.0);
   at.utime = 5'000'000;
   at.camera = 1;
-  for (const auto& name : effect_names()) {
+  for (const auto& name : shipped_effects()) {
     const auto targets = effect_targets(name, r);
     ASSERT_FALSE(targets.empty()) << name;
     for (const auto& target : targets) {
       auto effect = make_effect(name, target, r);
       effect->observe({0, Eigen::VectorXd::Zero(at.q.size()), Eigen::VectorXd::Zero(at.q.size())});
-      Corrections c(at.q.size());
+      Corrections c = r.no_corrections();
       effect->apply(at, c);
-      EXPECT_EQ(c.dq.norm(), 0.0) << effect->description();
-      EXPECT_EQ(c.mesh_scale, 0.0);
-      EXPECT_EQ(c.base_shift_m.norm(), 0.0);
-      EXPECT_EQ(c.dilation_px, 0.0);
-      EXPECT_EQ(c.camera.focal_scale, 0.0);
-      for (const auto& a : c.adjustments) EXPECT_TRUE(a.is_zero());
+      EXPECT_EQ(size_of(c), 0.0) << effect->description();
       EXPECT_GT(effect->parameters()[0].typical, 0.0) << effect->description();
     }
   }
@@ -71,7 +86,7 @@ TEST(Catalogue, EffectsSayWhatTheyFollow) {
   hanging.gravity_torque.setConstant(2.0);
   hanging.payload_torque.setConstant(3.0);
   moving.camera = hanging.camera = still.camera = 1;
-  for (const auto& name : effect_names()) {
+  for (const auto& name : shipped_effects()) {
     const auto effect = make_effect(name, effect_targets(name, r).front(), r);
     const double value = effect->parameters()[0].typical / effect->parameters()[0].si_per_unit;
     const auto apart = [&](const Instant& at) {
@@ -85,7 +100,7 @@ TEST(Catalogue, EffectsSayWhatTheyFollow) {
 /// Without sign and definition nobody can compare an estimate with another tool's.
 TEST(Catalogue, EveryParameterHasItsMeaningInTheHandbook) {
   const auto r = roles();
-  for (const auto& name : effect_names()) {
+  for (const auto& name : shipped_effects()) {
     std::ifstream page(std::string(BODYSCHEMA_SOURCE_DIR) + "/docs/diagnose.md");
     ASSERT_TRUE(page) << "docs/diagnose.md";
     const auto begin = "| `" + name + "` | ";
@@ -168,7 +183,7 @@ TEST(Backlash, LinkFollowsHalfAWidthBehind) {
     sample.q[kElbow] = at.encoder[kElbow] = radians(encoder_deg);
     sample.utime += 60'000'000;  // at rest
     effect->observe(sample);
-    Corrections c(at.q.size());
+    Corrections c = r.no_corrections();
     effect->apply(at, c);
     return dq_deg(c, kElbow);
   };
@@ -235,6 +250,10 @@ TEST(Geometry, LengthTiltAndHeadGoWhereTheyBelong) {
   const auto r = roles();
   const auto at = instant(r);
   EXPECT_NEAR(corrections(*make_effect("link_length", {"s_yaw", ""}, r), 2.0, at).adjustments[8].along_m, 0.002, 1e-15);
+  // A link that does not run along the axis of the joint at its end.
+  const auto forearm = corrections(*make_effect("link_length", {"prosup", ""}, r), 2.0, at).adjustments[10];
+  EXPECT_NEAR(forearm.along_m, 0.0012, 1e-15);
+  EXPECT_NEAR(forearm.shift_1_m, 0.0016, 1e-15);
   EXPECT_NEAR(corrections(*make_effect("axis_tilt", {"elbow", ""}, r), 2.0, at).adjustments[kElbow].tilt_1_rad,
               radians(2.0), 1e-15);
   EXPECT_NEAR(dq_deg(corrections(*make_effect("head_offset", {"neck_yaw", ""}, r), 1.0, at), 2), 1.0, 1e-12);
@@ -248,16 +267,67 @@ TEST(Geometry, LengthTiltAndHeadGoWhereTheyBelong) {
 TEST(Cameras, CorrectionsReachTheRightEye) {
   const auto r = roles();
   auto at = instant(r);
-  EXPECT_EQ(corrections(*make_effect("baseline", {}, r), 1.0, at).camera.shift_x_m, 0.0);
+  EXPECT_EQ(corrections(*make_effect("baseline", {}, r), 1.0, at).camera.shift_m.norm(), 0.0);
   auto difference = make_effect("principal_point", {"", "difference"}, r);
   EXPECT_NEAR(corrections(*difference, 2.0, at).camera.cx_px, 1.0, 1e-15);
+  auto right = make_effect("principal_point", {"", "right"}, r);
+  EXPECT_EQ(corrections(*right, 2.0, at).camera.cx_px, 0.0);
   at.camera = 1;
   EXPECT_NEAR(corrections(*difference, 2.0, at).camera.cx_px, -1.0, 1e-15);
-  EXPECT_NEAR(corrections(*make_effect("baseline", {}, r), 1.0, at).camera.shift_x_m, 1e-3, 1e-15);
+  EXPECT_NEAR(corrections(*right, 2.0, at).camera.cx_px, 2.0, 1e-15);
+  EXPECT_NEAR(corrections(*make_effect("baseline", {}, r), 1.0, at).camera.shift_m.x(), 1e-3, 1e-15);
   EXPECT_NEAR(corrections(*make_effect("focal_length", {}, r), 1.0, at).camera.focal_scale, 0.01, 1e-15);
   EXPECT_NEAR(corrections(*make_effect("distortion", {}, r), 0.05, at).camera.k1, 0.05, 1e-15);
-  EXPECT_NEAR(corrections(*make_effect("silhouette_bias", {}, r), 0.7, at).dilation_px, 0.7, 1e-15);
-  EXPECT_NEAR(corrections(*make_effect("mesh_scale", {}, r), 2.0, at).mesh_scale, 0.02, 1e-15);
+}
+
+TEST(Cameras, ThePoseIsThatOfTheRigThePairThatOfTheSecondAlone) {
+  const auto r = roles();
+  for (const std::size_t camera : {0u, 1u}) {
+    auto at = instant(r);
+    at.camera = camera;
+    for (const std::string name : {"camera_pose", "camera_pair"}) {
+      const auto effect = make_effect(name, {}, r);
+      for (std::size_t i = 0; i < 6; ++i) effect->parameters()[i].value = 0.01 * static_cast<double>(i + 1);
+      Corrections c = r.no_corrections();
+      effect->apply(at, c);
+      const Eigen::Vector3d shift(0.01, 0.02, 0.03), turn(0.04, 0.05, 0.06);
+      const bool pair = name == "camera_pair";
+      const double rig = pair ? 0.0 : 1.0, own = pair && camera == 1 ? 1.0 : 0.0;
+      EXPECT_LT((c.camera.rig_shift_m - rig * shift).norm() + (c.camera.rig_turn_rad - rig * turn).norm(), 1e-15);
+      EXPECT_LT((c.camera.shift_m - own * shift).norm() + (c.camera.turn_rad - own * turn).norm(), 1e-15) << camera;
+    }
+  }
+}
+
+TEST(Cameras, OneCameraHasNoPair) {
+  auto r = roles();
+  r.cameras = {"only"};
+  for (const char* name : {"camera_pair", "baseline"}) {
+    EXPECT_TRUE(effect_targets(name, r).empty()) << name;
+    EXPECT_THAT([&] { make_effect(name, {}, r); }, testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr(name)));
+  }
+  EXPECT_EQ(effect_targets("principal_point", r).size(), 1u);
+  EXPECT_EQ(effect_targets("camera_pose", r).size(), 1u);
+}
+
+/// The whole body, or one of its segments by name.
+TEST(Shapes, AreThoseOfTheBodyOrOfOneSegment) {
+  const auto r = roles();
+  const auto at = instant(r);
+  for (const std::string name : {"mesh_scale", "silhouette_bias"}) {
+    ASSERT_EQ(effect_targets(name, r).size(), 3u);
+    const auto size = [&](const Corrections& c, std::size_t segment) {
+      return name == "mesh_scale" ? c.shapes[segment].scale : 0.01 * c.shapes[segment].dilation_px;
+    };
+    const auto all = corrections(*make_effect(name, {}, r), 2.0, at);
+    const auto hand = corrections(*make_effect(name, {"", "hand"}, r), 2.0, at);
+    EXPECT_NEAR(size(all, 0), 0.02, 1e-15) << name;
+    EXPECT_NEAR(size(all, 1), 0.02, 1e-15);
+    EXPECT_EQ(size(hand, 0), 0.0) << name;
+    EXPECT_NEAR(size(hand, 1), 0.02, 1e-15);
+  }
+  EXPECT_THAT([&] { make_effect("mesh_scale", {"", "hnad"}, r); },
+              testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr("expected forearm or hand")));
 }
 
 TEST(InTime, DriftGrowsAndSlipJumps) {

@@ -56,7 +56,7 @@ TEST(ErrorModel, SumsEffectsAndLeavesOffsetsOutOnRequest) {
   model.add("encoder_gain", {"elbow", ""}).parameters()[0].value = 0.02;
   auto at = instant(model.roles());
   at.q[9] = radians(50.0);
-  Corrections c(at.q.size());
+  Corrections c = model.roles().no_corrections();
   model.corrections(at, c);
   EXPECT_NEAR(degrees(c.dq[9]), -2.0, 1e-12);
   model.corrections(at, c, false);

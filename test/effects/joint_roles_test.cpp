@@ -2,7 +2,8 @@
 
 #include <algorithm>
 
-#include "bodyschema/effects/effect.hpp"
+#include "bodyschema/effects/corrected_kinematics.hpp"
+#include "bodyschema/effects/joint_roles.hpp"
 #include "robot/tilting_eyes.hpp"
 #include "test_data.hpp"
 
@@ -74,6 +75,43 @@ TEST(JointRoles, OfAnEyeThatTiltsByItselfThePanTurnsAboutTheVertical) {
     EXPECT_EQ(r.names(r.roles.neck), Names{"neck"});
     EXPECT_EQ(name_of(r, r.roles.left_pan), "l_pan");
     EXPECT_EQ(name_of(r, r.roles.right_pan), "r_pan");
+  }
+}
+
+/// Bodies between the arm's joints, fingers counted to the hand, and the links between joints that lie apart.
+TEST(JointRoles, SegmentsHoldEveryPartOnceAndLinksAreAsLongAsTheRobotsAre) {
+  const auto configuration = Configuration::load(std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/robot.yaml");
+  const auto setup = RobotSetup::from(configuration.section("robot"));
+  const auto model = setup.load();
+  const auto roles = JointRoles::of(model, setup, StereoRig::from(configuration.section("cameras")));
+  std::vector<std::size_t> parts;
+  for (const auto& segment : roles.segments) parts.insert(parts.end(), segment.parts.begin(), segment.parts.end());
+  std::sort(parts.begin(), parts.end());
+  std::vector<std::size_t> all(setup.model.rendered_links.size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+  EXPECT_EQ(parts, all);
+  Names names;
+  for (const auto& segment : roles.segments) names.push_back(segment.name);
+  EXPECT_EQ(names, (Names{"r_upper_arm", "r_elbow_1", "r_forearm", "r_wrist_1", "r_wrist_2"}));
+  EXPECT_EQ(roles.segments.back().parts.size(), 18u);  // what carries the palm, the palm and five fingers
+
+  // Lengths by walking from joint to joint, and what a longer link does to the hand.
+  Names links;
+  for (const auto& link : roles.links) links.push_back(link.name);
+  EXPECT_EQ(links, (Names{"r_shoulder_1", "r_upper_arm", "r_forearm"}));
+  CorrectedKinematics kinematics(model, {setup.hand_link}, {"root_link"});
+  const auto q = setup.default_joints(*model);
+  for (const auto& link : roles.links) {
+    EXPECT_GT(link.length_m, 0.1);
+    std::vector<Pose> before(1), after(1);
+    auto c = roles.no_corrections();
+    kinematics.compute(q, c, 0, before);
+    auto& adjustment = c.adjustments[static_cast<std::size_t>(link.joint)];
+    adjustment.along_m = 0.01 * link.per_metre.along_m;
+    adjustment.shift_1_m = 0.01 * link.per_metre.shift_1_m;
+    adjustment.shift_2_m = 0.01 * link.per_metre.shift_2_m;
+    kinematics.compute(q, c, 0, after);
+    EXPECT_NEAR((after[0].translation() - before[0].translation()).norm(), 0.01, 1e-6) << link.name;
   }
 }
 

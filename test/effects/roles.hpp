@@ -1,10 +1,11 @@
 #pragma once
 
-#include "bodyschema/effects/effect.hpp"
+#include "bodyschema/effects/instant.hpp"
+#include "bodyschema/effects/joint_roles.hpp"
 
 namespace bodyschema::test {
 
-/// A made-up robot: six head joints, seven arm joints, two fingers.
+/// A made-up robot: six head joints, seven arm joints, two fingers, two cameras; three rendered parts in two segments.
 inline JointRoles roles() {
   JointRoles r;
   r.names = {"neck_pitch", "neck_roll", "neck_yaw", "eyes_tilt", "l_eye_pan", "r_eye_pan", "s_pitch", "s_roll",
@@ -15,6 +16,9 @@ inline JointRoles roles() {
   r.right_pan = 5;
   r.arm = {6, 7, 8, 9, 10, 11, 12};
   r.fingers = {13, 14};
+  r.cameras = {"left", "right"};
+  r.segments = {{"forearm", {0}}, {"hand", {1, 2}}};
+  r.links = {{"upper_arm", 8, 0.15, {.along_m = 1.0}}, {"forearm", 10, 0.14, {.along_m = 0.6, .shift_1_m = 0.8}}};
   return r;
 }
 

@@ -17,7 +17,7 @@ PATIENCE = float(os.environ.get("BODYSCHEMA_TEST_PATIENCE", "1"))  # sanitizers 
 def main():
     programs, source, scratch = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
     if shutil.which("snakemake") is None:
-        print("snakemake is not installed (scripts/setup --all brings it), skipped")
+        print("snakemake is not installed (scripts/setup --tests brings it), skipped")
         return SKIPPED
     shutil.rmtree(scratch, ignore_errors=True)
     logs, out = scratch / "logs", scratch / "fleet"

@@ -30,6 +30,9 @@ foreach(path IN ITEMS
     message(SEND_ERROR "the package lacks ${path}")
   endif()
 endforeach()
+if(JAVA_TYPES AND NOT EXISTS ${SCRATCH_DIR}/content/usr/share/java/bodyschema-lcmtypes.jar)
+  message(SEND_ERROR "the package lacks the types for lcm-spy, which were built")
+endif()
 foreach(program IN LISTS PROGRAMS)
   foreach(path IN ITEMS usr/bin/${program} usr/share/man/man1/${program}.1
                         usr/share/bash-completion/completions/${program})

@@ -43,7 +43,7 @@ if(BODYSCHEMA_DPKG_DEB AND BODYSCHEMA_DPKG_SHLIBDEPS AND BODYSCHEMA_PROGRAMS AND
       -D BUILD_TYPE=${CMAKE_BUILD_TYPE}
       -D SCRATCH_DIR=${PROJECT_BINARY_DIR}/test-package
       -D CPACK=${CMAKE_CPACK_COMMAND} -D DPKG_DEB=${BODYSCHEMA_DPKG_DEB}
-      -D "PROGRAMS=${BODYSCHEMA_PROGRAMS}"
+      -D "PROGRAMS=${BODYSCHEMA_PROGRAMS}" -D JAVA_TYPES=$<TARGET_EXISTS:lcmtypes_jar>
       -P ${PROJECT_SOURCE_DIR}/test/install/package.cmake)
   bodyschema_patient(timeout 300)
   set_tests_properties(install.package PROPERTIES LABELS install TIMEOUT ${timeout})
@@ -144,4 +144,21 @@ if(TARGET lcmtypes_jar AND BODYSCHEMA_JAVA)
   bodyschema_patient(timeout 120)
   set_tests_properties(install.lcm_spy_knows_our_types PROPERTIES LABELS install TIMEOUT ${timeout}
     PASS_REGULAR_EXPRESSION "Found ${type_count} LCM types\n")
+endif()
+
+if(CMAKE_GENERATOR STREQUAL "Ninja" AND BODYSCHEMA_PROGRAMS)
+  add_test(NAME install.demo_builds_the_programs_alone
+    COMMAND ${CMAKE_COMMAND} -D BUILD_DIR=${PROJECT_BINARY_DIR} -D SOURCE_DIR=${PROJECT_SOURCE_DIR}
+      -D NINJA=${CMAKE_MAKE_PROGRAM} -D "PROGRAMS=${BODYSCHEMA_PROGRAMS}"
+      -P ${PROJECT_SOURCE_DIR}/test/install/demo.cmake)
+  bodyschema_patient(timeout 60)
+  set_tests_properties(install.demo_builds_the_programs_alone PROPERTIES LABELS install TIMEOUT ${timeout})
+endif()
+
+if(Python3_FOUND)
+  # Skipped where neither Docker nor Podman works.
+  add_test(NAME install.container
+    COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/install/container.py ${PROJECT_SOURCE_DIR})
+  bodyschema_patient(timeout 3600)
+  set_tests_properties(install.container PROPERTIES LABELS install TIMEOUT ${timeout} SKIP_RETURN_CODE 77)
 endif()

@@ -36,7 +36,8 @@ class ExportCorrection : public ::testing::Test {
   }
   void write_summary(const std::string& more = "") const {
     std::ofstream(folder_ / "summary.json")
-        << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1}})"
+        << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1},
+          "told": ["r_elbow"]})"
         << more << "}";
   }
   /// Exports a replay that ended so, with a well and a badly known joint and what stood beside them.
@@ -44,10 +45,14 @@ class ExportCorrection : public ::testing::Test {
     std::ofstream(folder_ / "summary.json")
         << R"({"estimate": {"state": ")" << state << R"(", "offset_deg": {"r_elbow": -2.0, "r_wrist_yaw": 3.0},
           "stddev_deg": {"r_elbow": 0.1, "r_wrist_yaw": 1.234},
-          "head_offset_deg": {"neck_pitch": 2.8648, "neck_yaw": 0.5},
-          "head_stddev_deg": {"neck_pitch": 0.3, "neck_yaw": 0.75},
-          "nuisance": {"mesh_scale": 0.01, "dilation_px": 0.2},
-          "nuisance_stddev": {"mesh_scale": 0.002, "dilation_px": 0.1}}})";
+          "told": ["r_elbow"], "effects": [
+            {"name": "head_offset", "joint": "neck_pitch", "parameter": "angle", "unit": "deg", "value": -2.8648,
+             "stddev": 0.3, "prior_stddev": 3.0},
+            {"name": "head_offset", "joint": "neck_yaw", "parameter": "angle", "unit": "deg", "value": -0.5,
+             "stddev": 0.75, "prior_stddev": 3.0},
+            {"name": "mesh_scale", "parameter": "scale", "unit": "%", "value": 1.0, "stddev": 0.2, "prior_stddev": 0.35},
+            {"name": "silhouette_bias", "parameter": "dilation", "unit": "px", "value": 0.2, "stddev": 0.1,
+             "prior_stddev": 0.15}]}})";
     return export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out", anyway);
   }
   ~ExportCorrection() override { fs::remove_all(folder_); }
@@ -67,8 +72,7 @@ TEST_F(ExportCorrection, TheCorrectedUrdfGivesTheCorrectedPose) {
   for (const auto& name : setup.estimated_joints) {
     correction.offsets_rad.emplace_back(name, radians(10.0 * uniform(random)));
   }
-  correction.head_offsets_rad = {{"neck_pitch", 0.05}};
-  correction.nuisances = {{"mesh_scale", 0.01}};
+  correction.known_offsets_rad = {{"neck_pitch", 0.05}};
   write_corrected_urdf(setup.model.urdf, correction, folder_ / "corrected.urdf");
   RobotModelOptions corrected_options = setup.model;
   corrected_options.urdf = folder_ / "corrected.urdf";
@@ -99,7 +103,8 @@ TEST_F(ExportCorrection, TheCorrectedUrdfGivesTheCorrectedPose) {
 
 TEST_F(ExportCorrection, WritesThreeFilesAndRefusesWhatDoesNotFit) {
   std::ofstream(folder_ / "summary.json")
-      << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1}}})";
+      << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1},
+          "told": []}})";
   export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
   std::ifstream yaml(folder_ / "out/offsets.yaml");
   const std::string text((std::istreambuf_iterator<char>(yaml)), {});
@@ -107,7 +112,7 @@ TEST_F(ExportCorrection, WritesThreeFilesAndRefusesWhatDoesNotFit) {
   EXPECT_TRUE(fs::exists(folder_ / "out/calibration_delta.txt"));
 
   std::ofstream(folder_ / "summary.json")
-      << R"({"estimate": {"state": "converged", "offset_deg": {"no_joint": 1.0}, "stddev_deg": {}}})";
+      << R"({"estimate": {"state": "converged", "offset_deg": {"no_joint": 1.0}, "stddev_deg": {}, "told": []}})";
   EXPECT_THROW(export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out"), FileError);
   std::ofstream(folder_ / "summary.json") << "{}";
   EXPECT_THROW(export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out"), FileError);
@@ -218,20 +223,68 @@ TEST_F(ExportCorrection, AHeadJointHasDegreesADeviationAndTheWarningOfAnyJoint) 
   const Configuration yaml = Configuration::load(folder_ / "out/offsets.yaml");
   EXPECT_DOUBLE_EQ(yaml.section("head_offset_deg").number("neck_pitch"), 2.8648);
   EXPECT_DOUBLE_EQ(yaml.section("head_stddev_deg").number("neck_yaw"), 0.75);
-  EXPECT_DOUBLE_EQ(yaml.section("nuisance").number("dilation_px"), 0.2);
+  const auto bias = yaml.section("effects").section("silhouette_bias dilation");
+  EXPECT_DOUBLE_EQ(bias.number("value"), 0.2);
+  EXPECT_DOUBLE_EQ(bias.number("stddev"), 0.1);
+  EXPECT_EQ(bias.text("unit"), "px");
 }
 
-TEST_F(ExportCorrection, HeadJointsInRadiansWithoutADeviationAreRefused) {
-  std::ofstream(folder_ / "summary.json")
-      << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1},
-          "nuisance": {"neck_pitch": 0.05, "mesh_scale": 0.01}}})";
-  try {
-    export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
-    ADD_FAILURE() << "no error";
-  } catch (const FileError& e) {
-    EXPECT_THAT(e.what(), ::testing::HasSubstr("summary.json: estimate.nuisance"));
-    EXPECT_THAT(e.what(), ::testing::HasSubstr("replay the log again"));
+TEST_F(ExportCorrection, ASummaryOfAnOlderVersionIsRefused) {
+  for (const char* older : {R"("nuisance": {"neck_pitch": 0.05, "mesh_scale": 0.01})",
+                            R"("told": [], "nuisance": {"mesh_scale": 0.01})", R"("effective_sample_size": 3)"}) {
+    std::ofstream(folder_ / "summary.json")
+        << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1}, )"
+        << older << "}}";
+    try {
+      export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+      ADD_FAILURE() << "no error: " << older;
+    } catch (const FileError& e) {
+      EXPECT_THAT(e.what(), ::testing::HasSubstr("summary.json: the estimate is that of an older version"));
+      EXPECT_THAT(e.what(), ::testing::HasSubstr("replay the log again"));
+    }
   }
+}
+
+TEST_F(ExportCorrection, AnEffectThatTheSummaryMakesUpIsRefused) {
+  const auto refuse = [&](const std::string& entry, const char* words) {
+    std::ofstream(folder_ / "summary.json")
+        << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1},
+            "told": [], "effects": [)"
+        << entry << "]}}";
+    try {
+      export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+      ADD_FAILURE() << "no error: " << words;
+    } catch (const FileError& e) {
+      EXPECT_THAT(e.what(), ::testing::HasSubstr("summary.json"));
+      EXPECT_THAT(e.what(), ::testing::HasSubstr(words));
+    }
+  };
+  refuse(R"({"name": "mesh_scail", "parameter": "scale", "unit": "%", "value": 1.0, "stddev": 0.2})", "'mesh_scale'");
+  refuse(R"({"name": "mesh_scale", "parameter": "size", "unit": "%", "value": 1.0, "stddev": 0.2})",
+         "no parameter 'size'");
+  refuse(R"({"name": "mesh_scale", "parameter": "scale", "unit": "%", "stddev": 0.2})", "value");
+}
+
+/// What the replay estimated beside the offsets goes where it belongs, and the files say where.
+TEST_F(ExportCorrection, WhatElseWasEstimatedIsInTheFilesOrSaidNotToBe) {
+  export_of("converged");
+  const std::string applied = content("out/what_was_applied.txt");
+  EXPECT_THAT(applied, ::testing::HasSubstr("head_offset of neck_pitch angle -2.86 deg: in corrected.urdf"));
+  EXPECT_LT(applied.find("cannot hold"), applied.find("mesh_scale scale 1 %"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/cameras.yaml"));
+  // The head turns in the corrected URDF as the estimate says.
+  const auto nominal = setup_.load();
+  RobotModelOptions options = setup_.model;
+  options.urdf = folder_ / "out/corrected.urdf";
+  ForwardKinematics a(nominal, {"l_eye_optical"}), b(RobotModel::load(options), {"l_eye_optical"});
+  Eigen::VectorXd encoder = setup_.default_joints(*nominal), q_true = encoder;
+  q_true(nominal->joint_index("neck_pitch")) += radians(-2.8648);
+  q_true(nominal->joint_index("neck_yaw")) += radians(-0.5);
+  std::vector<Pose> X_a(1), X_b(1);
+  a.compute(q_true, X_a);
+  b.compute(encoder, X_b);
+  EXPECT_LT((X_a[0].translation() - X_b[0].translation()).norm(), 1e-6);
+  EXPECT_LT(rotation_distance(X_a[0].linear(), X_b[0].linear()), 1e-6);
 }
 
 // Arm and head offsets hold together: a calibrator that gets one without the other is wrong.
@@ -263,13 +316,15 @@ TEST_F(ExportCorrection, TheUrdfHoldsWhatItCanOfAnExtendedModel) {
   put("axis_tilt", {"r_elbow", ""});
   put("axis_shift", {"r_elbow", ""});
   put("axis_shift", {"r_wrist_prosup", ""});
+  put("camera_pair", {});
+  put("camera_pose", {});
   put("baseline", {});
   put("base_shift", {});
   put("focal_length", {});
   put("compliance", {"r_elbow", ""});
   Correction correction;
   correction.offsets_rad = {{"r_shoulder_yaw", 0.1}, {"r_elbow", -0.07}};
-  const auto applied = add_extended_model(model, robot, setup_, rig_, correction);
+  const auto applied = add_effects(model, robot, setup_, rig_, correction);
   ASSERT_EQ(applied.size(), model.size());
   EXPECT_EQ(applied.back().applied, "");
   EXPECT_THAT(applied.back().effect, ::testing::HasSubstr("compliance of r_elbow"));
@@ -296,7 +351,7 @@ TEST_F(ExportCorrection, TheUrdfHoldsWhatItCanOfAnExtendedModel) {
     for (const std::size_t c : {0u, 1u}) {
       Instant at;
       instants.build(sample, c, Eigen::VectorXd::Zero(sample.q.size()), at);
-      Corrections corrections(sample.q.size());
+      Corrections corrections = model.roles().no_corrections();
       model.corrections(at, corrections);
       Eigen::VectorXd q = sample.q;
       for (const auto& [name, offset] : correction.offsets_rad) q(robot->joint_index(name)) -= offset;

@@ -180,7 +180,7 @@ TEST_F(GivenMasks, ACameraWithoutOneHasSeenNothing) {
   seen.joints = {0, pipeline.setup().default_joints(pipeline.robot()),
                  Eigen::VectorXd::Zero(pipeline.robot().joint_count())};
   seen.image = Image(320, 240, 3);
-  Observation observation{0, {seen, seen}};
+  Observation observation{0, {seen, seen}, {}};
   observation.cameras[1]->given_mask = Image(320, 240, 1);
   EXPECT_TRUE(pipeline.segment(observation));
   EXPECT_TRUE(observation.cameras[0]->mask.empty());

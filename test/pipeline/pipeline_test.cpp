@@ -93,7 +93,7 @@ Observation observation_of(const Pipeline& pipeline, const Image& image, Microse
   seen.joints = {utime, pipeline.setup().default_joints(pipeline.robot()),
                  Eigen::VectorXd::Zero(pipeline.robot().joint_count())};
   seen.image = image;
-  return {utime, {seen, seen}};
+  return {utime, {seen, seen}, {}};
 }
 
 std::vector<std::string> lens(const std::string& k1) {

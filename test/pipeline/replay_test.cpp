@@ -125,8 +125,14 @@ TEST_F(ReplayTest, WritesEstimatesSummaryAndPictures) {
   EXPECT_EQ(last["state"], "converged");
   EXPECT_EQ(last["offset_deg"].size(), 7u);
   EXPECT_EQ(last["stddev_deg"].size(), 7u);
-  EXPECT_TRUE(last["head_offset_deg"].contains("neck_pitch"));
-  EXPECT_EQ(last["head_stddev_deg"].size(), last["head_offset_deg"].size());
+  EXPECT_THAT(last["told"], ::testing::Contains("r_elbow"));
+  const auto& effects = last["effects"];
+  const auto neck = std::find_if(effects.begin(), effects.end(), [](const auto& effect) {
+    return effect["name"] == "head_offset" && effect["joint"] == "neck_pitch";
+  });
+  ASSERT_NE(neck, effects.end());
+  EXPECT_EQ((*neck)["unit"], "deg");
+  EXPECT_LE((*neck)["stddev"].get<double>(), (*neck)["prior_stddev"].get<double>());
   EXPECT_EQ(last["hand_pose_left_camera"].size(), 4u);
   EXPECT_GT(last["likelihood"].get<double>(), 0.95);
   EXPECT_LT(last["error_left"]["position_mm"].get<double>(), 1.0);
@@ -232,14 +238,17 @@ TEST_F(ReplayTest, ErrorsAndTheLastPictureAreOfTheOffsetsThatAreReported) {
   o.learn_background_online = true;
   record_with_an_empty_room_at_the_end(o.log, {1});
   std::vector<Observation> seen;
+  std::vector<Exposure> exposures;
   std::vector<Estimate> estimates;
   const auto watch = [&](Pipeline& pipeline) {
     seen.clear();
+    exposures.clear();
     estimates.clear();
     ObservationStream stream = pipeline.make_stream();
     const auto drain = [&] {
       while (auto arrived = stream.next()) {
         estimates.push_back(pipeline.process(arrived->observation));
+        exposures.push_back(pipeline.estimator().exposure(0));
         seen.push_back(std::move(arrived->observation));
       }
     };
@@ -269,11 +278,11 @@ TEST_F(ReplayTest, ErrorsAndTheLastPictureAreOfTheOffsetsThatAreReported) {
   const auto mean_mm = [&](const Estimate& estimate) {
     double sum = 0.0;
     int n = 0;
-    for (const auto& observation : seen) {
-      if (!observation.cameras[0]) continue;
-      const TruthInstant* instant = truth.at(observation.cameras[0]->utime);
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      if (!seen[i].cameras[0]) continue;
+      const TruthInstant* instant = truth.at(seen[i].cameras[0]->utime);
       if (instant == nullptr) continue;
-      const Pose hand = pipeline.estimator().hand_pose(*observation.cameras[0], 0, estimate);
+      const Pose hand = pipeline.estimator().hand_pose(exposures[i], estimate);
       sum += 1e3 * hand_error(hand, *instant, 0, pipeline.rig().cameras[0].intrinsics).position_m;
       ++n;
     }

@@ -1,5 +1,7 @@
 #include "bodyschema/selftest/self_test.hpp"
 
+#include "bodyschema/selftest/engine_table.hpp"
+
 #include <cstdio>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -50,6 +52,14 @@ TEST(SelfTest, AGoodInstallationPasses) {
   EXPECT_TRUE(results.contains("network"));
   EXPECT_TRUE(results.contains("lcm"));
   EXPECT_FALSE(results.contains("config"));
+}
+
+TEST(EngineTable, NamesAllEnginesAndWhatIsInForce) {
+  const std::string table = engine_table(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml");
+  for (const char* word : {"400 silhouettes of ", "contour  - ", "atlas    raster", "atlas    compute",
+                           "silhouette.engine in force: "}) {
+    EXPECT_THAT(table, HasSubstr(word));
+  }
 }
 
 TEST(SelfTest, MissingFilesFailAndTheRestIsStillChecked) {

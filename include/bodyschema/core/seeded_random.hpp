@@ -9,8 +9,15 @@
 
 namespace bodyschema {
 
+/// SplitMix64's output function: numbers that differ by little become numbers that have nothing in common.
+constexpr std::uint64_t mixed_bits(std::uint64_t z) {
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+  return z ^ (z >> 31);
+}
+
 /// Random numbers that are the same for a seed on every machine: the distributions of the standard library differ
-/// from one library to the next. The simulator has its own (simulator/random.hpp): nothing of it is the estimator's.
+/// from one library to the next. The simulator has its own (simulator/random.hpp).
 class SeededRandom {
  public:
   explicit SeededRandom(std::uint64_t seed) : random_(seed) {}

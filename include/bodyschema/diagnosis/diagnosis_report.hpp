@@ -86,6 +86,7 @@ struct Remainder {
   double rms_px = 0.0;               ///< along the outline's normals; 0 where nothing was found
   double mean_px = 0.0;              ///< mean along the outward normal
   std::vector<double> apparent_deg;  ///< correction of each arm joint alone that it asks for
+  Eigen::Vector3d hand_C_m = Eigen::Vector3d::Zero();  ///< where the model has the hand in the camera, m
 };
 
 /// One exposure, for the charts of structure.

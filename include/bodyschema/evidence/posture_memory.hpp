@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bodyschema/core/time.hpp"
+#include "bodyschema/geometry/pose.hpp"
 
 namespace bodyschema {
 
@@ -34,13 +35,13 @@ struct MemoryLayout {
 };
 
 struct MemoryOptions {
-  double memory_s = 300.0;          ///< after so long a posture's say has faded to 1/e
-  double block_s = 0.25;            ///< of motion that counts as one posture
-  double same_posture_rad = 0.05;   ///< joints nearer than this are the same posture
-  std::size_t most_blocks = 120;    ///< the oldest are summed up beyond
-  double encoder_sd_rad = 0.0006;   ///< of one reading: noise and rounding; the least a posture gets wrong
-  double posture_sd_rad = 0.0012;   ///< what a posture is believed to get wrong before any was seen, per joint
-  double posture_prior = 8.0;       ///< how many told directions that belief counts as
+  double memory_s = 300.0;                 ///< after so long a posture's say has faded to 1/e
+  double block_s = 0.25;                   ///< of motion that counts as one posture
+  double same_posture_rad = radians(3.0);  ///< joints nearer than this are the same posture
+  std::size_t most_blocks = 120;           ///< the oldest are summed up beyond
+  double encoder_sd_rad = radians(0.035);  ///< of one reading: noise and rounding; the least a posture gets wrong
+  double posture_sd_rad = radians(0.07);   ///< what a posture is believed to get wrong before any was seen, per joint
+  double posture_prior = 8.0;              ///< how many told directions that belief counts as
 };
 
 /// The estimate: best values, and how well they are known.

@@ -9,6 +9,7 @@
 #include "bodyschema/bus/bus_options.hpp"
 #include "bodyschema/bus/observation_stream.hpp"
 #include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/core/background_worker.hpp"
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/effects/error_model.hpp"
 #include "bodyschema/estimator/estimator.hpp"
@@ -23,7 +24,7 @@ namespace bodyschema {
 
 /// From configuration to estimates: robot, cameras, segmentation and estimator wired together.
 /// The daemon, replay and evaluation run this same object, so that a recorded log gives what the
-/// live robot gave. One thread.
+/// live robot gave. Called by one thread, beside which it has one of its own.
 class Pipeline {
  public:
   /// Reads the whole configuration, robot and meshes, opens the silhouette engine. Throws Error.
@@ -109,7 +110,11 @@ class Pipeline {
     std::vector<std::optional<Look>> of;
   };
   [[nodiscard]] static bool frozen(const PictureChange& change);
-  Looks look(const Observation& observation);
+  /// @param alone  whether the other thread is free to help
+  Looks look(const Observation& observation, bool alone);
+  Look look_with(Eye& eye, const CameraObservation& seen, const std::optional<BinaryMask>& predicted) const;
+  template <class OfCamera>
+  void for_each_eye(const OfCamera& of_camera);
   Looks looks_at(const Observation& observation);
   void watch_background(const Observation& observation, std::size_t camera, bool learning);
 
@@ -132,6 +137,8 @@ class Pipeline {
   bool tracking_ = false;  ///< the estimate is good enough to predict where the robot is
   double segmentation_ms_ = 0.0;
   std::future<Looks> ahead_;  ///< at the next observation, where it was known
+  /// Looks ahead, or at the second camera's picture.
+  std::unique_ptr<BackgroundWorker> worker_ = std::make_unique<BackgroundWorker>();
 };
 
 }  // namespace bodyschema

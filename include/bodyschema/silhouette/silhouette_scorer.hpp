@@ -69,11 +69,14 @@ class SilhouetteScorer {
 };
 
 /// `engine` is "atlas", "contour" or "auto". Auto takes contour when the GL renderer is software
-/// or there is no GL at all, and atlas on a GPU.
+/// or there is no GL at all, and atlas on a GPU; `gl_pass` "auto" is "compute". What is fastest in fact is measured by
+/// time_engines; search/fastest_engine.hpp chooses by that.
 struct SilhouetteOptions {
   std::string engine = "auto";
   std::string gl_platform = "auto";  ///< "auto", "egl_device", "egl_surfaceless", "osmesa"
   int threads = 0;                   ///< contour: worker threads, 0 = one per core
+  /// atlas: "raster" draws triangles through the rasteriser, "compute" adds up contour edges in a shader; "auto".
+  std::string gl_pass = "auto";
 };
 
 /// Throws FileError for an unusable mesh, std::invalid_argument for an unusable option, ContextError when the atlas
@@ -82,5 +85,21 @@ std::unique_ptr<SilhouetteScorer> make_silhouette_scorer(const SilhouetteModel& 
                                                          std::span<const PinholeIntrinsics> cameras,
                                                          const SilhouetteOptions& options = {},
                                                          std::string* reason = nullptr);
+
+/// How long an engine takes here.
+struct EngineTiming {
+  std::string engine;       ///< as SilhouetteOptions::engine
+  std::string gl_pass;      ///< of atlas, as SilhouetteOptions::gl_pass
+  double ms = 0.0;          ///< of wall clock for the silhouettes asked for: the least of those measured
+  std::string description;  ///< SilhouetteScorer::description()
+  std::string error;        ///< why it could not be measured; then nothing else holds
+};
+
+/// Measures engine contour and both passes of atlas on this machine with this model: parts are turned at random, where
+/// the largest fills a third of the picture. None is given more than its share of `seconds`, but for what one scoring of
+/// all silhouettes takes. Throws as make_silhouette_scorer for an unusable model.
+/// @param silhouettes  to be scored at once
+std::vector<EngineTiming> time_engines(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras,
+                                       const SilhouetteOptions& options, std::size_t silhouettes, double seconds);
 
 }  // namespace bodyschema

@@ -1,0 +1,23 @@
+# Finds OpenCV's modules one by one, as opencv_<module>. Debian keeps OpenCV's own CMake configuration in
+# its metapackage, which brings Qt and VTK along; where it is absent, headers and libraries are enough.
+find_package(OpenCV ${OpenCV_FIND_VERSION} QUIET CONFIG COMPONENTS ${OpenCV_FIND_COMPONENTS})
+if(NOT OpenCV_FOUND)
+  find_path(BODYSCHEMA_OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4)
+  mark_as_advanced(BODYSCHEMA_OPENCV_INCLUDE_DIR)
+  set(OpenCV_INCLUDE_DIRS ${BODYSCHEMA_OPENCV_INCLUDE_DIR})
+  foreach(module IN LISTS OpenCV_FIND_COMPONENTS)
+    find_library(BODYSCHEMA_OPENCV_${module} opencv_${module})
+    mark_as_advanced(BODYSCHEMA_OPENCV_${module})
+    if(NOT BODYSCHEMA_OPENCV_${module} OR NOT EXISTS ${OpenCV_INCLUDE_DIRS}/opencv2/${module}.hpp)
+      continue()
+    endif()
+    set(OpenCV_${module}_FOUND TRUE)
+    if(NOT TARGET opencv_${module})
+      add_library(opencv_${module} UNKNOWN IMPORTED)
+      set_target_properties(opencv_${module} PROPERTIES IMPORTED_LOCATION ${BODYSCHEMA_OPENCV_${module}}
+                            INTERFACE_INCLUDE_DIRECTORIES ${OpenCV_INCLUDE_DIRS})
+    endif()
+  endforeach()
+  include(FindPackageHandleStandardArgs)
+  find_package_handle_standard_args(OpenCV REQUIRED_VARS BODYSCHEMA_OPENCV_INCLUDE_DIR HANDLE_COMPONENTS)
+endif()

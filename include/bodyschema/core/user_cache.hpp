@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace bodyschema {
+
+/// What was computed once and can be computed again, kept in files of the user's cache: $XDG_CACHE_HOME/bodyschema or
+/// $HOME/.cache/bodyschema. Where there is neither, or it cannot be read or written, nothing is kept; nothing throws.
+/// Files are replaced whole, so that processes at the same time do not disturb each other.
+/// @param name  a path below it, e.g. "meshes/0123456789abcdef"
+[[nodiscard]] std::optional<std::string> read_cache(const std::filesystem::path& name);
+void write_cache(const std::filesystem::path& name, std::string_view bytes);
+
+}  // namespace bodyschema

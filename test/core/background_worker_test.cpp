@@ -1,0 +1,37 @@
+#include "bodyschema/core/background_worker.hpp"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <vector>
+
+namespace bodyschema {
+namespace {
+
+TEST(BackgroundWorker, IsOneThreadForAllWork) {
+  BackgroundWorker worker;
+  const auto first = worker.begin([] { return std::this_thread::get_id(); }).get();
+  EXPECT_NE(first, std::this_thread::get_id());
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(worker.begin([] { return std::this_thread::get_id(); }).get(), first);
+}
+
+TEST(BackgroundWorker, GivesBackWhatWasReturnedOrThrown) {
+  BackgroundWorker worker;
+  auto failing = worker.begin([]() -> int { throw std::runtime_error("broken"); });
+  auto good = worker.begin([] { return 7; });
+  EXPECT_THROW(failing.get(), std::runtime_error);
+  EXPECT_EQ(good.get(), 7);
+}
+
+TEST(BackgroundWorker, DoesAllInOrderBeforeItEnds) {
+  std::vector<int> done;
+  {
+    BackgroundWorker worker;
+    for (int i = 0; i < 50; ++i) worker.begin([&done, i] { done.push_back(i); });
+  }
+  ASSERT_EQ(done.size(), 50u);
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(done[static_cast<std::size_t>(i)], i);
+}
+
+}  // namespace
+}  // namespace bodyschema
