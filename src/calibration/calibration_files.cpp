@@ -10,6 +10,7 @@
 #include "bodyschema/pipeline/export_correction.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/pipeline/silhouette_preview.hpp"
+#include "bodyschema/pipeline/ros_files.hpp"
 #include "bodyschema/report/report.hpp"
 
 namespace bodyschema {
@@ -136,6 +137,18 @@ std::string cameras_yaml(const Calibration& c, const StereoRig& rig) {
   return text;
 }
 
+/// Where the URDF itself places a camera, and nothing else was found, it stays with the URDF.
+std::vector<RosCamera> ros_cameras_of(const Calibration& c, const StereoRig& rig) {
+  std::vector<RosCamera> cameras;
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    const auto& camera = c.cameras[i];
+    const bool as_in_urdf = camera.link == rig.cameras[i].link && camera.X_link_optical.isApprox(Pose::Identity(), 1e-12);
+    cameras.push_back({camera.name, rig.cameras[i].intrinsics, rig.cameras[i].distortion,
+                       as_in_urdf ? "" : camera.link, camera.X_link_optical});
+  }
+  return cameras;
+}
+
 void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, const std::vector<Observation>& kept,
                 const CalibrationOptions& options) {
   Report page("Calibration of " + options.log.filename().string());
@@ -230,8 +243,10 @@ void write_calibration(const Calibration& calibration, const BatchFit& batch, Pi
     if (effect_kind(effect.name()).home == EffectHome::kCameras) cameras.add(effect.clone());
   }
   replace_file(options.out / "cameras.yaml", cameras_yaml(calibration, cameras.corrected(log.rig())));
-  write_corrected_urdf(pipeline.setup().model.urdf, correction_of(calibration, options.all_parameters),
-                       options.out / "corrected.urdf");
+  const Correction correction = correction_of(calibration, options.all_parameters);
+  write_corrected_urdf(pipeline.setup().model.urdf, correction, options.out / "corrected.urdf");
+  write_ros_files(options.out / "ros", pipeline.setup().model.urdf, options.out / "corrected.urdf", correction,
+                  ros_cameras_of(calibration, cameras.corrected(log.rig())));
 }
 
 std::string to_table(const Calibration& c) {

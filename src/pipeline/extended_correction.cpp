@@ -73,7 +73,32 @@ bool moves_rig(const CameraCorrection& camera) {
   return !camera.rig_shift_m.isZero(0.0) || !camera.rig_turn_rad.isZero(0.0);
 }
 
+/// Else it is a frame that only the configuration knows.
+bool is_link_of_urdf(const CameraModel& camera) {
+  return !camera.mount.relative && camera.link == camera.mount.parent;
+}
+
 }  // namespace
+
+StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                        const StereoRig& rig) {
+  StereoRig result = model.corrected(rig);
+  std::vector<Pose> moved(rig.cameras.size(), Pose::Identity());
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    Corrections change = model.roles().no_corrections();
+    model.corrections(at_rest(robot->joint_count(), c), change);
+    const auto motion = camera_motion(robot, setup, rig, c, change);
+    if (motion) moved[c] = *motion;
+    if (is_link_of_urdf(rig.cameras[c])) continue;
+    CameraMount& mount = result.cameras[c].mount;
+    mount.X_PC = mount.X_PC * moved[c];
+    if (mount.relative) mount.X_PC = moved.front().inverse(Eigen::Isometry) * mount.X_PC;
+    if (motion || (mount.relative && !moved.front().isApprox(Pose::Identity(), 1e-12))) {
+      mount.knowledge = PlaceKnowledge::kKnown;
+    }
+  }
+  return result;
+}
 
 std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
                                               const RobotSetup& setup, const StereoRig& rig, Correction& correction) {
@@ -89,7 +114,12 @@ std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::share
       entry.applied = "cameras.yaml";
     } else if (kind.home == EffectHome::kUrdf) {
       entry.applied = "corrected.urdf";
-      for (std::size_t c = 0; c < rig.cameras.size(); ++c) effect.apply(at_rest(joints, c), cameras[c]);
+      for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+        effect.apply(at_rest(joints, c), cameras[c]);
+        Corrections own = model.roles().no_corrections();
+        effect.apply(at_rest(joints, c), own);
+        if (!is_link_of_urdf(rig.cameras[c]) && camera_motion(robot, setup, rig, c, own)) entry.applied = "cameras.yaml";
+      }
       Corrections change = model.roles().no_corrections();
       effect.apply(at_rest(joints, 0), change);  // what is no camera's changes for all of them alike
       if (moves_rig(change.camera) && model.roles().neck.size() < model.roles().head.size()) {
@@ -112,6 +142,7 @@ std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::share
   }
   // All at once: motions of a camera do not commute.
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    if (!is_link_of_urdf(rig.cameras[c])) continue;
     if (auto moved = camera_motion(robot, setup, rig, c, cameras[c])) {
       correction.camera_motions.emplace_back(rig.cameras[c].link, *moved);
     }
