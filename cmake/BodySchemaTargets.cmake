@@ -66,10 +66,13 @@ function(bodyschema_patient variable seconds)
   set(${variable} ${limit} PARENT_SCOPE)
 endfunction()
 
-# bodyschema_test(<folder> SOURCES ... [LINKS lib...] [LABELS ...] [TIMEOUT seconds] [RUN_SERIAL])
+# bodyschema_test(<folder> SOURCES ... [LINKS lib...] [LABELS ...] [TIMEOUT seconds] [RUN_SERIAL] [LONG] [FRESH])
 #   One GoogleTest program per folder of test/, named test_<folder>. RUN_SERIAL: no other test beside its own.
+#   LONG: logs of many pictures, label long; outside the default suite, ctest -C long -L long runs them.
+#   FRESH: draws from BODYSCHEMA_SEED (test/random_seed.hpp), which is fixed in the default suite; ctest -C fresh -L fresh
+#   runs it with a seed that nobody has seen, and prints that.
 function(bodyschema_test folder)
-  cmake_parse_arguments(ARG "RUN_SERIAL" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "RUN_SERIAL;LONG;FRESH" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
   find_package(GTest REQUIRED)
   set(target test_${folder})
   add_executable(${target} ${ARG_SOURCES})
@@ -85,8 +88,30 @@ function(bodyschema_test folder)
     set(ARG_LABELS unit)
   endif()
   bodyschema_patient(timeout ${ARG_TIMEOUT})
-  include(GoogleTest)
-  gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60
-    PROPERTIES TIMEOUT ${timeout} LABELS "${ARG_LABELS}" RUN_SERIAL ${ARG_RUN_SERIAL}
-               ENVIRONMENT BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE})
+  set(patience BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE})
+  if(ARG_LONG)
+    bodyschema_long_tests(${target} ${ARG_SOURCES})
+  else()
+    include(GoogleTest)
+    gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60
+      PROPERTIES TIMEOUT ${timeout} LABELS "${ARG_LABELS}" RUN_SERIAL ${ARG_RUN_SERIAL} ENVIRONMENT ${patience})
+  endif()
+  if(ARG_FRESH)
+    add_test(NAME fresh.${folder} CONFIGURATIONS fresh COMMAND ${target})
+    set_tests_properties(fresh.${folder} PROPERTIES TIMEOUT ${timeout} LABELS fresh
+      ENVIRONMENT "${patience};BODYSCHEMA_SEED=fresh")
+  endif()
 endfunction()
+
+# One ctest for each TEST or TEST_F of some sources, of the configuration long (gtest_discover_tests knows none).
+macro(bodyschema_long_tests program)
+  foreach(source ${ARGN})
+    file(STRINGS ${source} lines REGEX "^TEST(_F)?\\(")
+    foreach(line IN LISTS lines)
+      string(REGEX REPLACE "^TEST(_F)?\\(([A-Za-z0-9]+), *([A-Za-z0-9]+)\\).*" "\\2.\\3" name "${line}")
+      add_test(NAME long.${name} CONFIGURATIONS long COMMAND ${program} --gtest_filter=${name})
+      set_tests_properties(long.${name} PROPERTIES TIMEOUT ${timeout} LABELS "long;${ARG_LABELS}"
+        RUN_SERIAL ${ARG_RUN_SERIAL} ENVIRONMENT ${patience})
+    endforeach()
+  endforeach()
+endmacro()

@@ -28,6 +28,12 @@ Json matrix_json(const Pose& X) {
   return rows;
 }
 
+Json parameter_json(const CalibratedParameter& p) {
+  Json json = {{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"stddev", p.sd}};
+  if (p.prior_sd > 0.0) json["prior_stddev"] = p.prior_sd;
+  return json;
+}
+
 Json to_json(const Calibration& c, const std::string& root) {
   Json json;
   json["state"] = to_string(c.state);
@@ -46,16 +52,24 @@ Json to_json(const Calibration& c, const std::string& root) {
     entry["estimated"] = camera.estimated;
     entry["sd_mm"] = 1e3 * camera.sd_m;
     entry["sd_deg"] = degrees(camera.sd_rad);
+    if (camera.estimated && !c.joints.empty()) {
+      entry["if_first_joint_were_known"] = {{"joint", c.joints.front().name},
+                                            {"turn_about_it_sd_deg", degrees(c.joints.front().sd_rad)},
+                                            {"sd_mm", 1e3 * camera.sd_m_beside_first_joint},
+                                            {"sd_deg", degrees(camera.sd_rad_beside_first_joint)}};
+    }
   }
   json["outline_px"] = {{"before", c.outline_px.before}, {"after", c.outline_px.after}};
   if (c.outline_px.heldout) json["outline_px"]["heldout"] = *c.outline_px.heldout;
+  json["parameters"] = Json::array();
+  for (const auto& p : c.parameters) json["parameters"].push_back(parameter_json(p));
   json["effects"] = Json::array();
-  for (const auto& p : c.parameters) {
-    json["effects"].push_back({{"name", p.name},
-                               {"unit", p.unit},
-                               {"value", p.value},
-                               {"stddev", p.sd},
-                               {"prior_stddev", p.prior_sd}});
+  for (const auto& e : c.effects) {
+    Json entry = {{"effect", e.effect}, {"sentence", e.sentence}, {"parameters", Json::array()}};
+    if (!e.joint.empty()) entry["joint"] = e.joint;
+    if (!e.source.empty()) entry["source"] = e.source;
+    for (const auto& p : e.parameters) entry["parameters"].push_back(parameter_json(p));
+    json["effects"].push_back(std::move(entry));
   }
   json["hand_sd_mm"] = 1e3 * c.hand_sd_m;
   json["postures"] = c.postures;
@@ -165,6 +179,12 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
     }
     page.table({"effect", "value", "sd", "sd believed before", "unit"}, rows);
   }
+  if (!c.effects.empty()) {
+    page.heading("What else was found");
+    std::vector<std::string> items;
+    for (const auto& effect : c.effects) items.push_back(effect.sentence);
+    page.list(items);
+  }
   page.heading("How well it fits");
   rows = {{"before", fmt::format("{:.2f}", c.outline_px.before)}, {"after", fmt::format("{:.2f}", c.outline_px.after)}};
   if (c.outline_px.heldout) rows.push_back({"postures left out of the fit", fmt::format("{:.2f}", *c.outline_px.heldout)});
@@ -248,6 +268,7 @@ std::string to_table(const Calibration& c) {
     if (p.name.starts_with("camera_")) continue;
     text += fmt::format("\n{:<36} {:>9.3f} {:<3} sd {:.3f} (believed {:.3f})", p.name, p.value, p.unit, p.sd, p.prior_sd);
   }
+  for (const auto& effect : c.effects) text += "\nalso: " + effect.sentence;
   text += fmt::format("\n\noutlines, median distance: {:.2f} px before, {:.2f} px after{}\n", c.outline_px.before,
                       c.outline_px.after,
                       c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out", *c.outline_px.heldout) : "");

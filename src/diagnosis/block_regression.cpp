@@ -159,7 +159,11 @@ Eigen::MatrixXd BlockRegression::covariance() const {
   Eigen::MatrixXd covariance = Q * meat * Q;
   for (Eigen::Index i = 0; i < size(); ++i) {
     const double least = Q(i, i), own = covariance(i, i);
-    if (own >= least || own <= 0.0) continue;
+    if (own >= least) continue;
+    if (own <= 0.0) {
+      covariance(i, i) = least;
+      continue;
+    }
     covariance.row(i) *= std::sqrt(least / own);
     covariance.col(i) *= std::sqrt(least / own);
   }

@@ -94,6 +94,7 @@ class Page {
   Report write(const std::vector<std::pair<Image, std::string>>& pictures) {
     page_.verdict(d_.sentence);
     if (!d_.side_left_over.empty()) page_.paragraph("Left over: " + d_.side_left_over + ".");
+    if (!d_.not_in_model.empty()) page_.paragraph("Not in the model: " + d_.not_in_model + ".");
     causes();
     gain();
     if (!pictures.empty()) {

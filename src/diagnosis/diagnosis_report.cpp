@@ -128,6 +128,7 @@ std::string DiagnosisReport::to_json() const {
               {"block_s", number(block_s)}};
   j["warnings"] = warnings;
   j["side_left_over"] = optional_text(side_left_over);
+  j["not_in_model"] = optional_text(not_in_model);
   return j.dump(2) + "\n";
 }
 

@@ -9,6 +9,7 @@
 
 #include "bodyschema/evidence/distributions.hpp"
 #include "limits.hpp"
+#include "surplus.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
@@ -208,6 +209,7 @@ void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candi
   }
   describe_causes(log, all, candidates);
   check_sides(log);
+  check_surplus(log);
   exclude(log, all, candidates);
 }
 
@@ -346,6 +348,13 @@ void Findings::check_sides(const LogAbout& log) {
                                          roles.segments[group / kSides / fit_.log().rig().cameras.size()].name, std::abs(mean),
                                          mean > 0.0 ? "outside of" : "inside of", camera.name);
   }
+}
+
+void Findings::check_surplus(const LogAbout& log) {
+  const auto found = surplus(fit_, log, search_.raster());
+  if (found.blocks < limits::kMostOfTheLog) return;
+  constexpr double kCm2 = 1e-4;
+  report_.not_in_model = fmt::format("{:.0f} cm2 beside the robot, in {:.0f} % of the log", found.area_m2 / kCm2, 100.0 * found.blocks);
 }
 
 void Findings::exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates) {

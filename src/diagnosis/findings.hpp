@@ -43,6 +43,8 @@ class Findings {
   void exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
   /// Where outlines lie off on one side of one part, block after block.
   void check_sides(const LogAbout& log);
+  /// What the pictures show and the model lacks.
+  void check_surplus(const LogAbout& log);
   [[nodiscard]] double quantile(const LogAbout& log) const;
 
   LogFit& fit_;

@@ -13,6 +13,7 @@ constexpr double kJump_rad = 0.14;    ///< between two pictures: the arm was mov
 constexpr double kFloor_px = 0.1;     ///< no picture places a flank nearer (OutlineNoise::Prior::floor_px)
 constexpr double kImplausible = 20.0; ///< of an effect's typical size: no robot is so wrong
 constexpr double kLeastFound = 0.6;   ///< share of the outline that must be found where the robot is seen at all
+constexpr double kMostOfTheLog = 0.5; ///< of the blocks: what is seen there beside the robot is no passer-by
 constexpr double kLostContrast = 0.5; ///< between the shares of two parts of the log that are seen
 
 // Statistical.

@@ -7,6 +7,20 @@
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "limits.hpp"
 
+namespace bodyschema {
+
+Belief wide_belief(const CauseName& cause, const JointRoles& roles) {
+  const EffectTarget target{cause.joint, cause.source};
+  const auto effect = make_effect(cause.name, target, roles);
+  std::vector<double> sd;
+  for (const auto& p : std::as_const(*effect).parameters()) {
+    if (p.fitted) sd.push_back(diagnosis::limits::kWide * p.typical);
+  }
+  return {cause.name, target, sd};
+}
+
+}  // namespace bodyschema
+
 namespace bodyschema::diagnosis {
 namespace {
 
@@ -28,16 +42,6 @@ std::vector<std::size_t> raster_of(const PictureLog& log, std::size_t most) {
 }
 
 }  // namespace
-
-Belief wide_belief(const CauseName& cause, const JointRoles& roles) {
-  const EffectTarget target{cause.joint, cause.source};
-  const auto effect = make_effect(cause.name, target, roles);
-  std::vector<double> sd;
-  for (const auto& p : std::as_const(*effect).parameters()) {
-    if (p.fitted) sd.push_back(limits::kWide * p.typical);
-  }
-  return {cause.name, target, sd};
-}
 
 ModelSearch::ModelSearch(LogFit& fit, const std::vector<Belief>& beliefs, const std::vector<Belief>& tolerances,
                          const DiagnosisOptions& options)
@@ -69,15 +73,11 @@ double ModelSearch::fit(State& state, double from_px) {
 }
 
 void ModelSearch::start() {
-  std::vector<Eigen::VectorXd> starts = options_.start_offsets;
-  starts.insert(starts.begin(), Eigen::VectorXd());
+  auto starts = options_.starts;
+  starts.insert(starts.begin(), state_.x());
   std::optional<State> best;
-  for (const auto& offsets : starts) {
+  for (const auto& x : starts) {
     State state(fit_.log().roles(), beliefs_);
-    Eigen::VectorXd x = state.x();
-    for (Eigen::Index j = 0; j < state.joints() && offsets.size() > 0; ++j) {
-      x[j] = offsets[state.parameters()[static_cast<std::size_t>(j)].joint];
-    }
     state.set(x);
     const double cost = fit(state, limits::kFrom_px);
     if (best && cost >= cost_) continue;

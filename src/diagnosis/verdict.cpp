@@ -80,6 +80,10 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles) {
   if (std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.implausible; })) {
     return unexplained("No known cause explains this log: what fits is larger than on any robot.");
   }
+  if (!report.not_in_model.empty()) {
+    return unexplained("The pictures show something that the model lacks: " + report.not_in_model +
+                       ". The hand holds a thing, or a part has no mesh.");
+  }
   if (!report.side_left_over.empty()) {
     return unexplained(fmt::format("The model does not explain what is seen: {}.", report.side_left_over));
   }

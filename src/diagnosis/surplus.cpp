@@ -1,0 +1,76 @@
+#include "surplus.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bodyschema/pipeline/silhouette_preview.hpp"
+#include "limits.hpp"
+
+namespace bodyschema::diagnosis {
+namespace {
+
+/// Every pixel that has one of the mask's within `reach` columns and rows.
+BinaryMask grown(const BinaryMask& mask, int reach) {
+  BinaryMask along(mask.width(), mask.height()), result(mask.width(), mask.height());
+  for (int v = 0; v < mask.height(); ++v) {
+    for (int u = 0, last = -reach - 1; u < mask.width() + reach; ++u) {
+      if (u < mask.width() && mask.at(u, v)) last = u;
+      const int centre = u - reach;
+      if (centre >= 0 && last >= centre - reach) along.set(centre, v);
+    }
+  }
+  for (int u = 0; u < mask.width(); ++u) {
+    for (int v = 0, last = -reach - 1; v < mask.height() + reach; ++v) {
+      if (v < mask.height() && along.at(u, v)) last = v;
+      const int centre = v - reach;
+      if (centre >= 0 && last >= centre - reach) result.set(u, centre);
+    }
+  }
+  return result;
+}
+
+/// Pixels that are seen and lie beyond.
+double beyond(const Picture& picture, const BinaryMask& allowed) {
+  double count = 0.0;
+  for (int v = 0; v < allowed.height(); ++v) {
+    for (int u = 0; u < allowed.width(); ++u) {
+      const bool judged = picture.valid.empty() || picture.valid.at(u, v);
+      count += judged && picture.mask.at(u, v) && !allowed.at(u, v) ? 1.0 : 0.0;
+    }
+  }
+  return count;
+}
+
+}  // namespace
+
+Surplus surplus(LogFit& fit, const LogAbout& log, const std::vector<std::size_t>& pictures) {
+  SilhouettePreview preview(fit.log());
+  std::vector<std::vector<double>> of_block(log.blocks);
+  for (const auto p : pictures) {
+    if (log.precision[p] <= 0.0) continue;
+    const auto& picture = fit.log().pictures()[p];
+    const auto& k = fit.log().rig().cameras[picture.camera].intrinsics;
+    const double reach_px = limits::kSearch_px * picture_unit(k);
+    const auto silhouette = preview.draw(picture.joints.q, log.at.corrections[p], picture.camera);
+    const double pixels = beyond(picture, grown(silhouette, static_cast<int>(std::lround(reach_px))));
+    auto& measurement = fit.measurement();
+    measurement.projection().place(picture.joints.q, log.at.corrections[p], picture.camera);
+    const double depth = std::max(0.0, measurement.projection().hand().translation().z());
+    of_block[log.block_of[p]].push_back(pixels < reach_px * reach_px ? 0.0 : pixels * depth * depth / (k.fx * k.fy));
+  }
+  std::vector<double> areas;
+  double seen = 0.0;
+  for (auto& areas_of_pictures : of_block) {
+    if (areas_of_pictures.empty()) continue;
+    seen += 1.0;
+    const auto middle = areas_of_pictures.begin() + static_cast<std::ptrdiff_t>(areas_of_pictures.size() / 2);
+    std::nth_element(areas_of_pictures.begin(), middle, areas_of_pictures.end());
+    if (*middle > 0.0) areas.push_back(*middle);
+  }
+  if (areas.empty()) return {};
+  const auto middle = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
+  std::nth_element(areas.begin(), middle, areas.end());
+  return {static_cast<double>(areas.size()) / seen, *middle};
+}
+
+}  // namespace bodyschema::diagnosis

@@ -1,0 +1,176 @@
+#include "verdict.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "effects/roles.hpp"
+
+namespace bodyschema::diagnosis {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+DiagnosisReport report_of(std::vector<DiagnosedCause> causes) {
+  DiagnosisReport report;
+  report.after.rms_px = 0.3;
+  report.causes = std::move(causes);
+  report.exclusion_limits = {{{"backlash", "elbow", ""}, "width", "deg", 0.2}};
+  return report;
+}
+
+DiagnosisReport worded(DiagnosisReport report) {
+  word_verdict(report, test::roles());
+  return report;
+}
+
+DiagnosedCause gain_of_elbow() {
+  DiagnosedCause cause;
+  cause.cause = {"encoder_gain", "elbow", ""};
+  cause.parameters = {{"gain", "%", 4.0, {3.5, 4.5}}};
+  cause.same = {cause.cause};
+  return cause;
+}
+
+TEST(Verdict, IsASentenceWithSizeIntervalAndDirection) {
+  auto report = worded(report_of({gain_of_elbow()}));
+  EXPECT_EQ(report.verdict, "named");
+  EXPECT_EQ(report.sentence, "Elbow turns 4 % (3.5 to 4.5) further than its encoder says.");
+  EXPECT_EQ(report.causes[0].sentence, "elbow turns 4 % (3.5 to 4.5) further than its encoder says");
+  // A size has no sign: the word says which way.
+  auto less = gain_of_elbow();
+  less.parameters = {{"gain", "%", -4.0, {-4.5, -3.5}}};
+  report = worded(report_of({less}));
+  EXPECT_EQ(report.sentence, "Elbow turns 4 % (3.5 to 4.5) less far than its encoder says.");
+  EXPECT_FALSE(report.exclusion_limits.empty()) << "a model that explains the log excludes the rest";
+}
+
+TEST(Verdict, OfASizeThatMayBeNoneSaysUpToWhat) {
+  auto cause = gain_of_elbow();
+  cause.parameters = {{"gain", "%", -0.3, {-0.9, 0.3}}};
+  EXPECT_THAT(worded(report_of({cause})).sentence, HasSubstr("0.3 % (at most 0.9)"));
+}
+
+TEST(Verdict, NamesSeveralCausesInOneSentence) {
+  DiagnosedCause latency;
+  latency.cause = {"latency", "", ""};
+  latency.parameters = {{"delay", "ms", 58.0, {57.0, 59.0}}};
+  latency.same = {latency.cause};
+  const auto report = worded(report_of({latency, gain_of_elbow()}));
+  EXPECT_EQ(report.verdict, "named");
+  EXPECT_EQ(report.sentence,
+            "Pictures arrive 58 ms (57 to 59) late against the encoders; elbow turns 4 % (3.5 to 4.5) further than its "
+            "encoder says.");
+}
+
+TEST(Verdict, KeepsTheLettersOfAJointsName) {
+  DiagnosedCause cause = gain_of_elbow();
+  cause.cause.joint = "w_yaw";
+  cause.same = {cause.cause};
+  EXPECT_THAT(worded(report_of({cause})).sentence, testing::StartsWith("w_yaw turns"));
+}
+
+TEST(Verdict, SaysWhenAJointSlippedAndOverWhichSpanItDrifted) {
+  DiagnosedCause slip, drift;
+  slip.cause = {"slip", "elbow", ""};
+  slip.parameters = {{"step", "deg", 2.0, {1.9, 2.1}, Microseconds{1'600'000'048'700'000}}};
+  slip.same = {slip.cause};
+  drift.cause = {"drift", "prosup", ""};
+  drift.parameters = {{"change", "deg/log", 2.0, {1.9, 2.1}, Microseconds{1'600'000'003'500'000}, 50.5}};
+  drift.same = {drift.cause};
+  auto report = report_of({slip, drift});
+  report.begin_utime = 1'600'000'000'000'000;
+  report = worded(std::move(report));
+  EXPECT_EQ(report.causes[0].sentence, "elbow slipped by 2 deg (1.9 to 2.1), 48.7 s into the log");
+  EXPECT_THAT(report.causes[1].sentence, HasSubstr("from 3.5 to 54.0 s into the log"));
+}
+
+TEST(Verdict, SaysAClassWhereSeveralFit) {
+  auto cause = gain_of_elbow();
+  cause.same.push_back({"eccentricity", "elbow", ""});
+  cause.same.push_back({"joint_coupling", "elbow", "prosup"});
+  const auto report = worded(report_of({cause}));
+  EXPECT_EQ(report.verdict, "class");
+  EXPECT_THAT(report.sentence, HasSubstr("(or eccentricity of elbow, joint_coupling of elbow with prosup, which this log cannot "
+                                         "tell from it)"));
+}
+
+/// A kink of 1.5 deg in an elbow was named an eccentricity of 16 deg.
+TEST(Verdict, TrustsNoNameOfASizeThatNoRobotHas) {
+  auto cause = gain_of_elbow();
+  cause.implausible = true;
+  const auto report = worded(report_of({cause}));
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, HasSubstr("larger than on any robot"));
+  EXPECT_THAT(report.sentence, HasSubstr("may only stand in for it: elbow turns 4 %"));
+  EXPECT_THAT(report.exclusion_limits, IsEmpty());
+}
+
+TEST(Verdict, TrustsNothingWhereMuchOfTheOutlineIsMissing) {
+  for (const bool with_cause : {true, false}) {
+    auto report = report_of({});
+    if (with_cause) report.causes = {gain_of_elbow()};
+    report.after.outline_found = 0.47;
+    report = worded(std::move(report));
+    EXPECT_EQ(report.verdict, "unexplained");
+    EXPECT_THAT(report.sentence, HasSubstr("only 47 %"));
+    EXPECT_EQ(report.sentence.find("elbow turns") != std::string::npos, with_cause);
+    EXPECT_THAT(report.exclusion_limits, IsEmpty());
+  }
+}
+
+TEST(Verdict, TrustsNothingWhereThePicturesShowMoreThanTheModel) {
+  for (const bool with_cause : {true, false}) {
+    auto report = report_of({});
+    if (with_cause) report.causes = {gain_of_elbow()};
+    report.not_in_model = "14 cm2 beside the robot, in 96 % of the log";
+    report = worded(std::move(report));
+    EXPECT_EQ(report.verdict, "unexplained");
+    EXPECT_THAT(report.sentence, HasSubstr("14 cm2 beside the robot"));
+    EXPECT_THAT(report.exclusion_limits, IsEmpty());
+  }
+}
+
+TEST(Verdict, AnOutlineThatLiesOffOnOneSideIsNotExplained) {
+  auto report = report_of({});
+  report.side_left_over = "the left outline of hand lies 0.8 px outside of where the model has it in the pictures of left";
+  report = worded(std::move(report));
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, HasSubstr(report.side_left_over));
+  EXPECT_THAT(report.exclusion_limits, IsEmpty());
+}
+
+TEST(Verdict, SaysWhatAnUnknownStructureFollows) {
+  DiagnosedCause cause;
+  cause.cause = {"unexplained", "elbow", ""};
+  cause.variable = "velocity";
+  cause.same = {cause.cause};
+  const auto report = worded(report_of({cause, gain_of_elbow()}));
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, HasSubstr("follows the velocity of elbow that no known cause explains"));
+  EXPECT_THAT(report.exclusion_limits, IsEmpty());
+}
+
+TEST(Verdict, OfNothingSaysSoAndKeepsItsLimits) {
+  const auto report = worded(report_of({}));
+  EXPECT_EQ(report.verdict, "none");
+  EXPECT_THAT(report.sentence, HasSubstr("to its noise"));
+  EXPECT_FALSE(report.exclusion_limits.empty());
+}
+
+TEST(Verdict, OfACrowdDoesNotSayThatNothingIsLeft) {
+  auto crowd = report_of({});
+  crowd.crowded = true;
+  crowd = worded(std::move(crowd));
+  EXPECT_EQ(crowd.verdict, "none");
+  EXPECT_TRUE(crowd.crowded);
+  EXPECT_THAT(crowd.sentence, Not(HasSubstr("to its noise")));
+  // Beside a cause that stands out there is none.
+  auto named = report_of({gain_of_elbow()});
+  named.crowded = true;
+  EXPECT_FALSE(worded(std::move(named)).crowded);
+}
+
+}  // namespace
+}  // namespace bodyschema::diagnosis
