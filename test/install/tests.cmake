@@ -83,6 +83,10 @@ if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
     bodyschema_patient(timeout 900)
     set_tests_properties(docs.${page} PROPERTIES LABELS docs TIMEOUT ${timeout} SKIP_RETURN_CODE 77
       ENVIRONMENT BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE})
+    if(page MATCHES "^import_(ros_bag|lerobot)$")
+      string(REPLACE "_" "-" environment ${CMAKE_MATCH_1})
+      set_tests_properties(docs.${page} PROPERTIES RESOURCE_LOCK venv-${environment})
+    endif()
   endforeach()
 endif()
 
