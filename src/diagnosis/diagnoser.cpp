@@ -72,17 +72,20 @@ class Diagnoser {
   void refuse_unusable() const {
     const auto pictures = fit_.log().pictures();
     const double length = pictures.empty() ? 0.0 : seconds(pictures.back().joints.utime - pictures.front().joints.utime);
-    std::size_t postures = 0;
-    Eigen::VectorXd last;
+    // Postures of stills: from one picture to the next the arm was moved.
+    std::size_t postures = 1;
+    Eigen::VectorXd first, last;
+    double moved = 0.0;
     for (const auto& picture : pictures) {
       Eigen::VectorXd q(static_cast<Eigen::Index>(fit_.log().roles().arm.size()));
       Eigen::Index i = 0;
       for (const auto joint : fit_.log().roles().arm) q[i++] = picture.joints.q[joint];
-      if (last.size() > 0 && (q - last).cwiseAbs().maxCoeff() < limits::kJump_rad) continue;
+      if (first.size() == 0) first = last = q;
+      postures += (q - last).cwiseAbs().maxCoeff() > limits::kJump_rad;
+      moved = std::max(moved, (q - first).cwiseAbs().maxCoeff());
       last = q;
-      ++postures;
     }
-    if (postures <= 1) {
+    if (moved < options_.same_posture_rad) {
       throw DataError("the arm stands still in every picture; move it through its range while recording");
     }
     if (length < options_.shortest_log_s && postures < options_.fewest_postures) {
