@@ -271,6 +271,7 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
     // A slip is an offset, with the opposite sign, of the pictures from a time on: from the last one back to the first.
     AddedColumns tail(log.blocks, n, 1);
     std::optional<Candidate> best;
+    double most = -1.0;
     for (std::size_t p = pictures; p-- > 1;) {
       if (log.precision[p] > 0.0) {
         const auto b = log.block_of[p];
@@ -283,11 +284,14 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
       }
       if (log.at.instants[p].utime == log.at.instants[p - 1].utime || log.precision[p] <= 0.0) continue;
       result.all.push_back(base.score(tail));
-      const double t = result.all.back().z();
-      if (!best || t > best->z()) {
+      const auto& scores = result.all.back();
+      // When it was is where it explains most (maximum likelihood): how far it stands out hardly says.
+      const double explained = scores.total[0] * scores.total[0] / std::max(1e-300, scores.S(0, 0));
+      if (scores.independent[0] > limits::kRounding && explained > most) {
+        most = explained;
         best = Candidate{.cause = cause, .variable = {}, .parameters = {0}, .from = log.at.instants[p].utime};
         best->columns = tail;
-        best->scores = result.all.back();
+        best->scores = scores;
       }
     }
     if (best) result.best.push_back(std::move(*best));

@@ -60,7 +60,7 @@ std::vector<Candidate> free_curves(LogFit& fit, const LogAbout& log);
 /// How a joint's correction by these amounts moves the pictures: [picture][column].
 std::vector<std::vector<Direction>> along_joint(const LogFit& fit, Eigen::Index joint,
                                                 const std::vector<std::vector<double>>& amounts);
-/// A slip of every arm joint at every picture, scored. `best` keeps of every joint the time that stands out most.
+/// A slip of every arm joint at every picture, scored. `best` keeps of every joint the time at which one explains most.
 struct Slips {
   std::vector<Scores> all;
   std::vector<Candidate> best;

@@ -96,6 +96,7 @@ class Page {
     if (!d_.side_left_over.empty()) page_.paragraph("Left over: " + d_.side_left_over + ".");
     if (!d_.not_in_model.empty()) page_.paragraph("Not in the model: " + d_.not_in_model + ".");
     causes();
+    small_causes();
     gain();
     if (!pictures.empty()) {
       page_.heading("Pictures");
@@ -147,6 +148,14 @@ class Page {
       }
       page_.paragraph("This log cannot tell " + cause.same.front().text() + " from " + others + ". " + cause.advice);
     }
+  }
+
+  void small_causes() {
+    if (d_.small_causes.empty()) return;
+    std::vector<std::string> items;
+    for (const auto& cause : d_.small_causes) items.push_back(cause.sentence);
+    page_.paragraph(fmt::format("Also in the extended model, though it moves hand and outlines by less than {:.2g} mm:", d_.matters_mm));
+    page_.list(items);
   }
 
   void gain() {

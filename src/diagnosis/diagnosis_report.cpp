@@ -99,6 +99,8 @@ std::string DiagnosisReport::to_json() const {
   j["crowded"] = crowded;
   j["causes"] = Json::array();
   for (const auto& c : causes) j["causes"].push_back(json_of(c));
+  j["small_causes"] = Json::array();
+  for (const auto& c : small_causes) j["small_causes"].push_back(json_of(c));
   j["not_testable"] = Json::array();
   for (const auto& n : not_testable) {
     auto entry = json_of(n.cause);

@@ -49,6 +49,17 @@ Eigen::VectorXd values_of(const ModelSearch& search, const std::vector<Eigen::In
   return values;
 }
 
+/// How much worse another explanation is, in standard deviations of the difference: on blocks that neither has seen, and
+/// in how far nuisances must depart from what is believed of them for it (log likelihoods that are d apart in the mean
+/// differ by a variance of 4 d).
+double worse_by(const Heldout& other, const Heldout& best) {
+  const Eigen::VectorXd d = other.loss - best.loss;
+  const double n = static_cast<double>(d.size()), beliefs = other.beliefs - best.beliefs;
+  if (n < 2) return 0.0;
+  const double variance = (d.array() - d.mean()).square().sum() * n / (n - 1.0) + 4.0 * std::abs(beliefs);
+  return variance > 0.0 ? (d.sum() + beliefs) / std::sqrt(variance) : 0.0;
+}
+
 }  // namespace
 
 Reduced without(const ModelSearch& search, const BlockRegression& all, const std::vector<Eigen::Index>& out) {
@@ -216,7 +227,6 @@ void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candi
 void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates) {
   const auto& state = search_.state();
   const double loss = all.heldout().loss.sum();
-  std::string small;
   for (std::size_t c = 0; c < search_.causes().size(); ++c) {
     const auto& found = search_.causes()[c];
     DiagnosedCause cause;
@@ -248,17 +258,9 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, 
       }
       find_class(all, c, candidates, cause);
     }
-    if (found.small) {
-      report_.crowded = true;
-      small += (small.empty() ? "" : ", ") + cause.cause.text();
-    } else {
-      report_.causes.push_back(std::move(cause));
-    }
+    (found.small ? report_.small_causes : report_.causes).push_back(std::move(cause));
   }
-  if (!small.empty()) {
-    report_.warnings.push_back("in the model, but too small to matter (" +
-                               fmt::format("{:.1f}", 1e3 * options_.matters_m) + " mm at the hand): " + small);
-  }
+  report_.matters_mm = 1e3 * options_.matters_m;
   std::stable_sort(report_.causes.begin(), report_.causes.end(),
                    [](const auto& a, const auto& b) { return a.heldout_gain > b.heldout_gain; });
 }
@@ -279,7 +281,7 @@ void Findings::find_class(const BlockRegression& all, std::size_t cause, const s
     if (scores.independent.maxCoeff() < limits::kRounding) continue;
     const auto other = base.heldout(rival);
     if (base.heldout().total() - other.total() < limits::kRivalShare * gain) continue;
-    if (paired_t(other.loss, with.loss) > student_quantile(limits::kRivalTail, dof)) continue;
+    if (worse_by(other, with) > student_quantile(limits::kRivalTail, dof)) continue;
     // One that can say the same and more besides is no other explanation: what is left of the cause beside it?
     if (rival.size() > own_columns) {
       Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(own_columns, rival.size());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <spdlog/spdlog.h>
 #include <utility>
 
 #include "bodyschema/evidence/batch_fit.hpp"
@@ -393,6 +394,11 @@ void ModelSearch::look_for_lost_part() {
     best = std::move(state);
   }
   if (!best) return;
+  // It explains the part only if the part is seen then.
+  const auto now = fit_.linearise(best->model(), {}, search());
+  const auto explained = std::count_if(lost.begin(), lost.end(), [&](std::size_t p) { return now.evidence[p].weight > 0.0; });
+  if (static_cast<double>(explained) < limits::kLostContrast * static_cast<double>(lost.size())) return;
+  spdlog::debug("diagnosis: a part of the log out of sight is explained by {}", found.name.text());
   state_ = std::move(*best);
   causes_ = {found};
   measure_noise();

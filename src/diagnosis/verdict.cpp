@@ -60,11 +60,17 @@ std::string with_class(const DiagnosedCause& cause) {
 
 void word_verdict(DiagnosisReport& report, const JointRoles& roles) {
   const auto is_unexplained = [](const DiagnosedCause& c) { return c.cause.name == "unexplained"; };
-  std::string list;
-  for (auto& cause : report.causes) {
-    cause.sentence = sentence_of(cause, report, roles);
-    list += (list.empty() ? "" : "; ") + with_class(cause);
-  }
+  const auto list_of = [&](std::vector<DiagnosedCause>& which) {
+    std::string text;
+    for (auto& cause : which) {
+      cause.sentence = sentence_of(cause, report, roles);
+      // Of a curve in several pieces one is enough.
+      if (is_unexplained(cause) && text.find(cause.sentence) != std::string::npos) continue;
+      text += (text.empty() ? "" : "; ") + with_class(cause);
+    }
+    return text;
+  };
+  const auto list = list_of(report.causes), small = list_of(report.small_causes);
   const auto& causes = report.causes;
   const auto unexplained = [&](std::string why) {
     report.verdict = "unexplained";
@@ -87,19 +93,19 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles) {
   if (!report.side_left_over.empty()) {
     return unexplained(fmt::format("The model does not explain what is seen: {}.", report.side_left_over));
   }
+  report.crowded = causes.empty() && report.small_causes.size() > 1;
   if (!causes.empty()) {
-    report.crowded = false;
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });
     report.verdict = std::any_of(causes.begin(), causes.end(), is_unexplained) ? "unexplained" : several ? "class" : "named";
     report.sentence = capitalised(list) + ".";
     if (report.verdict == "unexplained") report.exclusion_limits.clear();
     return;
   }
-  report.crowded = report.crowded && causes.empty();
   report.verdict = "none";
-  report.sentence = report.crowded
-                        ? "No single cause stands out; several small errors share what the joint offsets leave."
-                        : "The model explains the log to its noise: nothing but joint offsets was found.";
+  report.sentence = small.empty() ? "The model explains the log to its noise: nothing but joint offsets was found."
+                                  : fmt::format("Nothing that matters was found but joint offsets. What is there moves hand and "
+                                                "outlines by less than {:.2g} mm: {}.",
+                                                report.matters_mm, small);
 }
 
 }  // namespace bodyschema::diagnosis

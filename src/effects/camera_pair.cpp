@@ -18,11 +18,9 @@ EffectKind camera_pair() {
                              });
               },
           .sentence =
-              [](const Effect&, const JointRoles& roles, std::span<const std::string> amounts) {
-                std::string text = "camera '" + roles.cameras[1] + "' sits elsewhere against '" + roles.cameras[0] +
-                                   "' than configured: along and about its x (right), y (down) and z (forward) by ";
-                for (std::size_t i = 0; i < amounts.size(); ++i) text += (i > 0 ? ", " : "") + amounts[i];
-                return text;
+              [](const Effect& e, const JointRoles& roles, std::span<const std::string> amounts) {
+                return "camera '" + roles.cameras[1] + "' sits otherwise against '" + roles.cameras[0] +
+                       "' than configured: " + camera_place(e.parameters(), amounts);
               },
           .not_testable = [](const EffectTarget&, const JointRoles&,
                              const LogMotion& motion) { return needs_two_cameras(motion); },

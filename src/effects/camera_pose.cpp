@@ -18,11 +18,9 @@ EffectKind camera_pose() {
                              });
               },
           .sentence =
-              [](const Effect&, const JointRoles& roles, std::span<const std::string> amounts) {
-                std::string text = std::string(roles.cameras.size() > 1 ? "the cameras sit" : "the camera sits") +
-                                   " elsewhere than configured: along and about its x (right), y (down) and z (forward) by ";
-                for (std::size_t i = 0; i < amounts.size(); ++i) text += (i > 0 ? ", " : "") + amounts[i];
-                return text;
+              [](const Effect& e, const JointRoles& roles, std::span<const std::string> amounts) {
+                return std::string(roles.cameras.size() > 1 ? "the cameras sit" : "the camera sits") +
+                       " otherwise than configured: " + camera_place(e.parameters(), amounts);
               },
           .lookalikes = {"head_offset", "base_shift", "principal_point"},
           .splitting_motion = "Move the first joint of the arm through its range, or the head by 20 to 30 deg.",

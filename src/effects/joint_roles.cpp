@@ -96,7 +96,7 @@ class ArmAnatomy {
     corrected_.compute(q, Corrections(q.size()), 0, X_CB);
   }
 
-  /// Parts that the same joint of the arm moves last.
+  /// Parts that the same joint of the arm moves last, those of the hand under the name of its frame.
   [[nodiscard]] std::vector<BodySegment> segments() const {
     std::vector<BodySegment> segments;
     std::vector<Eigen::Index> last;
@@ -105,7 +105,8 @@ class ArmAnatomy {
       const auto at = std::find(last.begin(), last.end(), joint);
       if (at == last.end()) {
         last.push_back(joint);
-        segments.push_back({rendered_[part], {part}});
+        const bool hand = joint == last_that_moves(rendered_.size());
+        segments.push_back({hand ? links_[rendered_.size()] : rendered_[part], {part}});
       } else {
         segments[static_cast<std::size_t>(at - last.begin())].parts.push_back(part);
       }

@@ -161,15 +161,22 @@ TEST(Verdict, OfNothingSaysSoAndKeepsItsLimits) {
 
 TEST(Verdict, OfACrowdDoesNotSayThatNothingIsLeft) {
   auto crowd = report_of({});
-  crowd.crowded = true;
+  crowd.small_causes = {gain_of_elbow()};
   crowd = worded(std::move(crowd));
   EXPECT_EQ(crowd.verdict, "none");
-  EXPECT_TRUE(crowd.crowded);
+  EXPECT_FALSE(crowd.crowded) << "one is no crowd";
   EXPECT_THAT(crowd.sentence, Not(HasSubstr("to its noise")));
-  // Beside a cause that stands out there is none.
+  EXPECT_THAT(crowd.sentence, HasSubstr("by less than 0.5 mm: elbow turns 4 %"));
+  crowd.small_causes.push_back(gain_of_elbow());
+  crowd = worded(std::move(crowd));
+  EXPECT_TRUE(crowd.crowded);
+  EXPECT_THAT(crowd.to_json(), HasSubstr("\"crowded\": true"));
+  // Beside a cause that stands out they are no news.
   auto named = report_of({gain_of_elbow()});
-  named.crowded = true;
-  EXPECT_FALSE(worded(std::move(named)).crowded);
+  named.small_causes = crowd.small_causes;
+  named = worded(std::move(named));
+  EXPECT_FALSE(named.crowded);
+  EXPECT_THAT(named.sentence, Not(HasSubstr("less than")));
 }
 
 }  // namespace

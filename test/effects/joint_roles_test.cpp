@@ -92,7 +92,7 @@ TEST(JointRoles, SegmentsHoldEveryPartOnceAndLinksAreAsLongAsTheRobotsAre) {
   EXPECT_EQ(parts, all);
   Names names;
   for (const auto& segment : roles.segments) names.push_back(segment.name);
-  EXPECT_EQ(names, (Names{"r_upper_arm", "r_elbow_1", "r_forearm", "r_wrist_1", "r_wrist_2"}));
+  EXPECT_EQ(names, (Names{"r_upper_arm", "r_elbow_1", "r_forearm", "r_wrist_1", "r_hand"}));
   EXPECT_EQ(roles.segments.back().parts.size(), 18u);  // what carries the palm, the palm and five fingers
 
   // Lengths by walking from joint to joint, and what a longer link does to the hand.

@@ -115,7 +115,10 @@ struct DiagnosisReport {
   /// What the pictures show beside the robot through most of the log, where no outline is looked for: "14 cm2 beside the
   /// robot, in 96 % of the log". Something is held, or a part has no mesh. Empty: nothing.
   std::string not_in_model;
-  bool crowded = false;  ///< several small errors share what is left, none of them a cause by itself
+  /// Causes that are there, and in the extended model, and move hand and outlines by less than what matters.
+  std::vector<DiagnosedCause> small_causes;
+  double matters_mm = 0.5;  ///< what matters
+  bool crowded = false;     ///< nothing else was found, and of those several
   /// Before: offsets and those nuisances that are not themselves found to be causes.
   HeldoutError before, after;
   std::map<std::string, double> offsets_deg_before, offsets_deg_after;
