@@ -90,6 +90,12 @@ class Calibrator {
     starts_ = {rig_};
     for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
       if (!to_be_searched(rig_.cameras[c])) continue;
+      if (pipeline_.masks_need_estimates()) {
+        throw DataError(fmt::format("{}: camera '{}' is to be found, which takes masks of the robot, and vision.method "
+                                    "statistics makes none before it is known where the robot is; give masks (vision.method: "
+                                    "given) or say roughly where the camera is (cameras.{}.pose: roughly)",
+                                    options_.log.string(), rig_.cameras[c].name, rig_.cameras[c].name));
+      }
       CameraSearch search(*log_, threads_of(options_));
       const auto places = search.find(c, kPlaces);
       if (places.empty()) {

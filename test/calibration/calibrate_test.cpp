@@ -1,0 +1,105 @@
+#include "bodyschema/calibration/calibrate.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "bodyschema/bus/log.hpp"
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/simulator/recording.hpp"
+
+namespace bodyschema {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+const std::map<std::string, double> kOffsets_deg = {{"joint1", 3.0}, {"joint2", -2.0}, {"joint3", 4.0}, {"joint4", 2.0},
+                                                    {"joint5", -3.0}, {"joint6", 2.0}, {"joint7", 5.0}};
+
+Configuration arm7(const char* file, std::vector<std::string> overrides) {
+  return Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/arm7" / file, std::move(overrides));
+}
+
+/// A folder of its own, gone at the end.
+class Calibrated : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("calibrate_test_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  /// Ten postures of the simulated arm, white on black: pictures that are their own masks.
+  fs::path recorded() {
+    const auto configuration = arm7("simulator.yaml", {});
+    const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
+    const StereoRig rig = StereoRig::from(configuration.section("cameras"));
+    auto settings = simulator::SimulatorSettings::from(configuration.section("simulator"));
+    settings.camera_rate_hz = 4.0;
+    simulator::SimulationPlan plan;
+    plan.seed = 3;
+    plan.motion = simulator::Motion::kPoses;
+    plan.poses = 10;
+    plan.offsets_deg = kOffsets_deg;
+    plan.output = simulator::Output::kSilhouettes;
+    simulator::Simulator simulator(load_robot(setup, rig), setup, rig, settings, plan);
+    LogWriter log(folder_ / "log");
+    simulator::FramePublisher publisher(simulator.joint_names(), {.channels = Channels::with_prefix("ARM7"), .format = simulator::PictureFormat::kMasks});
+    while (const auto frame = simulator.next()) publisher.publish(*frame, log);
+    return folder_ / "log";
+  }
+
+  Calibration calibration(const fs::path& log, std::vector<std::string> overrides) {
+    overrides.insert(overrides.end(), {"vision.method=single_colour", "vision.background_rgb=[0, 0, 0]"});
+    CalibrationOptions options;
+    options.log = log;
+    options.out = folder_ / "out";
+    options.quiet = true;
+    return calibrate(arm7("estimator.yaml", overrides), options);
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(Calibrated, OffsetsAreFoundWithinWhatIsClaimedAndTheFilesSayTheSame) {
+  const auto result = calibration(recorded(), {});
+  EXPECT_EQ(result.state, CalibrationState::kGood) << result.sentence;
+  ASSERT_EQ(result.joints.size(), 7u);
+  int told = 0;
+  for (const auto& joint : result.joints) {
+    if (!joint.told) continue;
+    ++told;
+    EXPECT_NEAR(degrees(joint.offset_rad), kOffsets_deg.at(joint.name), 3.0 * degrees(joint.sd_rad) + 0.05) << joint.name;
+    EXPECT_LT(degrees(joint.sd_rad), 0.5) << joint.name;
+  }
+  EXPECT_GE(told, 5);
+  EXPECT_LT(result.outline_px.after, 0.2 * result.outline_px.before);
+  std::ifstream in(folder_ / "out" / "calibration.json");
+  const auto json = nlohmann::json::parse(in);
+  EXPECT_EQ(json["state"], "good");
+  EXPECT_NEAR(json["offset_deg"]["joint2"], degrees(result.joints[1].offset_rad), 1e-6);
+  EXPECT_EQ(json["told"].size(), static_cast<std::size_t>(told));
+  for (const char* file : {"report.html", "corrected.urdf", "offsets.yaml", "cameras.yaml"}) {
+    EXPECT_TRUE(fs::exists(folder_ / "out" / file)) << file;
+  }
+}
+
+TEST_F(Calibrated, ACameraToBeFoundNeedsMasks) {
+  const auto log = recorded();
+  CalibrationOptions options;
+  options.log = log;
+  options.out = folder_ / "out";
+  options.quiet = true;
+  const auto configuration =
+      arm7("estimator.yaml", {"vision.method=statistics", "cameras.left.pose=unknown", "cameras.right.pose=unknown"});
+  EXPECT_THAT([&] { (void)calibrate(configuration, options); },
+              ::testing::ThrowsMessage<DataError>(HasSubstr("'left' is to be found, which takes masks")));
+}
+
+}  // namespace
+}  // namespace bodyschema
