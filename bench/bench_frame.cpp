@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "bodyschema/bus/messages.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/simulator/simulator.hpp"
 
@@ -117,7 +118,25 @@ void whole_frame(benchmark::State& state, const std::string& engine, const std::
       benchmark::Counter(static_cast<double>(particles), benchmark::Counter::kIsIterationInvariantRate);
 }
 
+/// Both pictures of a frame out of their messages.
+void jpeg(benchmark::State& state, Size size) {
+  const auto& cameras = reach(size).motion.front().cameras;
+  std::vector<bot_core::image_t> messages;
+  for (const auto& camera : cameras) messages.push_back(to_jpeg_message(camera->image, 0, 90));
+  Image out;
+  for (auto _ : state) {
+    for (const auto& m : messages) {
+      const ImageView view{0, 0, m.width, m.height, m.row_stride, m.pixelformat, m.data};
+      if (!unpack(view, out).ok()) return state.SkipWithError("a JPEG did not decode");
+    }
+  }
+}
+
 void register_all() {
+  for (const Size size : {Size{320, 240}, Size{640, 480}, Size{1280, 720}}) {
+    benchmark::RegisterBenchmark(("jpeg/" + size.text()).c_str(), [=](benchmark::State& state) { jpeg(state, size); })
+        ->Unit(benchmark::kMillisecond);
+  }
   for (const std::string engine : {"contour", "atlas"}) {
     for (const std::string mode : {"best", "paper"}) {
       for (const Size size : {Size{320, 240}, Size{640, 480}, Size{1280, 720}}) {

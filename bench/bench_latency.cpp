@@ -100,10 +100,44 @@ double quantile(std::vector<double> sorted, double share) {
   return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
-void latency(benchmark::State& state, int seconds) {
+struct Size {
+  int width, height;
+  [[nodiscard]] std::string text() const { return std::to_string(width) + "x" + std::to_string(height); }
+  /// The robot's cameras with pictures of this size, as arguments.
+  [[nodiscard]] std::vector<std::string> arguments() const {
+    std::vector<std::string> list;
+    const double focal_px = 257.34 * width / 320.0;
+    for (const std::string camera : {"cameras.left.", "cameras.right."}) {
+      for (const std::string& set :
+           {"width=" + std::to_string(width), "height=" + std::to_string(height), "fx=" + std::to_string(focal_px),
+            "fy=" + std::to_string(focal_px), "cx=" + std::to_string(0.5 * (width - 1)),
+            "cy=" + std::to_string(0.5 * (height - 1))}) {
+        list.insert(list.end(), {"--set", camera + set});
+      }
+    }
+    return list;
+  }
+};
+
+/// The tests' reach in other pictures: compressed, by the sender beforehand.
+std::filesystem::path log_of(Size size, const std::filesystem::path& folder) {
+  const auto file = folder / "reach.lcmlog";
+  std::vector<std::string> command{"bodyschema-sim", "--config",
+                                   std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/simulator.yaml",
+                                   "--frames", "60", "--seed", "7", "--pictures", "jpeg", "--log", file.string()};
+  for (const auto& argument : size.arguments()) command.push_back(argument);
+  Process simulator(command, folder);
+  if (simulator.wait(Seconds(300)) != 0) throw std::runtime_error("bodyschema-sim failed: " + simulator.err());
+  return file;
+}
+
+void latency(benchmark::State& state, int seconds, Size size, bool jpeg) {
   const Scratch scratch;
   const std::string url = private_lcm_url();
-  Process daemon({"bodyschemad", "--config", reach_configuration(), "--lcm-url", url}, scratch.folder());
+  const auto log = jpeg ? log_of(size, scratch.folder()) : reach_log();
+  std::vector<std::string> command{"bodyschemad", "--config", reach_configuration(), "--lcm-url", url};
+  for (const auto& argument : size.arguments()) command.push_back(argument);
+  Process daemon(command, scratch.folder());
   if (!daemon.said("waiting for", Seconds(60))) {
     state.SkipWithError("bodyschemad did not start");
     return;
@@ -115,7 +149,7 @@ void latency(benchmark::State& state, int seconds) {
   double cores = 0.0;
   double memory_before = 0.0;
   {
-    Robot robot(url, reach_log());
+    Robot robot(url, log);
     Robot::Faults watch;
     watch.pictures = [&](bot_core::images_t& pictures, LcmLink&) {
       arrivals.published(pictures.images.front().utime);
@@ -165,11 +199,17 @@ int main(int argc, char** argv) {
     if (const std::string why = why_no_lcm(); !why.empty()) throw std::runtime_error(why);
     const char* wish = std::getenv("BODYSCHEMA_BENCH_SECONDS");
     const int seconds = wish != nullptr ? std::max(2, std::atoi(wish)) : 60;
-    benchmark::RegisterBenchmark("daemon/contour/8k/320x240/200",
-                                 [seconds](benchmark::State& state) { latency(state, seconds); })
-        ->UseManualTime()
-        ->Iterations(1000)
-        ->Unit(benchmark::kMillisecond);
+    for (const Size size : {Size{320, 240}, Size{640, 480}, Size{1280, 720}}) {
+      for (const bool jpeg : {false, true}) {
+        if (!jpeg && size.width > 320) continue;  // raw pictures that large do not fit most networks
+        benchmark::RegisterBenchmark(
+            ("daemon" + std::string(jpeg ? "+jpeg" : "") + "/contour/8k/" + size.text() + "/200").c_str(),
+            [=](benchmark::State& state) { latency(state, seconds, size, jpeg); })
+            ->UseManualTime()
+            ->Iterations(1000)
+            ->Unit(benchmark::kMillisecond);
+      }
+    }
     benchmark::RunSpecifiedBenchmarks();
   } catch (const std::exception& error) {
     std::fprintf(stderr, "bench_latency: %s\n", error.what());

@@ -35,14 +35,20 @@ std::string gl_platform() {
   return wish != nullptr ? wish : "auto";
 }
 
+// The file of a robot's scene, null where there is none.
+const char* scene_file(const std::string& triangles) {
+  if (triangles == "63k") return std::getenv("BODYSCHEMA_BENCH_SCENE");
+  return triangles == "200k" ? std::getenv("BODYSCHEMA_BENCH_SCENE_200K") : nullptr;
+}
+
 // Made when first asked for, and kept.
 const Scene& scene_of(const std::string& triangles) {
   static std::map<std::string, Scene> scenes;
   const auto found = scenes.find(triangles);
   if (found != scenes.end()) return found->second;
   Scene scene;
-  if (triangles == "63k") {
-    scene = read_scene(std::getenv("BODYSCHEMA_BENCH_SCENE"));
+  if (const char* file = scene_file(triangles)) {
+    scene = read_scene(file);
   } else {
     scene.model = synthetic::hand(1000 * std::stoi(triangles));
     scene.cameras = {synthetic::camera(320, 240), synthetic::camera(320, 240)};
@@ -216,10 +222,11 @@ void score_at_level(benchmark::State& state, const std::string& triangles, Size 
 #endif
 
 void register_all() {
-  const bool has_63k = std::getenv("BODYSCHEMA_BENCH_SCENE") != nullptr;
+  const std::vector<std::string> all{"2k", "8k", "30k", "63k", "200k"};
+  const auto absent = [](const std::string& t) { return (t == "63k" || t == "200k") && scene_file(t) == nullptr; };
   for (const Size size : {Size{320, 240}, Size{160, 120}, Size{640, 480}, Size{1280, 720}}) {
-    for (const std::string triangles : {"2k", "8k", "30k", "63k"}) {
-      if (triangles == "63k" && !has_63k) continue;
+    for (const std::string& triangles : all) {
+      if (absent(triangles)) continue;
       for (const std::size_t particles : {50u, 200u, 1000u, 10000u}) {
         for (const std::string engine : {"naive", "atlas_raster", "atlas", "contour"}) {
           if (engine == "naive" && particles > 200) continue;  // minutes, and nobody asks
@@ -242,8 +249,8 @@ void register_all() {
       }
     }
   }
-  for (const std::string triangles : {"2k", "8k", "30k", "63k"}) {
-    if (triangles == "63k" && !has_63k) continue;
+  for (const std::string& triangles : all) {
+    if (absent(triangles)) continue;
     benchmark::RegisterBenchmark(("outline/" + triangles + "/320x240/1").c_str(),
                                  [=](benchmark::State& state) { extract(state, triangles); })
         ->MeasureProcessCPUTime()

@@ -6,6 +6,8 @@
 #include <cstdlib>
 #include <exception>
 #include <random>
+#include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -25,14 +27,24 @@ constexpr std::uint32_t kSeed = 1;
 int run(const std::vector<std::string>& arguments) {
   if (arguments.size() < 6) {
     std::fprintf(stderr,
-                 "usage: dump_scene FILE URDF MESH_ROOT LEFT_EYE RIGHT_EYE HAND [LINK ...]\n"
-                 "  HAND and every LINK are drawn\n");
+                 "usage: dump_scene FILE URDF MESH_ROOT LEFT_EYE RIGHT_EYE HAND[,HAND] [LINK ...]\n"
+                 "  every HAND, which is brought before the eyes, and every LINK are drawn; LINK/optical is the\n"
+                 "  camera of a LINK whose x points forward\n");
     return 2;
   }
   RobotModelOptions options;
   options.urdf = arguments[1];
   options.mesh_search_roots = {arguments[2]};
-  options.rendered_links.assign(arguments.begin() + 5, arguments.end());
+  std::istringstream list(arguments[5]);
+  for (std::string hand; std::getline(list, hand, ',');) options.rendered_links.push_back(hand);
+  const std::size_t hands = options.rendered_links.size();
+  options.rendered_links.insert(options.rendered_links.end(), arguments.begin() + 6, arguments.end());
+  for (const auto& eye : std::set<std::string>{arguments[3], arguments[4]}) {
+    if (!eye.ends_with("/optical")) continue;
+    AddedFrame frame{eye, eye.substr(0, eye.find('/')), Pose::Identity()};
+    frame.X_PF.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;  // z forward, x right
+    options.added_frames.push_back(frame);
+  }
   const auto robot = RobotModel::load(options);
   std::vector<std::string> links{arguments[3], arguments[4]};
   links.insert(links.end(), options.rendered_links.begin(), options.rendered_links.end());
@@ -41,7 +53,9 @@ int run(const std::vector<std::string>& arguments) {
   // The joints between the root and the hand but not the eyes are the arm's.
   std::vector<Eigen::Index> arm;
   for (Eigen::Index j = 0; j < robot->joint_count(); ++j) {
-    if (kinematics.moves(j, 2) && !kinematics.moves(j, 0)) arm.push_back(j);
+    bool moves = false;
+    for (std::size_t h = 0; h < hands; ++h) moves = moves || kinematics.moves(j, 2 + h);
+    if (moves && !kinematics.moves(j, 0)) arm.push_back(j);
   }
   std::mt19937 random(kSeed);
   std::uniform_real_distribution<double> uniform;
@@ -49,9 +63,14 @@ int run(const std::vector<std::string>& arguments) {
   std::vector<Pose> X_WB(links.size());
   const auto cost = [&](const Eigen::VectorXd& q) {
     kinematics.compute(q, X_WB);
-    const Eigen::Vector3d p_LH = (X_WB[0].inverse() * X_WB[2]).translation();
-    const Eigen::Vector3d p_RH = (X_WB[1].inverse() * X_WB[2]).translation();
-    return (0.5 * (p_LH + p_RH) - Eigen::Vector3d(0.0, 0.02, kDistance_m)).norm();
+    double sum = 0.0;
+    for (std::size_t h = 0; h < hands; ++h) {
+      const Eigen::Vector3d p_LH = (X_WB[0].inverse() * X_WB[2 + h]).translation();
+      const Eigen::Vector3d p_RH = (X_WB[1].inverse() * X_WB[2 + h]).translation();
+      const double beside_m = hands == 1 ? 0.0 : h == 0 ? 0.1 : -0.1;
+      sum += (0.5 * (p_LH + p_RH) - Eigen::Vector3d(beside_m, 0.02, kDistance_m)).norm();
+    }
+    return sum;
   };
   Eigen::VectorXd q = Eigen::VectorXd::Zero(robot->joint_count());
   double best = 1e9;

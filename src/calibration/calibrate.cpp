@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "bodyschema/calibration/camera_search.hpp"
+#include "bodyschema/diagnosis/diagnoser.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/core/write_file.hpp"
@@ -63,14 +64,16 @@ class Calibrator {
     if (!options_.quiet) bar_.emplace("calibration", 100);
     find_cameras();
     LogFit fit(*log_, threads_of(options_));
-    BatchFit best = fitted(fit, starts_, {});
+    std::optional<BatchFit> best(fitted(fit, starts_, {}));
+    progress(0.6);
+    if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
-    describe(fit, best);
-    hold_out(fit, best);
+    describe(fit, *best);
+    hold_out(fit, *best);
     progress(0.9);
-    conclude(best);
-    suggest(fit, best);
-    write_calibration(result_, best, *log_, watched.kept, pipeline_, configuration_, options_);
+    conclude(*best);
+    suggest(fit, *best);
+    write_calibration(result_, *best, *log_, watched.kept, pipeline_, configuration_, options_);
     progress(1.0);
     return std::move(result_);
   }
@@ -148,6 +151,62 @@ class Calibrator {
     use(fit, best_rig);
     if (starts.size() > 1) only_ = second / std::max(1e-9, best->misfit());
     return std::move(*best);
+  }
+
+  /// What the log asks for besides: causes that a diagnosis of it names become part of the state.
+  std::optional<BatchFit> with_effects(LogFit& fit, const BatchFit& best) {
+    if (best.postures() < DiagnosisOptions{}.fewest_postures) return std::nullopt;
+    const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
+    DiagnosisOptions options;
+    options.noise = pipeline_.options().noise;
+    options.spacing_px = pipeline_.options().outline_spacing_px;
+    options.starts = {best.state().x()};
+    const auto report = diagnose(fit, beliefs.state, beliefs.tolerances, options);
+    auto more = beliefs;
+    for (const auto& cause : report.causes) {
+      CalibratedEffect effect{cause.cause.name, cause.cause.joint, cause.cause.source, cause.sentence, {}};
+      for (const auto& p : cause.parameters) {
+        effect.parameters.push_back({p.parameter, p.unit, p.estimate, 0.25 * (p.ci95[1] - p.ci95[0]), 0.0});
+      }
+      const bool named = report.verdict == "named" || report.verdict == "class";
+      if (named && effect_kind_of(cause) != nullptr && effect_kind_of(cause)->timing == EffectTiming::kAlways) {
+        more.state.push_back(wide_belief(cause.cause, log_->roles()));
+      }
+      result_.effects.push_back(std::move(effect));
+    }
+    if (report.verdict == "unexplained") result_.remarks.push_back(report.sentence);
+    if (more.state.size() == beliefs.state.size()) return std::nullopt;
+    State state(log_->roles(), without_doubles(more.state));
+    BatchFit extended(fit, state, more.tolerances, settings());
+    extended.start_at(joined(state, best.state()));
+    extended.run(0.0, {});
+    if (extended.misfit() >= best.misfit()) return std::nullopt;
+    return extended;
+  }
+
+  static const EffectKind* effect_kind_of(const DiagnosedCause& cause) {
+    return cause.cause.name == "unexplained" ? nullptr : &effect_kind(cause.cause.name);
+  }
+
+  /// Of two beliefs about one effect the later one.
+  static std::vector<Belief> without_doubles(const std::vector<Belief>& beliefs) {
+    std::vector<Belief> list;
+    for (const auto& belief : beliefs) {
+      std::erase_if(list, [&](const Belief& b) { return b.effect == belief.effect && b.target == belief.target; });
+      list.push_back(belief);
+    }
+    return list;
+  }
+
+  /// Values of another state for the parameters that both have.
+  static Eigen::VectorXd joined(const State& state, const State& known) {
+    Eigen::VectorXd x = state.x();
+    for (Eigen::Index i = 0; i < known.size(); ++i) {
+      const auto& ref = known.parameters()[static_cast<std::size_t>(i)].ref;
+      const auto& effect = known.model()[ref.effect];
+      if (const auto at = state.find(effect.name(), effect.target(), ref.parameter); at >= 0) x[at] = known.x()[i];
+    }
+    return x;
   }
 
   void use(LogFit& fit, const StereoRig& rig) {
@@ -235,6 +294,11 @@ class Calibrator {
       const Eigen::MatrixXd C = J * batch.estimate().covariance * J.transpose();
       found.sd_m = std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace()));
       found.sd_rad = std::sqrt(std::max(0.0, C.bottomRightCorner<3, 3>().trace()));
+      const Eigen::VectorXd with_first = J * batch.estimate().covariance.col(0);
+      const Eigen::MatrixXd beside =
+          C - with_first * with_first.transpose() / std::max(1e-300, batch.estimate().covariance(0, 0));
+      found.sd_m_beside_first_joint = std::sqrt(std::max(0.0, beside.topLeftCorner<3, 3>().trace()));
+      found.sd_rad_beside_first_joint = std::sqrt(std::max(0.0, beside.bottomRightCorner<3, 3>().trace()));
       result_.cameras.push_back(std::move(found));
     }
   }

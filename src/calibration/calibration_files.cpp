@@ -10,6 +10,7 @@
 #include "bodyschema/pipeline/export_correction.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/pipeline/silhouette_preview.hpp"
+#include "bodyschema/pipeline/ros_files.hpp"
 #include "bodyschema/report/report.hpp"
 
 namespace bodyschema {
@@ -25,6 +26,12 @@ Json matrix_json(const Pose& X) {
     rows.push_back(std::move(row));
   }
   return rows;
+}
+
+Json parameter_json(const CalibratedParameter& p) {
+  Json json = {{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"stddev", p.sd}};
+  if (p.prior_sd > 0.0) json["prior_stddev"] = p.prior_sd;
+  return json;
 }
 
 Json to_json(const Calibration& c, const std::string& root) {
@@ -45,16 +52,24 @@ Json to_json(const Calibration& c, const std::string& root) {
     entry["estimated"] = camera.estimated;
     entry["sd_mm"] = 1e3 * camera.sd_m;
     entry["sd_deg"] = degrees(camera.sd_rad);
+    if (camera.estimated && !c.joints.empty()) {
+      entry["if_first_joint_were_known"] = {{"joint", c.joints.front().name},
+                                            {"turn_about_it_sd_deg", degrees(c.joints.front().sd_rad)},
+                                            {"sd_mm", 1e3 * camera.sd_m_beside_first_joint},
+                                            {"sd_deg", degrees(camera.sd_rad_beside_first_joint)}};
+    }
   }
   json["outline_px"] = {{"before", c.outline_px.before}, {"after", c.outline_px.after}};
   if (c.outline_px.heldout) json["outline_px"]["heldout"] = *c.outline_px.heldout;
+  json["parameters"] = Json::array();
+  for (const auto& p : c.parameters) json["parameters"].push_back(parameter_json(p));
   json["effects"] = Json::array();
-  for (const auto& p : c.parameters) {
-    json["effects"].push_back({{"name", p.name},
-                               {"unit", p.unit},
-                               {"value", p.value},
-                               {"stddev", p.sd},
-                               {"prior_stddev", p.prior_sd}});
+  for (const auto& e : c.effects) {
+    Json entry = {{"effect", e.effect}, {"sentence", e.sentence}, {"parameters", Json::array()}};
+    if (!e.joint.empty()) entry["joint"] = e.joint;
+    if (!e.source.empty()) entry["source"] = e.source;
+    for (const auto& p : e.parameters) entry["parameters"].push_back(parameter_json(p));
+    json["effects"].push_back(std::move(entry));
   }
   json["hand_sd_mm"] = 1e3 * c.hand_sd_m;
   json["postures"] = c.postures;
@@ -122,6 +137,18 @@ std::string cameras_yaml(const Calibration& c, const StereoRig& rig) {
   return text;
 }
 
+/// Where the URDF itself places a camera, and nothing else was found, it stays with the URDF.
+std::vector<RosCamera> ros_cameras_of(const Calibration& c, const StereoRig& rig) {
+  std::vector<RosCamera> cameras;
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    const auto& camera = c.cameras[i];
+    const bool as_in_urdf = camera.link == rig.cameras[i].link && camera.X_link_optical.isApprox(Pose::Identity(), 1e-12);
+    cameras.push_back({camera.name, rig.cameras[i].intrinsics, rig.cameras[i].distortion,
+                       as_in_urdf ? "" : camera.link, camera.X_link_optical});
+  }
+  return cameras;
+}
+
 void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, const std::vector<Observation>& kept,
                 const CalibrationOptions& options) {
   Report page("Calibration of " + options.log.filename().string());
@@ -151,6 +178,12 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
                       p.unit});
     }
     page.table({"effect", "value", "sd", "sd believed before", "unit"}, rows);
+  }
+  if (!c.effects.empty()) {
+    page.heading("What else was found");
+    std::vector<std::string> items;
+    for (const auto& effect : c.effects) items.push_back(effect.sentence);
+    page.list(items);
   }
   page.heading("How well it fits");
   rows = {{"before", fmt::format("{:.2f}", c.outline_px.before)}, {"after", fmt::format("{:.2f}", c.outline_px.after)}};
@@ -210,8 +243,10 @@ void write_calibration(const Calibration& calibration, const BatchFit& batch, Pi
     if (effect_kind(effect.name()).home == EffectHome::kCameras) cameras.add(effect.clone());
   }
   replace_file(options.out / "cameras.yaml", cameras_yaml(calibration, cameras.corrected(log.rig())));
-  write_corrected_urdf(pipeline.setup().model.urdf, correction_of(calibration, options.all_parameters),
-                       options.out / "corrected.urdf");
+  const Correction correction = correction_of(calibration, options.all_parameters);
+  write_corrected_urdf(pipeline.setup().model.urdf, correction, options.out / "corrected.urdf");
+  write_ros_files(options.out / "ros", pipeline.setup().model.urdf, options.out / "corrected.urdf", correction,
+                  ros_cameras_of(calibration, cameras.corrected(log.rig())));
 }
 
 std::string to_table(const Calibration& c) {
@@ -233,6 +268,7 @@ std::string to_table(const Calibration& c) {
     if (p.name.starts_with("camera_")) continue;
     text += fmt::format("\n{:<36} {:>9.3f} {:<3} sd {:.3f} (believed {:.3f})", p.name, p.value, p.unit, p.sd, p.prior_sd);
   }
+  for (const auto& effect : c.effects) text += "\nalso: " + effect.sentence;
   text += fmt::format("\n\noutlines, median distance: {:.2f} px before, {:.2f} px after{}\n", c.outline_px.before,
                       c.outline_px.after,
                       c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out", *c.outline_px.heldout) : "");

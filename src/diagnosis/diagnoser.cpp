@@ -1,8 +1,7 @@
-#include <cstdlib>
-#include <cstdio>
 #include "bodyschema/diagnosis/diagnoser.hpp"
 
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cmath>
@@ -40,8 +39,14 @@ class Diagnoser {
     Findings findings(fit_, search_, options_, report_);
     const auto begin = search_.about(options_.block_s);
     findings.before(begin);
-    for (std::size_t round = 0; round < limits::kMostCauses && take_one(round); ++round) {
+    block_s_ = options_.block_s;
+    for (std::size_t round = 0; round < limits::kMostCauses; ++round) {
+      const bool taken = take_one(round);
       progress(0.2 + 0.1 * static_cast<double>(round + 1));
+      if (taken) continue;
+      // Blocks that err alike are no witnesses of their own.
+      if (alike_ <= limits::kNeighboursAlike || search_.about(2.0 * block_s_).blocks < limits::kFewestBlocks) break;
+      block_s_ *= 2.0;
     }
     while (drop_one()) {}
     search_.polish(block_s_);
@@ -72,17 +77,20 @@ class Diagnoser {
   void refuse_unusable() const {
     const auto pictures = fit_.log().pictures();
     const double length = pictures.empty() ? 0.0 : seconds(pictures.back().joints.utime - pictures.front().joints.utime);
-    std::size_t postures = 0;
-    Eigen::VectorXd last;
+    // Postures of stills: from one picture to the next the arm was moved.
+    std::size_t postures = 1;
+    Eigen::VectorXd first, last;
+    double moved = 0.0;
     for (const auto& picture : pictures) {
       Eigen::VectorXd q(static_cast<Eigen::Index>(fit_.log().roles().arm.size()));
       Eigen::Index i = 0;
       for (const auto joint : fit_.log().roles().arm) q[i++] = picture.joints.q[joint];
-      if (last.size() > 0 && (q - last).cwiseAbs().maxCoeff() < limits::kJump_rad) continue;
+      if (first.size() == 0) first = last = q;
+      postures += (q - last).cwiseAbs().maxCoeff() > limits::kJump_rad;
+      moved = std::max(moved, (q - first).cwiseAbs().maxCoeff());
       last = q;
-      ++postures;
     }
-    if (postures <= 1) {
+    if (moved < options_.same_posture_rad) {
       throw DataError("the arm stands still in every picture; move it through its range while recording");
     }
     if (length < options_.shortest_log_s && postures < options_.fewest_postures) {
@@ -100,25 +108,22 @@ class Diagnoser {
     double threshold = 0.0;
   };
   Field field() {
-    for (double block_s = std::max(block_s_, options_.block_s);; block_s *= 2.0) {
-      LogAbout log = search_.about(block_s);
-      BlockRegression base = search_.regression(log);
-      auto candidates = catalogue_candidates(fit_, log, report_.not_testable);
-      auto curves = free_curves(fit_, log);
-      std::move(curves.begin(), curves.end(), std::back_inserter(candidates));
-      std::vector<Scores> scores;
-      for (auto& candidate : candidates) {
-        candidate.scores = base.score(candidate.columns);
-        scores.push_back(candidate.scores);
-      }
-      if (neighbours_alike(scores) > limits::kNeighboursAlike && log.blocks >= 2 * limits::kFewestBlocks) continue;
-      block_s_ = block_s;
-      auto slips = diagnosis::slips(log, base, report_.not_testable);
-      std::move(slips.all.begin(), slips.all.end(), std::back_inserter(scores));
-      std::move(slips.best.begin(), slips.best.end(), std::back_inserter(candidates));
-      const double threshold = chance_threshold(scores, options_.level, options_.seed);
-      return {std::move(log), std::move(base), std::move(candidates), threshold};
+    LogAbout log = search_.about(block_s_);
+    BlockRegression base = search_.regression(log);
+    auto candidates = catalogue_candidates(fit_, log, report_.not_testable);
+    auto curves = free_curves(fit_, log);
+    std::move(curves.begin(), curves.end(), std::back_inserter(candidates));
+    std::vector<Scores> scores;
+    for (auto& candidate : candidates) {
+      candidate.scores = base.score(candidate.columns);
+      scores.push_back(candidate.scores);
     }
+    alike_ = neighbours_alike(scores);
+    auto slips = diagnosis::slips(log, base, report_.not_testable);
+    std::move(slips.all.begin(), slips.all.end(), std::back_inserter(scores));
+    std::move(slips.best.begin(), slips.best.end(), std::back_inserter(candidates));
+    const double threshold = chance_threshold(scores, options_.level, options_.seed);
+    return {std::move(log), std::move(base), std::move(candidates), threshold};
   }
 
   /// Finds the next cause and takes it into the model; false: there is none.
@@ -126,34 +131,28 @@ class Diagnoser {
     Field field = this->field();
     report_.z_threshold = field.threshold;
     if (round == 0) leave_out_untold(field);
-    const Heldout without = field.base.heldout();
-    std::vector<Trial> trials;
-    for (const auto& candidate : field.candidates) {
-      const double z = candidate.z();
-      if (round == 0) add_bar(candidate, z);
-      if (z < field.threshold || candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
-      const bool refused = std::find(refused_.begin(), refused_.end(), candidate.cause) != refused_.end();
-      if (refused) continue;
-      Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0, true};
-      trial.gain = without.total() - trial.heldout.total();
-      trial.plausible = is_plausible(candidate, trial.heldout.estimate.tail(candidate.columns.size()));
-      if (trial.gain > 0.0) trials.push_back(std::move(trial));
-    }
-    std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.gain > b.gain; });
-    for (std::size_t i = 0; i < std::min<std::size_t>(12, trials.size()) && getenv("DBG"); ++i) {
-      const auto sz = size_of(field, trials[i]);
-      fprintf(stderr, "R%zu thr %.2f blocks %zu %s|%s t %.2f gain %.4g of %.4g est %.4g size %.2f mm %.2f px\n", round, field.threshold, field.log.blocks, trials[i].candidate->cause.text().c_str(), trials[i].candidate->variable.c_str(), trials[i].candidate->z(), trials[i].gain, without.total(), trials[i].heldout.estimate.tail(trials[i].candidate->columns.size())[0], 1e3*sz.metres(), sz.outline_px);
-    }
-    // What would be larger than on any robot stands in for something else, if anything plausible does as well.
-    std::stable_partition(trials.begin(), trials.end(), [](const Trial& t) { return t.plausible; });
-    while (!trials.empty()) {
+    auto trials = trials_of(field, round == 0);
+    for (std::size_t tried = 0; !trials.empty() && tried < limits::kMostTried; ++tried) {
       const Trial* best = choose(trials);
       const auto cause = best->candidate->cause;
-      if (take(field, *best)) return true;
+      spdlog::debug("diagnosis: {} {}, z {:.1f} (chance: {:.1f}), held-out gain {:.0f}", cause.text(),
+                    best->candidate->variable, best->candidate->z(), field.threshold, best->gain);
+      if (take(field, *best)) {
+        spdlog::debug("diagnosis: fitted, cost {:.4f}, z {:.1f}", search_.cost(), z_of_last());
+        // What is large bends the very sums by which it is judged: so it is judged where it is fitted.
+        if (best->candidate->z() >= field.threshold || z_of_last() >= field.threshold) return true;
+        search_.drop(search_.causes().size() - 1);
+      }
       if (!best->candidate->generic()) refused_.push_back(cause);
       std::erase_if(trials, [&](const Trial& t) { return &t == best || t.candidate->cause == cause; });
     }
     return false;
+  }
+
+  double z_of_last() {
+    const auto all = search_.regression(search_.about(block_s_));
+    const auto reduced = diagnosis::without(search_, all, search_.columns_of(search_.causes().size() - 1));
+    return reduced.base.score(reduced.own).z();
   }
 
   struct Trial {
@@ -162,6 +161,27 @@ class Diagnoser {
     double gain;
     bool plausible;
   };
+
+  /// Candidates that may be there, those first that predict best what their fit has not seen. What would be larger than on
+  /// any robot comes last: it stands in for something else, if anything plausible does as well.
+  std::vector<Trial> trials_of(const Field& field, bool first) {
+    const Heldout without = field.base.heldout();
+    std::vector<Trial> trials;
+    for (const auto& candidate : field.candidates) {
+      const double z = candidate.z();
+      if (first) add_bar(candidate, z);
+      if (z < (candidate.generic() ? field.threshold : limits::kWorthATrial_z)) continue;
+      if (candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
+      if (std::find(refused_.begin(), refused_.end(), candidate.cause) != refused_.end()) continue;
+      Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0, true};
+      trial.gain = without.total() - trial.heldout.total();
+      trial.plausible = is_plausible(candidate, trial.heldout.estimate.tail(candidate.columns.size()));
+      if (trial.gain > 0.0) trials.push_back(std::move(trial));
+    }
+    std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.gain > b.gain; });
+    std::stable_partition(trials.begin(), trials.end(), [](const Trial& t) { return t.plausible; });
+    return trials;
+  }
 
   [[nodiscard]] bool is_plausible(const Candidate& candidate, const Eigen::VectorXd& estimate) const {
     if (candidate.generic()) return true;
@@ -181,12 +201,13 @@ class Diagnoser {
     const auto generic = std::find_if(trials.begin(), trials.end(), [](const Trial& t) { return t.candidate->generic(); });
     if (known == trials.end()) return &*generic;
     if (generic != trials.end() && generic->gain > limits::kGenericGain * known->gain) return &*generic;
-    constexpr double kAlike = 0.02;  // of the gain
+    const double dof = static_cast<double>(known->heldout.loss.size()) - 1.0;
     const Trial* best = &*known;
     for (const auto& trial : trials) {
       const bool simpler = !trial.candidate->generic() &&
                            trial.candidate->parameters.size() < best->candidate->parameters.size();
-      if (simpler && trial.gain > (1.0 - kAlike) * known->gain) best = &trial;
+      if (!simpler || trial.gain < (1.0 - limits::kAlikeShare) * known->gain) continue;
+      if (paired_t(trial.heldout.loss, known->heldout.loss) < student_quantile(limits::kRivalTail, dof)) best = &trial;
     }
     return best;
   }
@@ -234,7 +255,6 @@ class Diagnoser {
       const double t = base.score(own).z();
       const double gain = base.heldout().total() - with;
       const double strength = gain > 0.0 ? t : 0.0;
-      if (getenv("DBG")) fprintf(stderr, "drop? %s t %.2f gain %.3g\n", search_.causes()[c].name.text().c_str(), t, gain);
       if (strength >= least) continue;
       least = strength;
       worst = c;
@@ -289,6 +309,7 @@ class Diagnoser {
   ModelSearch search_;
   DiagnosisReport report_;
   double block_s_ = 0.0;
+  double alike_ = 0.0;  ///< correlation of neighbouring blocks, at the last look
   std::vector<CauseName> refused_;
 };
 

@@ -19,6 +19,7 @@ constexpr double kLostContrast = 0.5; ///< between the shares of two parts of th
 // Statistical.
 constexpr double kRivalTail = 0.02;     ///< two-sided, Student's t of paired blocks: clearly worse than the best
 constexpr double kRivalShare = 0.5;     ///< of the best one's gain: less explains something else
+constexpr double kAlikeShare = 0.1;     ///< of a gain: of causes that explain so much alike the simplest is taken
 constexpr double kConfidence = 0.05;    ///< two-sided, of intervals
 constexpr double kSameChange = 1e-3;    ///< share of a column that another cause cannot make up for: it is the same
 constexpr double kNeighboursAlike = 0.3; ///< correlation of neighbouring blocks: they are made longer
@@ -27,8 +28,10 @@ constexpr double kGenericGain = 2.0;    ///< a free curve must explain so much m
 
 // Computational.
 constexpr double kRounding = 1e-7;          ///< share of a column beyond others: less is rounding
-constexpr double kWide = 100.0;             ///< typical sizes: a belief that is none
+constexpr double kWide = 4.0;              ///< typical sizes: a belief that is none
 constexpr std::size_t kMostCauses = 6;
+constexpr std::size_t kMostTried = 4;      ///< candidates a round that are fitted for real
+constexpr double kWorthATrial_z = 2.5;      ///< less does not stand out even of one candidate's noise
 constexpr std::size_t kFewestBlocks = 16;   ///< blocks are not made longer where fewer would be left
 constexpr std::size_t kPicturesForSize = 60;
 

@@ -42,7 +42,7 @@ class LogDiagnosis {
     DiagnosisOptions diagnosis;
     diagnosis.noise = pipeline_.options().noise;
     diagnosis.spacing_px = pipeline_.options().outline_spacing_px;
-    diagnosis.start_offsets = starts();
+    diagnosis.starts = starts();
     diagnosis.progress = [&](double share) {
       if (bar) bar->set(static_cast<std::uint64_t>(100.0 * share));
     };
@@ -79,11 +79,12 @@ class LogDiagnosis {
   /// Where the estimator was when it had converged.
   [[nodiscard]] std::vector<Eigen::VectorXd> starts() const {
     if (watched_.offsets_at_start.empty()) return {};
-    Eigen::VectorXd offsets = Eigen::VectorXd::Zero(pipeline_.robot().joint_count());
+    const State state(watched_.pictures.roles(), pipeline_.beliefs().state);
+    Eigen::VectorXd x = state.x();
     for (const auto& [joint, offset] : watched_.offsets_at_start) {
-      offsets[watched_.pictures.roles().index(joint)] = offset;
+      if (const auto at = state.find("joint_offset", {joint, ""}, 0); at >= 0) x[at] = offset;
     }
-    return {offsets};
+    return {x};
   }
 
   /// The diagnosis; what it refuses is refused in the log's name.

@@ -2,10 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <spdlog/spdlog.h>
 #include <utility>
 
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "limits.hpp"
+
+namespace bodyschema {
+
+Belief wide_belief(const CauseName& cause, const JointRoles& roles) {
+  const EffectTarget target{cause.joint, cause.source};
+  const auto effect = make_effect(cause.name, target, roles);
+  std::vector<double> sd;
+  for (const auto& p : std::as_const(*effect).parameters()) {
+    if (p.fitted) sd.push_back(diagnosis::limits::kWide * p.typical);
+  }
+  return {cause.name, target, sd};
+}
+
+}  // namespace bodyschema
 
 namespace bodyschema::diagnosis {
 namespace {
@@ -28,16 +43,6 @@ std::vector<std::size_t> raster_of(const PictureLog& log, std::size_t most) {
 }
 
 }  // namespace
-
-Belief wide_belief(const CauseName& cause, const JointRoles& roles) {
-  const EffectTarget target{cause.joint, cause.source};
-  const auto effect = make_effect(cause.name, target, roles);
-  std::vector<double> sd;
-  for (const auto& p : std::as_const(*effect).parameters()) {
-    if (p.fitted) sd.push_back(limits::kWide * p.typical);
-  }
-  return {cause.name, target, sd};
-}
 
 ModelSearch::ModelSearch(LogFit& fit, const std::vector<Belief>& beliefs, const std::vector<Belief>& tolerances,
                          const DiagnosisOptions& options)
@@ -69,15 +74,11 @@ double ModelSearch::fit(State& state, double from_px) {
 }
 
 void ModelSearch::start() {
-  std::vector<Eigen::VectorXd> starts = options_.start_offsets;
-  starts.insert(starts.begin(), Eigen::VectorXd());
+  auto starts = options_.starts;
+  starts.insert(starts.begin(), state_.x());
   std::optional<State> best;
-  for (const auto& offsets : starts) {
+  for (const auto& x : starts) {
     State state(fit_.log().roles(), beliefs_);
-    Eigen::VectorXd x = state.x();
-    for (Eigen::Index j = 0; j < state.joints() && offsets.size() > 0; ++j) {
-      x[j] = offsets[state.parameters()[static_cast<std::size_t>(j)].joint];
-    }
     state.set(x);
     const double cost = fit(state, limits::kFrom_px);
     if (best && cost >= cost_) continue;
@@ -395,6 +396,11 @@ void ModelSearch::look_for_lost_part() {
     best = std::move(state);
   }
   if (!best) return;
+  // It explains the part only if the part is seen then.
+  const auto now = fit_.linearise(best->model(), {}, search());
+  const auto explained = std::count_if(lost.begin(), lost.end(), [&](std::size_t p) { return now.evidence[p].weight > 0.0; });
+  if (static_cast<double>(explained) < limits::kLostContrast * static_cast<double>(lost.size())) return;
+  spdlog::debug("diagnosis: a part of the log out of sight is explained by {}", found.name.text());
   state_ = std::move(*best);
   causes_ = {found};
   measure_noise();

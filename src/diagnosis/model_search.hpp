@@ -84,7 +84,4 @@ class ModelSearch {
   double cost_ = 0.0;
 };
 
-/// A belief about an effect so wide that it is none.
-Belief wide_belief(const CauseName& cause, const JointRoles& roles);
-
 }  // namespace bodyschema::diagnosis

@@ -57,13 +57,18 @@ class Backlash final : public ClonableEffect<Backlash> {
   bool started_ = false;
 };
 
+constexpr double kSparse_s = 0.025;
+
+bool jumps_between_postures(const LogMotion& motion) {
+  constexpr double kJump_rad = 8.0 * kDeg;  // between readings 100 ms apart even a fast arm moves less
+  return motion.reading_period_s > kSparse_s && motion.reading_step_rad > kJump_rad;
+}
+
 /// Why a log with this motion does not show which way the joint moved last.
 std::string not_testable(const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) {
-  constexpr double kSparse_s = 0.025;
-  constexpr double kJump_rad = 8.0 * kDeg;  // between readings 100 ms apart even a fast arm moves less
   if (motion.reading_period_s > kSparse_s) {
     // Of an arm that is read from one posture to the next it does not matter how often.
-    if (motion.reading_step_rad > kJump_rad) {
+    if (jumps_between_postures(motion)) {
       return "the arm's readings jump from posture to posture, by " + short_number(motion.reading_step_rad / kDeg, 0) +
              " deg (median); how the joints moved between them, and in which direction last, was not seen";
     }
@@ -79,6 +84,12 @@ std::string not_testable(const EffectTarget& target, const JointRoles& roles, co
 }
 
 }  // namespace
+
+std::string needs_motion_that_was_seen(const LogMotion& motion) {
+  if (!jumps_between_postures(motion)) return "";
+  return "the arm was seen in single postures, " + short_number(motion.reading_step_rad / kDeg, 0) +
+         " deg apart (median); each would be taken before or after a change, and none shows it happen";
+}
 
 EffectKind backlash() {
   return {.name = "backlash",

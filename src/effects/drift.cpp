@@ -26,6 +26,8 @@ EffectKind drift() {
                 return "the offset of " + e.target().joint + " creeps: " + amounts[0] + " over the log" +
                        by_sign(e.parameters()[0], "", ", downwards");
               },
+          .not_testable = [](const EffectTarget&, const JointRoles&,
+                             const LogMotion& motion) { return needs_motion_that_was_seen(motion); },
           .lookalikes = {"slip"},
           .splitting_motion = "Revisit the first postures in the middle and at the end of the log.",
           .timing = EffectTiming::kOverTheLog,

@@ -99,4 +99,7 @@ std::string too_little_motion(const std::string& joint, const JointRoles& roles,
 std::string too_slow(const LogMotion& motion);
 std::string needs_two_cameras(const LogMotion& motion);
 
+/// Why a log of single postures cannot tell what changed in the course of it; empty: the arm was seen moving.
+std::string needs_motion_that_was_seen(const LogMotion& motion);
+
 }  // namespace bodyschema::effects

@@ -19,6 +19,8 @@ EffectKind slip() {
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
                 return e.target().joint + " slipped by " + amounts[0] + by_sign(e.parameters()[0], "", ", backwards");
               },
+          .not_testable = [](const EffectTarget&, const JointRoles&,
+                             const LogMotion& motion) { return needs_motion_that_was_seen(motion); },
           .lookalikes = {"drift"},
           .splitting_motion = "Revisit the first postures in the middle and at the end of the log.",
           .timing = EffectTiming::kFromATime,

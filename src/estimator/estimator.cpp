@@ -287,7 +287,7 @@ struct Estimator::Impl {
     } else {
       OutlineFit fit = fitter.follow(frame, memory);
       judge(fit);
-      if (verdict == FrameVerdict::kAgrees && memory.postures() >= options.least_postures) {
+      if (verdict == FrameVerdict::kAgrees && !young()) {
         learn(fit);
       } else {
         explain_frame(observation, std::move(fit));
@@ -296,13 +296,14 @@ struct Estimator::Impl {
     times.refinement_ms += elapsed_ms(start);
 
     start = Clock::now();
-    spread(!memory.empty());
+    // A young memory that pictures contradict may be the wrong arm's: the search goes on beside it.
+    spread(!memory.empty() && !(young() && verdict != FrameVerdict::kAgrees));
     times.filter_ms += elapsed_ms(start);
   }
 
   /// How the frame agrees with the memory that its fit was held by.
   void judge(const OutlineFit& fit) {
-    near = fitter.fits(fit.evidence);
+    near = fitter.lies_near(fit.evidence);
     innovation = memory.innovation(fit.quadratic);
     const double ratio = innovation.dof > 0.0 ? innovation.nis / innovation.dof : 0.0;
     const double limit = chi_square_quantile(limits::kDoubt_tail, std::max(1.0, innovation.dof)) * usual();
@@ -317,6 +318,10 @@ struct Estimator::Impl {
 
   void learn(const OutlineFit& fit) {
     doubted_since_s = -1.0;
+    if (!fitter.fits(fit.evidence)) {  // too little of the hand to say much
+      settle_on(fit);
+      return;
+    }
     fitter.learn_noise(fit);
     if (const auto block = memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.quadratic, fit.x)) keep_frame(*block);
     look_again();
@@ -365,14 +370,13 @@ struct Estimator::Impl {
 
   /// The frame contradicts the memory, or the memory is so young that it may be wrong.
   void explain_frame(const Observation& observation, OutlineFit fit) {
-    const bool young = memory.postures() < options.least_postures;
     if (verdict != FrameVerdict::kAgrees && turned_swapped(observation)) {
       doubt(memory.estimate().x);
       cameras_swapped = true;
       return;
     }
-    if (verdict != FrameVerdict::kAgrees && !young) suspect_slips();
-    auto better = explain(hypotheses(fit, young), memory, fit, now_s, frame, fitter);
+    if (verdict != FrameVerdict::kAgrees && !young()) suspect_slips();
+    auto better = explain(hypotheses(fit), memory, fit, now_s, frame, fitter);
     if (better) {
       take(std::move(*better));
       return;
@@ -389,22 +393,29 @@ struct Estimator::Impl {
     if (now_s - doubted_since_s > limits::kPatience_s) {
       verdict = FrameVerdict::kContradicts;
       current = EstimatorState::kDiverged;
+      if (young()) begin_anew();
     }
   }
 
-  [[nodiscard]] std::vector<Hypothesis> hypotheses(const OutlineFit& fit, bool young) {
+  /// Too few postures for what is remembered to be relied on.
+  [[nodiscard]] bool young() const { return memory.postures() < options.least_postures; }
+
+  [[nodiscard]] std::vector<Hypothesis> hypotheses(const OutlineFit& fit) {
     std::vector<Hypothesis> list;
     const auto anew = starts_from(filter.states(), distance, state, 3);
     std::vector<Eigen::Index> everything(static_cast<std::size_t>(state.size()));
     std::iota(everything.begin(), everything.end(), Eigen::Index{0});
-    if (!young) {
+    if (!young()) {
       for (Eigen::Index joint = 0; joint < joints; ++joint) list.push_back(slip(joint, fit));
-      if (const auto camera = camera_parameters(); !camera.empty()) list.push_back({"the cameras were moved", camera, {}});
+      if (const auto camera = camera_parameters(); !camera.empty()) {
+        // From afar: knocked by more than is looked for about a memory.
+        list.push_back({"the cameras were moved", camera, {memory.estimate().x}});
+      }
       if (alternative && now_s - alternative_s < limits::kAlternative_s && !stalled.suspected()) {
         list.push_back({"what was known before holds", {}, {}, &*alternative});
       }
     }
-    list.push_back({"the arm was found elsewhere", everything, anew});
+    list.push_back({"the arm was found elsewhere", everything, anew, nullptr, young()});
     return list;
   }
 
@@ -442,10 +453,10 @@ struct Estimator::Impl {
       stalled.stepped(released[0], step);
       changed = fmt::format("{} slipped by {:.1f} deg", setup.estimated_joints[static_cast<std::size_t>(released[0])],
                             degrees(step));
-    } else if (memory.postures() >= options.least_postures) {
+    } else if (!young()) {
       changed = better.hypothesis.what;
     }
-    if (better.hypothesis.instead == nullptr && memory.postures() >= options.least_postures) {
+    if (better.hypothesis.instead == nullptr && !young()) {
       alternative = std::move(memory);
       alternative_s = now_s;
     } else {
@@ -455,7 +466,19 @@ struct Estimator::Impl {
     usual_sum = 1.0;
     innovation = {};
     verdict = FrameVerdict::kContradicts;
-    learn(better.fit);
+    if (fitter.fits(better.fit.evidence)) {
+      learn(better.fit);
+    } else {
+      settle_on(better.fit);
+    }
+  }
+
+  /// What a few pictures taught is contradicted by all that follow: it was theirs, the next frame is searched.
+  void begin_anew() {
+    memory.forget_all();
+    keyframes.clear();
+    doubted_since_s = -1.0;
+    usual_sum = 1.0;
   }
 
   /// Nothing is known: the best of what the particles found becomes the memory if it fits.
@@ -586,7 +609,7 @@ struct Estimator::Impl {
   /// Whether the estimate may be relied on.
   void conclude(Estimate& estimate) {
     estimate.hand_sd_limit_m = hand_sd_limit_m(estimate);
-    if (current != EstimatorState::kConverging || memory.postures() < options.least_postures) return;
+    if (current != EstimatorState::kConverging || young()) return;
     estimate.misfit = misfit();
     if (!estimate.misfit.empty()) {
       current = EstimatorState::kModelMisfit;

@@ -22,9 +22,10 @@ std::optional<Explanation> explain(const std::vector<Hypothesis>& hypotheses, co
                      : hypothesis.starts.size() == 1 ? fitter.follow_from(frame, hypothesis.starts.front(), memory)
                                                      : fitter.search(frame, hypothesis.starts, memory);
     // An arm that is somewhere else altogether shows so in its whole silhouette, not only in how an outline runs.
-    if (!fitter.fits(fit.evidence) || (anew && !fitter.clearly_nearer(fit, held))) continue;
+    if (anew && !fitter.clearly_nearer(fit, held)) continue;
     const double cost = fit.misfit + limits::kPerParameter * static_cast<double>(hypothesis.released.size());
-    if (cost >= least) continue;
+    const bool silhouettes_say_so = hypothesis.by_silhouette && !fitter.fits(held.evidence);
+    if (!silhouettes_say_so && (!fitter.fits(fit.evidence) || cost >= least)) continue;
     least = cost;
     best = Explanation{hypothesis, std::move(memory), std::move(fit), cost};
   }

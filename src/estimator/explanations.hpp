@@ -18,6 +18,9 @@ struct Hypothesis {
   std::vector<Eigen::Index> released;   ///< parameters that changed; all: nothing known holds
   std::vector<Eigen::VectorXd> starts;  ///< states to look from
   const PostureMemory* instead = nullptr;  ///< a memory that explains the frame with nothing changed since; null: none
+  /// Whether silhouettes alone decide against a memory that does not explain the outline at all: one so young that
+  /// nothing is lost with it.
+  bool by_silhouette = false;
 };
 
 /// A hypothesis with what it made of the frame.

@@ -97,9 +97,12 @@ bool OutlineFitter::clearly_nearer(const OutlineFit& fit, const OutlineFit& othe
   return scorer_.distance(fit.x) < limits::kNearer * scorer_.distance(other.x);
 }
 
+bool OutlineFitter::lies_near(const FrameEvidence& evidence) const {
+  return evidence.matched_share() > limits::kLeastMatched && evidence.rms_px() < limits::kNear_px;
+}
+
 bool OutlineFitter::fits(const FrameEvidence& evidence) const {
-  return evidence.matched >= limits::kFewestPoints && evidence.matched_share() > limits::kLeastMatched &&
-         evidence.rms_px() < limits::kNear_px;
+  return evidence.matched >= limits::kFewestPoints && lies_near(evidence);
 }
 
 void OutlineFitter::learn_noise(const OutlineFit& fit) {

@@ -37,7 +37,10 @@ class OutlineFitter {
 
   /// Whether a fit's silhouettes lie clearly nearer to the masks than another's; `scorer` must have the frame.
   [[nodiscard]] bool clearly_nearer(const OutlineFit& fit, const OutlineFit& other);
-  /// Whether enough of the outline was found, and near enough.
+  /// Whether what the pictures show of the predicted outline was found, and near enough; of a hand at the edge of the
+  /// picture that may be too little to learn from.
+  [[nodiscard]] bool lies_near(const FrameEvidence& evidence) const;
+  /// The same of enough outline to be learned from.
   [[nodiscard]] bool fits(const FrameEvidence& evidence) const;
   /// Measures the outlines' noise on what a good fit leaves.
   void learn_noise(const OutlineFit& fit);

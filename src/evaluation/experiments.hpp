@@ -39,6 +39,7 @@ void run_likelihood(ExperimentContext& context);
 void run_ablations(ExperimentContext& context);
 void run_reach(ExperimentContext& context);
 void run_recording(ExperimentContext& context);
+void run_real(ExperimentContext& context);
 void run_diagnosis(ExperimentContext& context);
 
 }  // namespace bodyschema

@@ -71,6 +71,33 @@ void LogFit::refresh() {
   for (auto& worker : workers_) {
     worker = std::make_unique<OutlineMeasurement>(log_.robot(), log_.setup(), log_.rig(), log_.roles());
   }
+  weigh_parts();
+}
+
+void LogFit::weigh_parts() {
+  constexpr double kStill = 1e-3;             // m, and rad
+  constexpr double kSamePosture_rad = 0.05;
+  auto& projection = workers_.front()->projection();
+  const auto nothing = log_.roles().no_corrections();
+  part_weight_.clear();
+  std::vector<bool> still(projection.part_count(), true);
+  std::vector<std::vector<Pose>> first(projection.camera_count());
+  Eigen::VectorXd posture;
+  double postures = 0.0;
+  for (const auto& picture : log_.pictures()) {
+    projection.place(picture.joints.q, nothing, picture.camera);
+    const auto links = projection.links();
+    auto& reference = first[picture.camera];
+    if (reference.empty()) reference.assign(links.begin(), links.end());
+    for (std::size_t l = 0; l < still.size(); ++l) {
+      if ((links[l].matrix() - reference[l].matrix()).cwiseAbs().maxCoeff() > kStill) still[l] = false;
+    }
+    if (posture.size() > 0 && (picture.joints.q - posture).cwiseAbs().maxCoeff() < kSamePosture_rad) continue;
+    posture = picture.joints.q;
+    postures += 1.0;
+  }
+  if (postures < 2.0 || std::none_of(still.begin(), still.end(), [](bool s) { return s; })) return;
+  for (const bool s : still) part_weight_.push_back(s ? 1.0 / postures : 1.0);
 }
 
 LogFit::~LogFit() = default;
@@ -110,6 +137,8 @@ LinearLog LogFit::linearise(const ErrorModel& model, std::span<const std::uint32
         playing.corrections(result.instants[p], result.corrections[p]);
       });
 
+  OutlineSearch weighed = search;
+  weighed.part_weight = part_weight_;
   std::atomic<std::size_t> next{0};
   const auto work = [&](OutlineMeasurement& measurement) {
     for (std::size_t p; (p = next++) < count;) {
@@ -120,7 +149,7 @@ LinearLog LogFit::linearise(const ErrorModel& model, std::span<const std::uint32
       }
       const auto& picture = log_.pictures()[p];
       measurement.linearise(log_.edges(p), picture.joints.q, result.corrections[p], picture.camera, coordinates,
-                            search, evidence);
+                            weighed, evidence);
       if (evidence.matched < kFewestPoints || evidence.matched_share() < kLeastShare) {
         const auto blind = std::exchange(evidence, {});
         evidence.clear(static_cast<Eigen::Index>(coordinates.size()));

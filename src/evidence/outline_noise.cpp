@@ -66,9 +66,12 @@ double OutlineNoise::sd_px() const {
 double OutlineNoise::correlated_points() const {
   double own = prior_.correlated_points;
   if (psi_square_ > 0.0) {
-    // Up to where they no longer are alike: further off, sums of products are but noise.
+    // Up to where they no longer are alike: further off, sums of products are but noise. Nearer than points are spaced
+    // there are none.
     own = 1.0;
-    for (std::size_t bin = 0; bin < kBins && product_[bin] > 0.0; ++bin) own += 2.0 * product_[bin] / psi_square_;
+    for (std::size_t bin = 0; bin < kBins && (pairs_[bin] <= 0.0 || product_[bin] > 0.0); ++bin) {
+      own += 2.0 * product_[bin] / psi_square_;
+    }
   }
   return (prior_.pictures * prior_.correlated_points + pictures_ * own) / (prior_.pictures + pictures_);
 }
@@ -76,8 +79,8 @@ double OutlineNoise::correlated_points() const {
 double OutlineNoise::correlation_px() const {
   double from = 0.0;
   for (std::size_t bin = 0; bin < kBins; ++bin) {
-    const double alike = pairs_[bin] > 0.0 ? product_[bin] / pairs_[bin] : 0.0;
-    if (points_ <= 0.0 || alike < 0.5 * psi_square_ / points_) break;
+    if (pairs_[bin] <= 0.0) continue;
+    if (points_ <= 0.0 || product_[bin] / pairs_[bin] < 0.5 * psi_square_ / points_) break;
     from = kBin_px[bin];
   }
   return from;

@@ -51,6 +51,16 @@ void replace(std::vector<Belief>& list, Belief belief) {
   }
 }
 
+/// Whether a target is about two cameras, of which this robot has one.
+bool misses_a_camera(const EffectKind& kind, const EffectTarget& target, const JointRoles& roles) {
+  if (roles.cameras.size() != 1) return false;
+  JointRoles two = roles;
+  two.cameras.push_back("a second one");
+  const auto own = kind.targets(roles), with_two = kind.targets(two);
+  return std::find(own.begin(), own.end(), target) == own.end() &&
+         std::find(with_two.begin(), with_two.end(), target) != with_two.end();
+}
+
 std::string name_of(const Effect& effect, const EffectParameter& parameter) {
   if (effect.name() == "joint_offset") return effect.target().joint;
   const auto fitted =
@@ -73,7 +83,7 @@ std::vector<Belief> read_beliefs(const Configuration& mapping, const JointRoles&
     try {
       const auto& kind = effect_kind(name);
       auto targets = kind.targets(roles);
-      if (targets.empty()) {
+      if (targets.empty() || misses_a_camera(kind, target, roles)) {
         // Sizes are read all the same, so that they are not unknown keys on a robot without this effect.
         static_cast<void>(entry.keys());
         continue;

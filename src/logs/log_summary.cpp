@@ -182,6 +182,8 @@ class Summariser {
       const auto [at, is_new] = joint_index_.try_emplace(name, joints_.size());
       if (is_new) joints_.emplace_back(name, summary_.sliding_joints && summary_.sliding_joints->contains(name));
       joints_[at->second].add(joint_state_.utime, static_cast<double>(joint_state_.position_rad[i]));
+      posture_.resize(joints_.size(), 0.0);
+      if (!joints_[at->second].motion.slides) posture_[at->second] = static_cast<double>(joint_state_.position_rad[i]);
     }
     return true;
   }
@@ -191,7 +193,22 @@ class Summariser {
     for (const auto& image : images_.images) {
       pictures_[{event.channel, image.type, image.width, image.height, image.pixelformat}].add(image.utime);
     }
+    if (!images_.images.empty()) count_posture();
     return true;
+  }
+
+  /// Where the joints are, as far as has been said, is another posture or one of those before.
+  void count_posture() {
+    if (posture_.empty() || postures_.size() == kMostPostures) return;
+    const auto same = [&](const std::vector<double>& other) {
+      for (std::size_t j = 0; j < posture_.size(); ++j) {
+        const double q = j < other.size() ? other[j] : 0.0;
+        if (!(std::abs(posture_[j] - q) < kSamePosture_rad)) return false;
+      }
+      return true;
+    };
+    // Newest first: a moving arm is near where it just was.
+    if (std::none_of(postures_.rbegin(), postures_.rend(), same)) postures_.push_back(posture_);
   }
 
   void finish() {
@@ -207,6 +224,7 @@ class Summariser {
     }
     for (std::size_t e = 0; e < encoder_stamps_.size(); ++e)
       summary_.encoders[e].stamps = encoder_stamps_[e].regularity();
+    summary_.postures = postures_.size();
     for (auto& joint : joints_) summary_.joints.push_back(std::move(joint.motion));
   }
 
@@ -218,6 +236,8 @@ class Summariser {
   std::vector<Stamps> encoder_stamps_;
   std::map<std::string, std::size_t> joint_index_;
   std::vector<JointWatcher> joints_;
+  std::vector<double> posture_;                ///< the last reading of each joint that turns
+  std::vector<std::vector<double>> postures_;  ///< those that were pictured, each once
   JointStateMessage joint_state_;
   ImagesView images_;
   joint_offsets_t offsets_;
@@ -308,6 +328,11 @@ std::string LogSummary::text() const {
                          per_unit * least_motion(slides), unit);
     }
   }
+  if (!pictures.empty()) {
+    out += fmt::format("pictures show {}{} (a joint apart by {:.0f} deg or more)\n",
+                       postures == kMostPostures ? "at least " : "",
+                       plural(postures, "different posture"), degrees(kSamePosture_rad));
+  }
   if (!sliding_joints) out += "in deg as if every joint turned: a log does not say which slide, a configuration does\n";
   return out;
 }
@@ -348,6 +373,7 @@ std::string LogSummary::json() const {
                            {"fastest" + unit + "_s", per_unit * m.fastest_rad_s},
                            {"turns", m.turns}});
   }
+  j["postures"] = postures;
   j["sliding_joints"] = sliding_joints ? Json(*sliding_joints) : Json(nullptr);
   return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";  // names may be no UTF-8
 }

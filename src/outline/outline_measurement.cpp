@@ -100,8 +100,9 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
       continue;
     }
     const double share = damping(r, robust_px);
+    const double factor = search.part_weight.empty() ? 1.0 : search.part_weight[point.part];
     point.residual_px = r;
-    point.weight = share * share;
+    point.weight = factor * share * share;
     out.cost += r * r * share;
     out.square += point.weight * r * r;
     out.weight += point.weight;

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -14,6 +15,8 @@
 #include "bodyschema/core/write_file.hpp"
 #include "bodyschema/estimator/estimate.hpp"
 #include "bodyschema/geometry/pose.hpp"
+#include "bodyschema/imports/camera_pose_file.hpp"
+#include "bodyschema/pipeline/ros_files.hpp"
 #include "bodyschema/robot/urdf_origin.hpp"
 #include "estimate_json.hpp"
 #include "model_hash.hpp"
@@ -153,17 +156,36 @@ std::string joints_delta(const std::vector<std::pair<std::string, double>>& offs
   return text;
 }
 
+std::string mount_yaml(const CameraModel& camera, const CameraModel& first) {
+  const CameraMount& mount = camera.mount;
+  std::string text;
+  if (mount.relative) {
+    text = fmt::format("    beside: {}\n    X_beside_optical: {}\n", first.name, pose_yaml(mount.X_PC));
+  } else if (camera.link == mount.parent) {
+    return fmt::format("    link: {}\n", camera.link);
+  } else {
+    text = fmt::format("    link: {}\n    X_link_optical: {}\n", mount.parent, pose_yaml(mount.X_PC));
+  }
+  constexpr std::array<const char*, 3> kKnowledge = {"known", "roughly", "unknown"};
+  text += fmt::format("    pose: {}\n", kKnowledge[static_cast<std::size_t>(mount.knowledge)]);
+  if (mount.knowledge == PlaceKnowledge::kRoughly) {
+    text += fmt::format("    pose_sd_deg: {:.6g}\n    pose_sd_mm: {:.6g}\n", degrees(mount.sd_rad), 1e3 * mount.sd_m);
+  }
+  return text;
+}
+
 std::string cameras_yaml(const StereoRig& rig) {
   std::string text =
-      "# Intrinsics as found: px; distortion k1 k2 p1 p2 k3 as OpenCV. Put in place of the section of the same name,\n"
+      "# Cameras as found: px; distortion k1 k2 p1 p2 k3 as OpenCV; m. Put in place of the section of the same name,\n"
       "# and do not load an extended model as well.\ncameras:\n";
   for (const auto& camera : rig.cameras) {
     const auto& k = camera.intrinsics;
     const auto& d = camera.distortion;
     text += fmt::format(
-        "  {}:\n    link: {}\n    width: {}\n    height: {}\n    fx: {:.4f}\n    fy: {:.4f}\n"
+        "  {}:\n{}    image_type: {}\n    width: {}\n    height: {}\n    fx: {:.4f}\n    fy: {:.4f}\n"
         "    cx: {:.4f}\n    cy: {:.4f}\n    distortion: [{:.6g}, {:.6g}, {:.6g}, {:.6g}, {:.6g}]\n",
-        camera.name, camera.link, k.width, k.height, k.fx, k.fy, k.cx, k.cy, d[0], d[1], d[2], d[3], d[4]);
+        camera.name, mount_yaml(camera, rig.cameras.front()), camera.number(), k.width, k.height, k.fx, k.fy, k.cx, k.cy, d[0], d[1], d[2],
+        d[3], d[4]);
   }
   return text;
 }
@@ -358,12 +380,14 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
       warnings + fmt::format("corrected URDF        {}\noffsets by joint      {}\niCub calibrationDelta {}\n",
                              (out / "corrected.urdf").string(), (out / "offsets.yaml").string(),
                              (out / "calibration_delta.txt").string());
+  const StereoRig found = corrected_rig(all, robot, setup, rig);
+  files += write_ros_files(out / "ros", setup.model.urdf, out / "corrected.urdf", correction, ros_cameras_of(found));
   if (applied.empty()) return files;
   const bool cameras =
       std::any_of(applied.begin(), applied.end(), [](const auto& a) { return a.applied == "cameras.yaml"; });
   if (cameras) {
-    replace_file(out / "cameras.yaml", cameras_yaml(all.corrected(rig)));
-    files += fmt::format("camera intrinsics     {}\n", (out / "cameras.yaml").string());
+    replace_file(out / "cameras.yaml", cameras_yaml(found));
+    files += fmt::format("cameras               {}\n", (out / "cameras.yaml").string());
   }
   const std::string report = applied_text(applied, model.has_value());
   replace_file(out / "what_was_applied.txt", report);

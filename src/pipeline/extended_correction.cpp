@@ -69,12 +69,42 @@ std::optional<Pose> camera_motion(const std::shared_ptr<const RobotModel>& robot
   return X;
 }
 
+bool moves_rig(const CameraCorrection& camera) {
+  return !camera.rig_shift_m.isZero(0.0) || !camera.rig_turn_rad.isZero(0.0);
+}
+
+/// Else it is a frame that only the configuration knows.
+bool is_link_of_urdf(const CameraModel& camera) {
+  return !camera.mount.relative && camera.link == camera.mount.parent;
+}
+
 }  // namespace
+
+StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                        const StereoRig& rig) {
+  StereoRig result = model.corrected(rig);
+  std::vector<Pose> moved(rig.cameras.size(), Pose::Identity());
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    Corrections change = model.roles().no_corrections();
+    model.corrections(at_rest(robot->joint_count(), c), change);
+    const auto motion = camera_motion(robot, setup, rig, c, change);
+    if (motion) moved[c] = *motion;
+    if (is_link_of_urdf(rig.cameras[c])) continue;
+    CameraMount& mount = result.cameras[c].mount;
+    mount.X_PC = mount.X_PC * moved[c];
+    if (mount.relative) mount.X_PC = moved.front().inverse(Eigen::Isometry) * mount.X_PC;
+    if (motion || (mount.relative && !moved.front().isApprox(Pose::Identity(), 1e-12))) {
+      mount.knowledge = PlaceKnowledge::kKnown;
+    }
+  }
+  return result;
+}
 
 std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
                                               const RobotSetup& setup, const StereoRig& rig, Correction& correction) {
   const auto joints = robot->joint_count();
   std::vector<AppliedEffect> list;
+  std::vector<Corrections> cameras(rig.cameras.size(), model.roles().no_corrections());
   for (std::size_t e = 0; e < model.size(); ++e) {
     const Effect& effect = model[e];
     if (effect.name() == "joint_offset") continue;
@@ -85,27 +115,37 @@ std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::share
     } else if (kind.home == EffectHome::kUrdf) {
       entry.applied = "corrected.urdf";
       for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-        Corrections change = model.roles().no_corrections();
-        effect.apply(at_rest(joints, c), change);
-        if (auto moved = camera_motion(robot, setup, rig, c, change)) {
-          correction.camera_motions.emplace_back(rig.cameras[c].link, *moved);
-        }
-        if (c > 0) continue;  // the rest changes for all cameras alike
-        if (change.base_shift_m.norm() > 0.0) {
-          correction.placements.push_back(shifted_base(robot, setup, change.base_shift_m));
-          entry.remark = "at the first arm joint, for a torso that stands as configured";
-        }
-        for (Eigen::Index j = 0; j < joints; ++j) {
-          const auto& name = robot->joints()[static_cast<std::size_t>(j)].name;
-          if (change.dq[j] != 0.0) correction.known_offsets_rad.emplace_back(name, -change.dq[j]);
-          const auto& adjustment = change.adjustments[static_cast<std::size_t>(j)];
-          if (!adjustment.is_zero()) correction.placements.push_back(placed(robot, setup, rig, j, adjustment));
-        }
+        effect.apply(at_rest(joints, c), cameras[c]);
+        Corrections own = model.roles().no_corrections();
+        effect.apply(at_rest(joints, c), own);
+        if (!is_link_of_urdf(rig.cameras[c]) && camera_motion(robot, setup, rig, c, own)) entry.applied = "cameras.yaml";
+      }
+      Corrections change = model.roles().no_corrections();
+      effect.apply(at_rest(joints, 0), change);  // what is no camera's changes for all of them alike
+      if (moves_rig(change.camera) && model.roles().neck.size() < model.roles().head.size()) {
+        entry.remark = "for eyes that stand at their default angles";
+      }
+      if (change.base_shift_m.norm() > 0.0) {
+        correction.placements.push_back(shifted_base(robot, setup, change.base_shift_m));
+        entry.remark = "at the first arm joint, for a torso that stands as configured";
+      }
+      for (Eigen::Index j = 0; j < joints; ++j) {
+        const auto& name = robot->joints()[static_cast<std::size_t>(j)].name;
+        if (change.dq[j] != 0.0) correction.known_offsets_rad.emplace_back(name, -change.dq[j]);
+        const auto& adjustment = change.adjustments[static_cast<std::size_t>(j)];
+        if (!adjustment.is_zero()) correction.placements.push_back(placed(robot, setup, rig, j, adjustment));
       }
     } else {
       entry.remark = kind.remark;
     }
     list.push_back(std::move(entry));
+  }
+  // All at once: motions of a camera do not commute.
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    if (!is_link_of_urdf(rig.cameras[c])) continue;
+    if (auto moved = camera_motion(robot, setup, rig, c, cameras[c])) {
+      correction.camera_motions.emplace_back(rig.cameras[c].link, *moved);
+    }
   }
   return list;
 }

@@ -231,16 +231,19 @@ class Replay {
       frames_since_ = 0;
     } else if (last_.state == EstimatorState::kConverging) {
       ++frames_since_;
-    } else if (last_.state == EstimatorState::kDiverged) {
+    } else if (last_.state == EstimatorState::kDiverged || last_.state == EstimatorState::kModelMisfit) {
       converged_.reset();
     }
   }
   /// A log that ends so has converged: with the offsets of the last frame that said so.
   void end_where_it_converged() {
     constexpr std::size_t kFew_frames = 30;
-    constexpr double kSame_rad = 0.25 * kPi / 180.0;
+    constexpr double kSame_rad = 0.25 * kPi / 180.0, kSame_sd = 2.0;
     if (last_.state == EstimatorState::kConverged || !converged_ || frames_since_ > kFew_frames) return;
-    if ((last_.offset_rad - converged_->offset_rad).cwiseAbs().maxCoeff() > kSame_rad) return;
+    // What was hardly told then may be told better by now.
+    const Eigen::ArrayXd same =
+        (kSame_sd * converged_->covariance_rad2.diagonal().array().max(0.0).sqrt()).max(kSame_rad);
+    if (((last_.offset_rad - converged_->offset_rad).array().abs() > same).any()) return;
     ended_after_ = last_.state;
     last_ = *converged_;
   }
@@ -330,6 +333,7 @@ class Replay {
                            last_.best_likelihood);
       case EstimatorState::kHandNotInView:
         return last_view_ ? "the arm had left the pictures; the offsets are of before" : "the arm is in no picture";
+      case EstimatorState::kModelMisfit: return last_.misfit;
       case EstimatorState::kLearningBackground: return "it holds too few pictures to learn the background from";
       default:
         return fmt::format("the offsets have not settled, the hand is known to {:.1f} mm; do not use them yet",

@@ -203,6 +203,7 @@ class Starter {
       cameras_.push_back(camera);
     }
     if (cameras_.empty()) {
+      if (names.empty() && o_.camera_infos.size() == 2) names = {"left", "right"};
       if (names.empty()) names.push_back("camera");
       for (const auto& name : names) cameras_.emplace_back().name = name;
     }

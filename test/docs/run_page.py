@@ -6,7 +6,8 @@ the page says is printed: every line of it must appear in the output, where `...
 usage: run_page.py PAGE BIN_DIR SOURCE_DIR SCRATCH_DIR
 /usr/share/bodyschema (configurations, robots) and /usr/share/doc/bodyschema stand for the source tree,
 /etc/bodyschema for the folder of the robot that the package's file there names. A page that uses
-BODYSCHEMA_DATA is skipped where that folder is absent. Exit 77 means skipped.
+BODYSCHEMA_DATA is skipped where that folder is absent. test/docs/PAGE.py, where there is one, makes what
+the page's reader has already, and says by 77 that it cannot. Exit 77 means skipped.
 """
 import os
 import pathlib
@@ -48,6 +49,13 @@ def main():
     if "$BODYSCHEMA_DATA" in text and not pathlib.Path(environment["BODYSCHEMA_DATA"]).is_dir():
         print(f"{page.name}: {environment['BODYSCHEMA_DATA']} is absent, skipped")
         return SKIPPED
+    # Packages of PyPI that a command sets up are kept for all pages of this build.
+    environment["XDG_CACHE_HOME"] = str(scratch.parent.parent / "cache")
+    before = pathlib.Path(__file__).with_name(page.stem + ".py")
+    if before.exists():
+        made = subprocess.run([sys.executable, before, source, scratch], env=environment, check=False)
+        if made.returncode != 0:
+            return made.returncode
     output, runs = "", 0
     for kind, content in BLOCK.findall(text):
         content = content.replace("/usr/share/doc/bodyschema", str(source))

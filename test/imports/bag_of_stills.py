@@ -2,7 +2,7 @@
 
 usage: bag_of_stills.py FOLDER BAG mcap|sqlite3|ros1 [KEY=VALUE ...]
 
-FOLDER holds images/CAMERA/NN.{png,ppm} and joints.csv; each posture becomes one picture a camera and readings held
+FOLDER holds images/CAMERA/NN.{png,ppm}, joints.csv and possibly camera_info/CAMERA.yaml; each posture becomes one picture a camera and readings held
 still around it, stamped as that import stamps them. Keys:
   encoding=rgb8|bgr8|rgba8|mono8   of the pictures
   compression=zstd                 of a ROS 2 bag's messages
@@ -20,6 +20,7 @@ import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from ruamel.yaml import YAML
 
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 PERIOD_US, HOLD_US, STEP_US = 10_000_000, 250_000, 25_000
@@ -97,15 +98,17 @@ class Bag:
             header=self.header(utime, frame), height=picture.shape[0], width=picture.shape[1], encoding=encoding,
             is_bigendian=0, step=pixels.size // picture.shape[0], data=data))
 
-    def info(self, topic, utime, frame, width, height, focal):
+    def info(self, topic, utime, frame, width, height, known, focal):
+        """As `known` (a CameraInfo) says, or a simple lens."""
         letters = str.upper if self.ros1 else str.lower
         k = np.array([focal, 0, (width - 1) / 2, 0, focal, (height - 1) / 2, 0, 0, 1.0])
-        matrices = {letters("d"): np.zeros(5), letters("k"): k, letters("r"): np.eye(3).reshape(-1),
-                    letters("p"): np.insert(k, [3, 6, 9], 0.0)}
+        simple = {"d": np.zeros(5), "k": k, "r": np.eye(3).reshape(-1), "p": np.insert(k, [3, 6, 9], 0.0)}
+        matrices = {letters(key): np.array(known.get(key, simple[key]), np.float64) for key in "dkrp"}
         roi = self.type("sensor_msgs/msg/RegionOfInterest")(
             x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
         self.write(topic, utime, self.type("sensor_msgs/msg/CameraInfo")(
-            header=self.header(utime, frame), height=height, width=width, distortion_model="plumb_bob", **matrices,
+            header=self.header(utime, frame), height=height, width=width, **matrices,
+            distortion_model=known.get("distortion_model", "plumb_bob"),
             binning_x=0, binning_y=0, roi=roi))
 
     def transform(self, topic, utime, parent, child, xyz):
@@ -120,6 +123,11 @@ class Bag:
 def file_of(folder, number):
     files = [f for f in folder.iterdir() if f.stem == f"{number:02d}"] if folder.is_dir() else []
     return files[0] if files else None
+
+
+def camera_info(folder, camera):
+    file = folder / "camera_info" / (camera + ".yaml")
+    return YAML(typ="safe").load(file.read_text(encoding="utf-8")) if file.exists() else {}
 
 
 def add_posture(bag, folder, utime, number, names, values):
@@ -137,7 +145,7 @@ def add_posture(bag, folder, utime, number, names, values):
                 continue
             picture, frame = read_picture(path), camera + "_optical"
             height, width = picture.shape[:2]
-            bag.info(f"/rig/{camera}/camera_info", utime, frame, width, height,
+            bag.info(f"/rig/{camera}/camera_info", utime, frame, width, height, camera_info(folder, camera),
                      width * (2.0 if bag.keys.get("wide_info") else 1.0))
             bag.picture(f"/rig/{camera}/image_rect", utime, frame, picture, encoding)
         for camera in cameras if bag.keys.get("masks") else []:

@@ -55,6 +55,7 @@ def write_log(path):
             offsets.utime, offsets.sequence, offsets.state = utime, i, "converged"
             offsets.num_joints, offsets.joint_name = 1, ["r_elbow"]
             offsets.mean_rad, offsets.covariance_rad2 = [math.radians(3.0)], [[math.radians(0.5) ** 2]]
+            offsets.told = [1]
             pose = pose_t()
             pose.position_m, pose.quaternion_wxyz = [0.1, 0.2, 0.3], [1.0, 0.0, 0.0, 0.0]
             offsets.num_cameras, offsets.camera_name, offsets.hand_pose_in_camera = 1, ["left"], [pose]

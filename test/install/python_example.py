@@ -21,6 +21,7 @@ message.num_joints = 2
 message.joint_name = ["r_elbow", "r_wrist_yaw"]
 message.mean_rad = [math.radians(-2.0), math.radians(3.25)]
 message.covariance_rad2 = [[1.0, 0.0], [0.0, 1.0]]
+message.told = [1, 1]
 bus = lcm.LCM()
 while True:
     for message.state in ("converged", "diverged"):

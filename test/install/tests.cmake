@@ -83,6 +83,10 @@ if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
     bodyschema_patient(timeout 900)
     set_tests_properties(docs.${page} PROPERTIES LABELS docs TIMEOUT ${timeout} SKIP_RETURN_CODE 77
       ENVIRONMENT BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE})
+    if(page MATCHES "^import_(ros_bag|lerobot)$")
+      string(REPLACE "_" "-" environment ${CMAKE_MATCH_1})
+      set_tests_properties(docs.${page} PROPERTIES RESOURCE_LOCK venv-${environment})
+    endif()
   endforeach()
 endif()
 
@@ -96,6 +100,15 @@ if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
   bodyschema_patient(timeout 120)
   set_tests_properties(install.help_has_examples PROPERTIES LABELS install TIMEOUT ${timeout}
     ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+
+  # Skipped where PyPI's xacro or Debian's python3-camera-calibration-parsers is not to be had.
+  add_test(NAME pipeline.ros_files_read_back
+    COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/pipeline/ros_files_read_back.py
+      $<TARGET_FILE:bodyschema> ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/venv-xacro
+      ${PROJECT_BINARY_DIR}/test-ros-files)
+  bodyschema_patient(timeout 300)
+  set_tests_properties(pipeline.ros_files_read_back PROPERTIES LABELS integration TIMEOUT ${timeout}
+    SKIP_RETURN_CODE 77 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
 
   # Skipped where PyPI's rosbags, which writes the bags, cannot be installed.
   foreach(bag IN ITEMS bag real_bag)

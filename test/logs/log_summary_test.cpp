@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/bus/log.hpp"
+#include "bodyschema/bus/messages.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "recorded_log.hpp"
@@ -71,6 +72,41 @@ TEST(LogSummary, TellsHowJointsMoved) {
   EXPECT_THAT(text, HasSubstr("elbow"));
   EXPECT_THAT(text, HasSubstr("1 joint moved by less than 0.5 deg"));
   EXPECT_THAT(text, HasSubstr("1 gap, the longest 1100 ms"));
+}
+
+TEST(LogSummary, CountsPosturesThatDifferInAJointThatTurns) {
+  const auto file = std::filesystem::temp_directory_path() / "bodyschema_postures.lcmlog";
+  {
+    LogWriter writer(file);
+    Microseconds t = kBegin;
+    const auto posture = [&](float elbow, float lift, bool pictured) {
+      bot_core::joint_state_t joints;
+      joints.utime = t += 1'000'000;
+      joints.num_joints = 2;
+      joints.joint_name = {"elbow", "lift"};
+      joints.joint_position = {elbow, lift};
+      joints.joint_velocity = joints.joint_effort = {0.0F, 0.0F};
+      writer.publish_message("A_JOINT_STATE", t, joints);
+      bot_core::images_t images;
+      images.utime = t;
+      images.n_images = 1;
+      images.image_types = {0};
+      images.images = {to_message(Image(4, 2, 1), t)};
+      if (pictured) writer.publish_message("A_CAMERAS", t, images);
+    };
+    posture(0.0F, 0.0F, true);
+    posture(0.04F, 0.0F, true);  // 2.3 deg on
+    posture(0.5F, 0.0F, true);
+    posture(0.9F, 0.0F, false);
+    posture(0.01F, 0.0F, true);  // the first again
+    posture(0.5F, 0.4F, true);
+  }
+  const auto summary = summarise_log(file, std::set<std::string>{"lift"});
+  EXPECT_EQ(summary.postures, 2u);
+  EXPECT_THAT(summary.text(), HasSubstr("pictures show 2 different postures (a joint apart by 3 deg or more)\n"));
+  EXPECT_EQ(nlohmann::json::parse(summary.json())["postures"], 2);
+  EXPECT_EQ(summarise_log(file, std::set<std::string>{}).postures, 3u) << "0.4 rad, were it a joint that turns";
+  std::filesystem::remove(file);
 }
 
 TEST(LogSummary, JointsThatSlideAreInMetres) {

@@ -252,6 +252,28 @@ TEST_F(OutlineOfOwnRobot, WhatLiesFarOffTheOutlineSaysLittle) {
   EXPECT_NEAR(step(), without, 0.1);
 }
 
+/// A part that is counted half says half; where its outline lies it says all the same.
+TEST_F(OutlineOfOwnRobot, PartsCountAsTheyAreWeighed) {
+  Corrections wrong = nothing_;
+  wrong.camera.cx_px = 1.0;
+  const auto seen = reach_.draw(q_, nothing_, 0);
+  const std::vector<std::uint32_t> active = {position(Kind::kCx, 0)};
+  OutlineSearch search;
+  measurement_.linearise(edges(seen, 0), q_, wrong, 0, active, search, evidence_);
+  const OutlineEvidence plain = evidence_;
+  const std::size_t part = measurement_.points().front().part;
+  double of_it = 0.0;
+  for (const auto& point : measurement_.points()) {
+    if (point.part == part) of_it += point.weight * std::pow(point.normal.x(), 2);
+  }
+  search.part_weight.assign(measurement_.part_count(), 1.0);
+  search.part_weight[part] = 0.5;
+  measurement_.linearise(edges(seen, 0), q_, wrong, 0, active, search, evidence_);
+  EXPECT_GT(of_it, 0.0);
+  EXPECT_NEAR(evidence_.A(0, 0), plain.A(0, 0) - 0.5 * of_it, 1e-9 * plain.A(0, 0));
+  EXPECT_EQ(evidence_.matched, plain.matched);
+}
+
 /// What a picture would tell, without one.
 TEST_F(OutlineOfOwnRobot, WhatIsExpectedIsWhatAPictureOfThatPoseTells) {
   const OutlineSearch search{.search_px = 4.0, .robust_px = 3.0};

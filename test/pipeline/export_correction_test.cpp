@@ -14,6 +14,7 @@
 #include "bodyschema/effects/corrected_kinematics.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
+#include "effects/own_effect.hpp"
 
 namespace bodyschema {
 namespace {
@@ -265,6 +266,25 @@ TEST_F(ExportCorrection, AnEffectThatTheSummaryMakesUpIsRefused) {
   refuse(R"({"name": "mesh_scale", "parameter": "scale", "unit": "%", "stddev": 0.2})", "value");
 }
 
+/// An effect that the software does not know: what was estimated of it is written, and what to do about it.
+TEST_F(ExportCorrection, HoldsWhatWasEstimatedOfARegisteredEffect) {
+  test::register_own_effect();
+  std::ofstream(folder_ / "summary.json")
+      << R"({"estimate": {"state": "converged", "offset_deg": {"r_elbow": -2.0}, "stddev_deg": {"r_elbow": 0.1},
+          "told": ["r_elbow"], "effects": [{"name": ")"
+      << test::kOwnEffect
+      << R"(", "joint": "r_elbow", "parameter": "ripple", "unit": "deg", "value": 1.5, "stddev": 0.2,
+             "prior_stddev": 5.0}]}})";
+  export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
+  const std::string applied = content("out/what_was_applied.txt");
+  EXPECT_LT(applied.find("cannot hold"), applied.find(std::string(test::kOwnEffect) + " of r_elbow ripple 1.5 deg"));
+  EXPECT_THAT(applied, ::testing::HasSubstr("correct the reading by the ripple"));
+  const Configuration yaml = Configuration::load(folder_ / "out/offsets.yaml");
+  const auto effect = yaml.section("effects").section(std::string(test::kOwnEffect) + " of r_elbow ripple");
+  EXPECT_DOUBLE_EQ(effect.number("value"), 1.5);
+  EXPECT_DOUBLE_EQ(effect.number("stddev"), 0.2);
+}
+
 /// What the replay estimated beside the offsets goes where it belongs, and the files say where.
 TEST_F(ExportCorrection, WhatElseWasEstimatedIsInTheFilesOrSaidNotToBe) {
   export_of("converged");
@@ -310,14 +330,14 @@ TEST_F(ExportCorrection, TheUrdfHoldsWhatItCanOfAnExtendedModel) {
   };
   put("head_offset", {"neck_pitch", ""});
   put("vergence", {});
-  put("link_length", {"r_shoulder_yaw", ""});
-  put("link_length", {"r_wrist_prosup", ""});
+  put("link_length", {"r_shoulder_roll", ""});
+  put("link_length", {"r_elbow", ""});
+  put("link_length", {"r_wrist_pitch", ""});
   put("axis_tilt", {"r_shoulder_yaw", ""});
   put("axis_tilt", {"r_elbow", ""});
   put("axis_shift", {"r_elbow", ""});
   put("axis_shift", {"r_wrist_prosup", ""});
-  put("camera_pair", {});
-  put("camera_pose", {});
+  put("camera_pair", {});  // turned, then moved by the baseline: the order of a file is no matter
   put("baseline", {});
   put("base_shift", {});
   put("focal_length", {});
@@ -365,11 +385,54 @@ TEST_F(ExportCorrection, TheUrdfHoldsWhatItCanOfAnExtendedModel) {
   }
 }
 
+/// A rig that sits elsewhere as a whole: its first camera by the pose's own axes, the second with it. Eyes that turn by
+/// themselves carry it along as they stand by default, which the files say.
+TEST_F(ExportCorrection, TheUrdfHoldsWhereTheCamerasSitWhateverTheOrderOfTheEffects) {
+  const auto robot = setup_.load();
+  const auto roles = JointRoles::of(robot, setup_, rig_);
+  const std::vector<std::string> cameras = {"l_eye_optical", "r_eye_optical"};
+  for (const bool pose_first : {true, false}) {
+    ErrorModel model(roles);
+    for (const char* name : pose_first ? std::vector{"camera_pose", "camera_pair"} : std::vector{"camera_pair", "camera_pose"}) {
+      double sign = 1.0;
+      for (auto& p : model.add(name, {}).parameters()) p.value = 5.0 * (sign = -sign) * p.typical;
+    }
+    Correction correction;
+    const auto applied = add_effects(model, robot, setup_, rig_, correction);
+    for (const auto& effect : applied) {
+      EXPECT_EQ(effect.applied, "corrected.urdf");
+      const bool of_the_rig = effect.effect.starts_with("camera_pose");
+      EXPECT_EQ(effect.remark, of_the_rig ? "for eyes that stand at their default angles" : "");
+    }
+    write_corrected_urdf(setup_.model.urdf, correction, folder_ / "corrected.urdf");
+    RobotModelOptions options = setup_.model;
+    options.urdf = folder_ / "corrected.urdf";
+    CorrectedKinematics expected(robot, {setup_.hand_link}, cameras);
+    ForwardKinematics found(RobotModel::load(options), {setup_.hand_link, cameras[0], cameras[1]});
+    Eigen::VectorXd q = setup_.default_joints(*robot);
+    q(robot->joint_index("r_elbow")) += 0.4;
+    q(robot->joint_index("neck_yaw")) += 0.3;
+    std::vector<Pose> X_W(3), X_C(1);
+    found.compute(q, X_W);
+    for (const std::size_t c : {0u, 1u}) {
+      Instant at;
+      at.camera = c;
+      at.encoder = at.q = q;
+      Corrections corrections = roles.no_corrections();
+      model.corrections(at, corrections);
+      expected.compute(q, corrections, c, X_C);
+      const Pose X = X_W[1 + c].inverse() * X_W[0];
+      EXPECT_LT((X.translation() - X_C[0].translation()).norm(), 1e-8) << pose_first << c;
+      EXPECT_LT(rotation_distance(X.linear(), X_C[0].linear()), 1e-7) << pose_first << c;
+    }
+  }
+}
+
 TEST_F(ExportCorrection, SaysWhereEachEffectWentAndRefusesAnotherModelsOffsets) {
   std::ofstream(folder_ / "model.yaml") << R"(version: 1
 effects:
   - {name: latency, parameters: {delay_ms: 40}}
-  - {name: link_length, joint: r_shoulder_yaw, parameters: {change_mm: 2}}
+  - {name: link_length, joint: r_elbow, parameters: {change_mm: 2}}
   - {name: focal_length, parameters: {scale_percent: 1}}
 )";
   setup_.extended_model = folder_ / "model.yaml";
@@ -385,13 +448,13 @@ effects:
   refuse("made without an extended model");
   const std::string made_with =
       R"(, "extended_model": [{"name": "latency", "parameters": [{"name": "delay", "unit": "ms", "value": 40.0}]},
-      {"name": "link_length", "joint": "r_shoulder_yaw",
+      {"name": "link_length", "joint": "r_elbow",
        "parameters": [{"name": "change", "unit": "mm", "value": 2.0}]},
       {"name": "focal_length", "parameters": [{"name": "scale", "unit": "%", "value": 1.0}]}])";
   write_summary(made_with);
   export_correction(folder_ / "summary.json", setup_, rig_, folder_ / "out");
   const std::string text = content("out/what_was_applied.txt");
-  EXPECT_THAT(text, ::testing::HasSubstr("link_length of r_shoulder_yaw change 2 mm: in corrected.urdf"));
+  EXPECT_THAT(text, ::testing::HasSubstr("link_length of r_elbow change 2 mm: in corrected.urdf"));
   EXPECT_THAT(text, ::testing::HasSubstr("focal_length scale 1 %: in cameras.yaml"));
   EXPECT_LT(text.find("cannot hold"), text.find("latency delay 40 ms"));
   // Beside corrected.urdf the extended model would apply the length twice.

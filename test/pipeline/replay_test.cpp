@@ -196,15 +196,17 @@ TEST_F(ReplayTest, LearnsTheBackgroundFromTheWholeLogUnlessToldOtherwise) {
     return largest;
   };
   constexpr int kLearning = 20;
+  double whole_log_mm = 0.0;
   for (const auto& [mode, from, bound_mm] :
        {std::tuple<std::string, int, double>{"best", 3, 2.0}, {"paper", 60, 15.0}}) {
     replay(configuration({"estimator.mode=" + mode}), o);
     EXPECT_LT(largest_error_mm(from), bound_mm) << mode;
     std::printf("%s, learned from the whole log: %.2f mm at most\n", mode.c_str(), largest_error_mm(from));
+    if (mode == "best") whole_log_mm = largest_error_mm(kLearning);
   }
   o.learn_background_online = true;
   replay(configuration(), o);
-  EXPECT_GT(largest_error_mm(kLearning), 4.0);
+  EXPECT_GT(largest_error_mm(kLearning), 2.0 * whole_log_mm);
   std::printf("best, learned from the first pictures: %.2f mm at most\n", largest_error_mm(kLearning));
 }
 
@@ -345,7 +347,10 @@ TEST_F(ReplayTest, ALogOfVersion010Replays) {
   for (std::string line; std::getline(lines, line); ++count) last = nlohmann::json::parse(line);
   EXPECT_GE(count, 26) << "of 28 frames";
   EXPECT_GT(last["likelihood"].get<double>(), 0.8);
-  EXPECT_NEAR(last["offset_deg"]["r_wrist_pitch"].get<double>(), -7.0, 2.0);
+  // Eight pictures of one posture hardly tell it, and the estimate says so.
+  EXPECT_NEAR(last["offset_deg"]["r_wrist_pitch"].get<double>(), -7.0,
+              3.0 * last["stddev_deg"]["r_wrist_pitch"].get<double>());
+  EXPECT_LT(last["stddev_deg"]["r_wrist_pitch"].get<double>(), 4.0);
 }
 
 /// The mean of every estimate, deg by joint.

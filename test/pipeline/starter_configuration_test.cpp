@@ -310,6 +310,27 @@ TEST_F(StarterConfiguration, WithoutCamerasTheirPosesAreToBeFound) {
   EXPECT_THAT(pipeline.setup().model.rendered_links, testing::Contains("base"));
 }
 
+// As `bodyschema import ros-bag BAG --camera-info FOLDER` writes them.
+TEST_F(StarterConfiguration, TwoCalibrationsAreTwoCameras) {
+  auto o = options();
+  o.camera_links.clear();
+  o.rectified = true;
+  for (const std::string camera : {"a", "b"}) {
+    put(folder_ / (camera + ".yaml"),
+        "# /rig/" + camera + "\n{\"width\": 8, \"height\": 6, \"distortion_model\": \"plumb_bob\", \"d\": [0, 0, 0, 0, 0],"
+        " \"k\": [8, 0, 3.6, 0, 8.1, 2.4, 0, 0, 1], \"r\": [1, 0, 0, 0, 1, 0, 0, 0, 1], \"p\": [8, 0, 3.6, " +
+            std::string(camera == "b" ? "-0.96" : "0") + ", 0, 8.1, 2.4, 0, 0, 0, 1, 0]}\n");
+    o.camera_infos.push_back(folder_ / (camera + ".yaml"));
+  }
+  EXPECT_TRUE(write_starter_configuration(o).usable);
+  const Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
+  const auto& cameras = pipeline.rig().cameras;
+  ASSERT_EQ(cameras.size(), 2u);
+  EXPECT_EQ(cameras[0].name, "left");
+  EXPECT_EQ(cameras[0].mount.knowledge, PlaceKnowledge::kUnknown);
+  EXPECT_TRUE(cameras[1].mount.X_PC.translation().isApprox(Eigen::Vector3d(0.12, 0, 0), 1e-6));
+}
+
 TEST_F(StarterConfiguration, FromStillsNothingElseIsAsked) {
   const SmallStills stills;
   for (const std::string camera : {"left", "right"}) {

@@ -43,6 +43,9 @@ struct CalibratedCamera {
   Pose X_link_optical = Pose::Identity();  ///< OpenCV axes, m
   double sd_m = 0.0;               ///< root of the summed variances of its place in the link's frame
   double sd_rad = 0.0;             ///< ... of its rotation
+  /// The same if the arm's first joint were known: where the camera does not move with the robot's base, no picture
+  /// tells that joint from a turn of the camera about its axis, and both figures above contain the turn.
+  double sd_m_beside_first_joint = 0.0, sd_rad_beside_first_joint = 0.0;
   bool estimated = false;          ///< false: as configured
   bool searched = false;           ///< nothing was known of it
 };
@@ -61,6 +64,13 @@ struct CalibratedParameter {
   double value = 0.0, sd = 0.0, prior_sd = 0.0;  ///< in that unit
 };
 
+/// Something that the pictures ask for besides: a cause that the diagnosis names.
+struct CalibratedEffect {
+  std::string effect, joint, source;  ///< as in the catalogue; empty where it has no such target
+  std::string sentence;               ///< "pictures arrive 58 ms (57 to 59) late against the encoders"
+  std::vector<CalibratedParameter> parameters;
+};
+
 /// The answer of a whole log or a folder of stills.
 struct Calibration {
   CalibrationState state = CalibrationState::kNotConverged;
@@ -68,6 +78,7 @@ struct Calibration {
   std::vector<CalibratedJoint> joints;
   std::vector<CalibratedCamera> cameras;
   std::vector<CalibratedParameter> parameters;
+  std::vector<CalibratedEffect> effects;  ///< what else was found; estimated with the rest where they do not depend on time
   OutlineDistances outline_px;
   double hand_sd_m = 0.0;  ///< of the hand's place in the first camera's picture, mean over postures
   std::size_t postures = 0, pictures = 0;
@@ -83,7 +94,7 @@ struct Calibration {
 /// uncertain (`cameras: pose`, `estimator.state`), by the outlines in all pictures at once. A camera of which nothing is
 /// known is searched for.
 ///
-/// Writes calibration.json, report.html, corrected.urdf, offsets.yaml, cameras.yaml and a configuration to go on with
+/// Writes calibration.json, report.html, corrected.urdf, offsets.yaml, cameras.yaml, ros/ (write_ros_files) and a configuration to go on with
 /// (calibrated.yaml) into `out`. Throws Error.
 Calibration calibrate(const Configuration& configuration, const CalibrationOptions& options);
 

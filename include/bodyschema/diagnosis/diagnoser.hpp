@@ -24,10 +24,13 @@ struct DiagnosisOptions {
   OutlineNoise::Prior noise;       ///< of outlines, before any was seen
   std::size_t most_pictures = 400; ///< that a fit looks at; tests look at all
   std::uint64_t seed = 1;          ///< of the sign flips
-  /// Where the search for joint offsets starts besides zero, rad (encoder = true + offset), RobotModel order.
-  std::vector<Eigen::VectorXd> start_offsets{};
+  /// Where the fit starts besides the beliefs' centre: values of the state's parameters, SI.
+  std::vector<Eigen::VectorXd> starts{};
   std::function<void(double)> progress{};  ///< called with the share done
 };
+
+/// A belief about an effect so wide that it is none: what was found is fitted freely.
+Belief wide_belief(const CauseName& cause, const JointRoles& roles);
 
 /// Says what the model of a robot gets wrong, from the outlines in a log's pictures. One loop: fit what is believed
 /// uncertain anyway (offsets, nuisances); ask of every cause of the catalogue, and of free curves over what a joint

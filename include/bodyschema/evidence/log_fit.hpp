@@ -92,10 +92,14 @@ class LogFit {
   }
 
  private:
+  /// Parts that no posture of the log moves in the pictures, a robot's base before a still camera: they show the same in
+  /// all, and count as seen once.
+  void weigh_parts();
   [[nodiscard]] double mean_cost(const LinearLog& at, double usual_points, double OutlineEvidence::* cost) const;
 
   PictureLog& log_;
   std::vector<std::unique_ptr<OutlineMeasurement>> workers_;
+  std::vector<double> part_weight_;
 };
 
 }  // namespace bodyschema

@@ -25,7 +25,8 @@ struct Belief {
 ///     camera_pose: {sd_mm: 5, sd_deg: 0.5}  # by the unit of its parameters
 ///
 /// A later entry for a target of an earlier one replaces it; a standard deviation of 0 leaves it out. Effects that this
-/// robot has no target for are left out where no target is named. Throws ConfigurationError.
+/// robot has no target for are left out where no target is named, and so is what is about two cameras where it has one.
+/// Throws ConfigurationError.
 std::vector<Belief> read_beliefs(const Configuration& mapping, const JointRoles& roles);
 
 /// One number of a state.

@@ -54,6 +54,10 @@ struct JointMotion {
   int turns = 0;               ///< changes of direction, each after at least half a degree or one millimetre
 };
 
+/// Postures nearer than this in every joint are the same, as for the estimator (estimator.best.same_posture_deg).
+inline constexpr double kSamePosture_rad = 3.0 * 3.14159265358979323846 / 180.0;
+inline constexpr std::size_t kMostPostures = 1000;
+
 /// What a log holds, whoever recorded it: message types are told by their LCM fingerprints.
 struct LogSummary {
   std::string file;
@@ -67,6 +71,9 @@ struct LogSummary {
   std::vector<std::string> joint_channels;
   std::vector<EncodersSummary> encoders;  ///< in the order of their first appearance
   std::vector<JointMotion> joints;        ///< in the order of their first appearance
+  /// Of the instants of pictures: postures of which no two have all turning joints within kSamePosture_rad; at most
+  /// kMostPostures are counted.
+  std::size_t postures = 0;
   /// What was given to summarise_log(). A log itself does not say; without it every joint counts as turning.
   std::optional<std::set<std::string>> sliding_joints;
 

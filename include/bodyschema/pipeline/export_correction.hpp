@@ -34,7 +34,7 @@ struct Correction {
   // What effects, estimated or of an extended model, add that a URDF can hold.
   std::vector<std::pair<std::string, double>> known_offsets_rad;  ///< encoder - true, by joint
   std::vector<JointPlacement> placements;
-  /// Of cameras, by link: the corrected frame in the one of the URDF.
+  /// Of cameras that are links of the URDF, by link: the corrected frame in the one of the URDF.
   std::vector<std::pair<std::string, Pose>> camera_motions;
 };
 
@@ -55,6 +55,11 @@ Correction read_correction(const std::filesystem::path& summary, bool anyway = f
 std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
                                               const RobotSetup& setup, const StereoRig& rig, Correction& correction);
 
+/// The rig with intrinsics and places as `model` has them. Cameras that are links of the URDF stay where their link is:
+/// corrected.urdf moves that. What has been estimated is known then (CameraMount::knowledge).
+StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                        const StereoRig& rig);
+
 /// A copy of the URDF that is right when it is fed the encoders as they are: every corrected joint's
 /// origin is turned back by its offset about its axis (moved, for a sliding joint) and its limits
 /// grow by it, so that FK_corrected(encoder) = FK_nominal(encoder - offset). Placements and shifts
@@ -64,10 +69,10 @@ std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::share
 void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& correction,
                           const std::filesystem::path& out);
 
-/// Writes `offsets.yaml` (by joint, deg), `corrected.urdf` and `calibration_delta.txt` (what to add
+/// Writes `offsets.yaml` (by joint, deg), `corrected.urdf`, `ros/` (write_ros_files) and `calibration_delta.txt` (what to add
 /// to each joint's calibrationDelta in an iCub's calibrator file, deg) into `out`, head joints that
-/// were estimated included: arm and head offsets hold together. With an extended model in `setup` also `cameras.yaml`
-/// (where it changes intrinsics) and `what_was_applied.txt`: which of its effects these files hold, and which only work
+/// were estimated included: arm and head offsets hold together. With other effects also `cameras.yaml` (where these
+/// change intrinsics or cameras' places) and `what_was_applied.txt`: which of its effects these files hold, and which only work
 /// where the model itself is loaded. Each file is written whole or, where that fails, stays as it was.
 /// @param anyway  as of read_correction, and also when the summary's `model_hash` is another robot's, with a warning
 /// Throws as read_correction does, as replace_file for a file that cannot be written, and ConfigurationError when the

@@ -1,0 +1,78 @@
+#include "bodyschema/evidence/picture_log.hpp"
+
+#include "evidence/drawn_log.hpp"
+
+namespace bodyschema {
+namespace {
+
+class PictureLogOfOwnRobot : public DrawnLog {
+ protected:
+  void SetUp() override { seen_ = observe(2, Eigen::VectorXd::Zero(7)); }
+  std::vector<Observation> seen_;
+};
+
+TEST_F(PictureLogOfOwnRobot, HoldsThePicturesInOrderOfTheirOwnTimes) {
+  seen_[1].cameras[0]->utime = 2'000'500;  // left a little later than right
+  const auto log = log_of(seen_);
+  ASSERT_EQ(log->pictures().size(), 4u);
+  const std::vector<std::size_t> cameras = {0, 1, 1, 0};
+  for (std::size_t p = 0; p < 4; ++p) {
+    EXPECT_EQ(log->pictures()[p].camera, cameras[p]) << p;
+    if (p > 0) {
+      EXPECT_GE(log->pictures()[p].joints.utime, log->pictures()[p - 1].joints.utime);
+    }
+  }
+}
+
+/// A simulator at rest, a driver that publishes twice: the same outlines at the same readings say nothing new.
+TEST_F(PictureLogOfOwnRobot, LeavesOutWhatRepeatsTheLast) {
+  PictureLog log(robot_, setup_, rig_);
+  for (int i = 0; i < 5; ++i) {
+    seen_[0].utime += 33'000;
+    for (auto& camera : seen_[0].cameras) camera->utime += 33'000;
+    log.add(seen_[0]);
+  }
+  EXPECT_EQ(log.pictures().size(), 2u);
+  // Noise moves an edge by a hair: a picture of its own.
+  seen_[0].cameras[1]->coverage[5000] ^= 1;
+  log.add(seen_[0]);
+  EXPECT_EQ(log.pictures().size(), 4u);
+  // The arm has moved a little, the outline not.
+  seen_[0].cameras[0]->joints.q[0] += 1e-4;
+  log.add(seen_[0]);
+  EXPECT_EQ(log.pictures().size(), 6u);
+}
+
+TEST_F(PictureLogOfOwnRobot, ACameraWithoutAMaskHasNoPicture) {
+  seen_[0].cameras[0]->mask = BinaryMask();
+  seen_[1].cameras[1].reset();
+  const auto log = log_of(seen_);
+  ASSERT_EQ(log->pictures().size(), 2u);
+  EXPECT_EQ(log->pictures()[0].camera, 1u);
+  EXPECT_EQ(log->pictures()[1].camera, 0u);
+}
+
+/// Whatever was published: the arm's motion is that of its readings, once each.
+TEST_F(PictureLogOfOwnRobot, MotionComesFromTheEncoders) {
+  const auto elbow = roles_.index("r_elbow");
+  PictureLog log(robot_, setup_, rig_);
+  seen_[0].encoders.clear();
+  for (Microseconds t = 500'000; t <= 1'500'000; t += 10'000) {
+    JointSample sample = seen_[0].cameras[0]->joints;
+    sample.utime = t;
+    sample.q[elbow] += 0.3 * seconds(t - 1'000'000);
+    sample.qdot.setConstant(77.0);
+    seen_[0].encoders.push_back(sample);
+  }
+  log.add(seen_[0]);
+  seen_[1].encoders = seen_[0].encoders;  // the same again
+  log.add(seen_[1]);
+  log.finish();
+  EXPECT_EQ(log.encoders().size(), 101u);
+  EXPECT_NEAR(log.pictures()[0].joints.qdot[elbow], 0.3, 1e-3);
+  EXPECT_NEAR(log.pictures()[0].joints.qdot[roles_.arm[0]], 0.0, 1e-9);
+  EXPECT_EQ(log.pictures()[3].joints.qdot.cwiseAbs().maxCoeff(), 0.0) << "no readings near";
+}
+
+}  // namespace
+}  // namespace bodyschema
