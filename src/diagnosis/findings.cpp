@@ -224,6 +224,34 @@ void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candi
   exclude(log, all, candidates);
 }
 
+bool Findings::is_small(const LogAbout& log, const BlockRegression& all, std::size_t cause) {
+  const auto& found = search_.causes()[cause];
+  if (!found.small || found.name.joint.empty()) return found.small;
+  std::vector<Eigen::Index> columns;
+  std::size_t pieces = 0;
+  for (std::size_t c = 0; c < search_.causes().size(); ++c) {
+    const auto& other = search_.causes()[c];
+    if (other.name.joint != found.name.joint) continue;
+    if (!other.small) return true;  // that one says what is wrong with the joint
+    const auto more = search_.columns_of(c);
+    columns.insert(columns.end(), more.begin(), more.end());
+    ++pieces;
+  }
+  if (pieces < 2) return true;
+  const Eigen::VectorXd amount = values_of(search_, columns) + all.step()(columns);
+  const auto joints = search_.state().joints();
+  Eigen::MatrixXd H = all.precision().head(joints).asDiagonal(), B = Eigen::MatrixXd::Zero(joints, amount.size());
+  for (const auto& block : all.parts()) {
+    H += block.H.topLeftCorner(joints, joints);
+    B += block.H.topRows(joints)(Eigen::all, columns);
+  }
+  std::vector<std::vector<Direction>> directions(log.base.size());
+  for (std::size_t p = 0; p < directions.size(); ++p) {
+    for (const auto i : columns) directions[p].push_back(log.base[p][static_cast<std::size_t>(i)]);
+  }
+  return search_.size_of(log, directions, amount, -H.ldlt().solve(B * amount)).metres() < options_.matters_m;
+}
+
 void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates) {
   const auto& state = search_.state();
   const double loss = all.heldout().loss.sum();
@@ -258,7 +286,7 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, 
       }
       find_class(all, c, candidates, cause);
     }
-    (found.small ? report_.small_causes : report_.causes).push_back(std::move(cause));
+    (is_small(log, all, c) ? report_.small_causes : report_.causes).push_back(std::move(cause));
   }
   report_.matters_mm = 1e3 * options_.matters_m;
   std::stable_sort(report_.causes.begin(), report_.causes.end(),

@@ -38,6 +38,8 @@ class Findings {
   /// What is left of every picture, predicted from the other blocks.
   HeldoutError remainders(const LogAbout& log, const BlockRegression& base, Which which);
   void describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
+  /// Whether a cause moves less than what matters, all else that was found of its joint together with it.
+  [[nodiscard]] bool is_small(const LogAbout& log, const BlockRegression& all, std::size_t cause);
   void find_class(const BlockRegression& all, std::size_t cause, const std::vector<Candidate>& candidates,
                   DiagnosedCause& out);
   void exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);

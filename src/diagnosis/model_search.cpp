@@ -259,7 +259,9 @@ void ModelSearch::group_blocks(LogAbout& log) const {
   for (const auto& picture : fit_.log().pictures()) {
     const Eigen::VectorXd q = posture_of(picture.joints.q, state_.model().roles());
     const double t = seconds(picture.joints.utime);
-    const bool jumped = last.size() > 0 && (q - last).cwiseAbs().maxCoeff() > limits::kJump_rad;
+    // Where postures beside each other err alike they go into one block.
+    const bool jumped = last.size() > 0 && log.block_s <= options_.block_s &&
+                        (q - last).cwiseAbs().maxCoeff() > limits::kJump_rad;
     const bool moved = begin.size() == 0 || (q - begin).cwiseAbs().maxCoeff() > options_.same_posture_rad;
     if (begin.size() == 0 || jumped || (moved && t - begin_s >= log.block_s)) {
       begin = q;

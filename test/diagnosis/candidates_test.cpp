@@ -170,9 +170,10 @@ TEST_F(Candidates, BlocksEndWhereTheArmHasMoved) {
   const auto about = search_.about(1.0);
   ASSERT_EQ(about.block_of.size(), log_.pictures().pictures().size());
   EXPECT_GE(about.blocks, 8u);
-  EXPECT_LE(about.blocks, 16u);
   EXPECT_TRUE(std::is_sorted(about.block_of.begin(), about.block_of.end()));
-  EXPECT_LT(search_.about(4.0).blocks, 5u);
+  // Longer ones are fewer, however far the arm went from picture to picture: that ended every block, and a diagnosis
+  // whose neighbouring blocks erred alike never came to an end.
+  EXPECT_LE(search_.about(4.0).blocks, 4u);
   const auto [first, last] = seen_span(log_.fit(), about.at);
   EXPECT_NEAR(last - first, 13.5, 1.0);
 }
