@@ -199,6 +199,10 @@ void run_real(ExperimentContext& context) {
     context.table += fmt::format("{:<34} {:>6} {:>7.3f} {:>7.3f} {:>7.2f} {:>6.2f} {:>5} {:>8.1f} {:>8.2f} {:>3}/{}\n",
                                  demand.name, f.trials, rms, repeat, f.worst_z, rms_z, f.fewest_told, f.camera_mm,
                                  f.camera_deg, f.good, f.trials);
+    for (std::size_t t = 0; t < list.size(); ++t) {
+      if (list[t].calibration.state == CalibrationState::kGood) continue;
+      context.table += fmt::format("  seed {}: {}\n", context.options.seed + t, list[t].calibration.sentence);
+    }
     context.table += fmt::format("{:<34} {:>6} {:>7.3f} {:>7.3f} {:>7.2f} {:>6} {:>5} {:>8.1f} {:>8.2f}\n", "  demanded", "",
                                  demand.rms_deg, demand.repeat_deg, 2.5, "", 4, 15.0, 0.7);
     context.summary["real"][demand.set] = {{"trials", f.trials},         {"rms_deg", rms},
