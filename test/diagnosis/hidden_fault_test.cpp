@@ -1,35 +1,80 @@
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <iostream>
-
+#include "answers.hpp"
 #include "random_seed.hpp"
 #include "simulated_log.hpp"
 
+/// The simulator's physics hide something in a log of masks; the diagnosis gets the log alone.
 namespace bodyschema {
 namespace {
 
-TEST(Explore, One) {
-  test::Simulated what;
-  if (const char* s = std::getenv("X_SEED")) what.seed = std::atoi(s);
-  if (const char* s = std::getenv("X_S")) what.seconds = std::atof(s);
-  if (const char* s = std::getenv("X_HEAD")) what.head_moves = std::atoi(s);
-  if (const char* f = std::getenv("X_FAULTS")) {
-    std::string text = f;
-    for (std::size_t at = 0; at < text.size();) {
-      const auto end = std::min(text.find(' ', at), text.size());
-      if (end > at) what.faults.push_back(text.substr(at, end - at));
-      at = end + 1;
-    }
+using test::expect_size;
+using test::found;
+
+DiagnosisReport answer(const std::vector<std::string>& faults, test::Simulated what = {}) {
+  what.seed = test::seed();
+  what.faults = faults;
+  return test::SimulatedLog(what).diagnosis();
+}
+
+TEST(HiddenFault, NothingIsNone) {
+  const auto report = answer({});
+  EXPECT_EQ(report.verdict, "none") << report.sentence;
+  EXPECT_TRUE(report.causes.empty()) << report.sentence;
+  EXPECT_LT(report.after.rms_px, 0.5);
+  ASSERT_FALSE(report.exclusion_limits.empty());
+  EXPECT_GT(report.blocks, 20u);
+  // The offsets are those that were hidden, within what is claimed of them.
+  for (const auto& [joint, offset] : test::Simulated{}.offsets_deg) {
+    const auto& ci = report.offsets_ci95_deg.at(joint);
+    EXPECT_NEAR(report.offsets_deg_after.at(joint), offset, ci[1] - ci[0]) << joint;
   }
-  test::SimulatedLog log(what);
-  const auto r = log.diagnosis();
-  std::cout << (std::getenv("X_FAULTS") ? std::getenv("X_FAULTS") : "healthy") << " => " << r.verdict << " | " << r.sentence << " | rms " << r.before.rms_px << " > " << r.after.rms_px << " crowded " << r.crowded << " " << (r.warnings.empty() ? "" : r.warnings[0]);
-  std::cout << " found " << r.after.outline_found << " seen " << r.after.outline_where_seen << " thr " << r.z_threshold << " blocks " << r.blocks;
-  for (auto& c : r.small_causes) std::cout << " small: " << c.sentence;
-  for (auto& b : r.bars) if (b.z_before > 3.5) std::cout << " " << b.label << " " << b.z_before << ">" << b.z_after;
-  for (auto& c : r.causes) { std::cout << " z " << c.z << " gain " << c.heldout_gain; for (auto& p : c.parameters) std::cout << " " << p.parameter << " " << p.estimate << " [" << p.ci95[0] << "," << p.ci95[1] << "]"; }
-  std::cout << std::endl;
+}
+
+TEST(HiddenFault, AHandLargerThanItsMeshesIsNamedByItsPart) {
+  const auto report = answer({"mesh_scale:part=hand,value=6"});
+  EXPECT_TRUE(test::is_named(report)) << report.sentence;
+  EXPECT_TRUE(test::names_only_part(report, "r_hand")) << report.sentence;
+  expect_size(report, {"mesh_scale", "", "r_hand"}, "scale", 6.0);
+}
+
+TEST(HiddenFault, AThickerCoverIsNamedByItsPart) {
+  const auto report = answer({"cover_dilation:part=forearm,value=2"});
+  EXPECT_TRUE(test::is_named(report)) << report.sentence;
+  EXPECT_TRUE(test::names_only_part(report, "r_forearm")) << report.sentence;
+}
+
+/// About its line of sight, where no joint offset makes up for it.
+TEST(HiddenFault, ATurnedCameraIsNamed) {
+  const auto report = answer({"camera_rotation:source=left,axis=z,value=0.7"});
+  EXPECT_TRUE(test::is_named(report)) << report.sentence;
+  ASSERT_EQ(report.causes.size(), 1u) << report.sentence;
+  expect_size(report, {"camera_pair", "", ""}, "turn_z", -0.7);  // the right one against the left
+}
+
+TEST(HiddenFault, ASlipAndALatencyTogetherAreBothFound) {
+  const auto report = answer({"slip:joint=r_elbow,value=2,at=20", "latency:value=40"});
+  EXPECT_EQ(report.causes.size(), 2u) << report.sentence;
+  expect_size(report, {"latency", "", ""}, "delay", 40.0);
+  expect_size(report, {"slip", "r_elbow", ""}, "step", 2.0);
+  const auto* slip = found(report, {"slip", "r_elbow", ""});
+  ASSERT_NE(slip, nullptr);
+  EXPECT_NEAR(seconds(*slip->parameters[0].from - report.begin_utime), 20.0, 0.5);
+}
+
+TEST(HiddenFault, AJointThatSwaysIsUnexplained) {
+  const auto report = answer({"wobble:joint=r_shoulder_roll,value=1,period=6"});
+  EXPECT_EQ(report.verdict, "unexplained") << report.sentence;
+  ASSERT_FALSE(report.causes.empty());
+  EXPECT_EQ(report.causes.front().cause.joint, "r_shoulder_roll") << report.sentence;
+  EXPECT_TRUE(report.exclusion_limits.empty());
+}
+
+/// Offsets fitted one part of the log, the outlines of the other lay beyond the search: nothing was found.
+TEST(HiddenFault, AFarSlipIsFound) {
+  const auto report = answer({"slip:joint=r_elbow,value=-12,at=15"});
+  EXPECT_EQ(report.verdict, "named") << report.sentence;
+  expect_size(report, {"slip", "r_elbow", ""}, "step", -12.0);
 }
 
 }  // namespace

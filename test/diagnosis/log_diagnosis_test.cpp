@@ -1,0 +1,66 @@
+#include "bodyschema/diagnosis/log_diagnosis.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "answers.hpp"
+#include "bodyschema/core/error.hpp"
+#include "picture_log.hpp"
+
+namespace bodyschema {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using Settings = simulator::SimulatorSettings;
+using Plan = simulator::SimulationPlan;
+
+TEST(LogDiagnosis, RefusesSwappedPictures) {
+  const test::RenderedLog log([](Settings&, Plan& plan) { plan.seconds = 12.0; },
+                              [](auto& frame, double) { std::swap(frame.cameras[0]->image, frame.cameras[1]->image); });
+  EXPECT_THAT([&] { (void)log.diagnosis(); },
+              ::testing::ThrowsMessage<DataError>(HasSubstr("the left and right pictures are swapped")));
+}
+
+/// No outline that the model predicts has a counterpart on the stick, so that no residual shows it: the answer was none.
+TEST(LogDiagnosis, AStickInTheHandIsSeen) {
+  const test::RenderedLog log(
+      [](Settings&, Plan& plan) { plan.faults = {simulator::FaultSpec::parse("held:thing=stick")}; });
+  const auto report = log.diagnosis();
+  EXPECT_EQ(report.verdict, "unexplained") << report.sentence;
+  EXPECT_THAT(report.not_in_model, HasSubstr("beside the robot"));
+  EXPECT_THAT(report.sentence, HasSubstr(report.not_in_model));
+}
+
+/// The head turns before a room and pictures are JPEG: a learned background is of no use.
+TEST(LogDiagnosis, DoesWithoutALearnedBackgroundWhereTheHeadTurnsAndWarnsOfPicturesNotUsed) {
+  const test::RenderedLog log(
+      [](Settings& settings, Plan&) {
+        settings.clutter = settings.head_moves = true;
+        settings.jpeg_quality = 70;
+      },
+      [](auto& frame, double share) {
+        if (share > 0.8) frame.encoders.clear();
+      });
+  const auto report = log.diagnosis();
+  EXPECT_THAT(report.warnings, Contains(HasSubstr("as by vision.method: statistics")));
+  EXPECT_THAT(report.warnings, Contains(HasSubstr("pictures are not used: ")));
+  EXPECT_EQ(report.verdict, "none") << report.sentence;
+  EXPECT_LT(report.after.rms_px, 1.3) << "with a learned background it is 2";
+}
+
+TEST(LogDiagnosis, OfAHealthyLogSaysNothingOfMethodsAndLostPictures) {
+  const test::RenderedLog log([](Settings&, Plan&) {});
+  const auto report = log.diagnosis();
+  EXPECT_EQ(report.verdict, "none") << report.sentence;
+  EXPECT_THAT(report.warnings, Not(Contains(HasSubstr("vision.method"))));
+  EXPECT_THAT(report.warnings, Not(Contains(HasSubstr("not used"))));
+  EXPECT_TRUE(report.not_in_model.empty()) << report.not_in_model;
+  // No picture places a flank nearer than the floor, however many there are.
+  ASSERT_EQ(report.offsets_ci95_deg.size(), 7u);
+  for (const auto& [joint, ci] : report.offsets_ci95_deg) EXPECT_GT(0.5 * (ci[1] - ci[0]), 0.02) << joint;
+}
+
+}  // namespace
+}  // namespace bodyschema
