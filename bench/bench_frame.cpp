@@ -72,8 +72,8 @@ const Reach& reach(Size size) {
 }
 
 /// Frames of the reach in turn, as the service gets them.
-void whole_frame(benchmark::State& state, const std::string& engine, const std::string& mode, Size size,
-                 int particles, bool ahead) {
+void whole_frame(benchmark::State& state, const std::string& engine, const std::string& mode, Size size, int particles,
+                 bool ahead) {
   Pipeline pipeline(configuration(engine, mode, size, particles));
   for (Observation observation : reach(size).background) pipeline.process(observation);
   // The first frames search; what counts is the frame of a running service.
@@ -134,8 +134,9 @@ void jpeg(benchmark::State& state, Size size) {
 
 void register_all() {
   for (const Size size : {Size{320, 240}, Size{640, 480}, Size{1280, 720}}) {
-    benchmark::RegisterBenchmark(("jpeg/" + size.text()).c_str(), [=](benchmark::State& state) { jpeg(state, size); })
-        ->Unit(benchmark::kMillisecond);
+    benchmark::RegisterBenchmark(("jpeg/" + size.text()).c_str(), [=](benchmark::State& state) {
+      jpeg(state, size);
+    })->Unit(benchmark::kMillisecond);
   }
   for (const std::string engine : {"contour", "atlas"}) {
     for (const std::string mode : {"best", "paper"}) {

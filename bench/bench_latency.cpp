@@ -122,9 +122,17 @@ struct Size {
 /// The tests' reach in other pictures: compressed, by the sender beforehand.
 std::filesystem::path log_of(Size size, const std::filesystem::path& folder) {
   const auto file = folder / "reach.lcmlog";
-  std::vector<std::string> command{"bodyschema-sim", "--config",
+  std::vector<std::string> command{"bodyschema-sim",
+                                   "--config",
                                    std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/simulator.yaml",
-                                   "--frames", "60", "--seed", "7", "--pictures", "jpeg", "--log", file.string()};
+                                   "--frames",
+                                   "60",
+                                   "--seed",
+                                   "7",
+                                   "--pictures",
+                                   "jpeg",
+                                   "--log",
+                                   file.string()};
   for (const auto& argument : size.arguments()) command.push_back(argument);
   Process simulator(command, folder);
   if (simulator.wait(Seconds(300)) != 0) throw std::runtime_error("bodyschema-sim failed: " + simulator.err());

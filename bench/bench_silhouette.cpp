@@ -239,8 +239,8 @@ void register_all() {
         }
 #ifdef BODYSCHEMA_BENCH_SEARCH
         benchmark::RegisterBenchmark(
-            ("contour+search/" + triangles + "/" + std::to_string(size.width) + "x" + std::to_string(size.height) + "/" +
-             std::to_string(particles))
+            ("contour+search/" + triangles + "/" + std::to_string(size.width) + "x" + std::to_string(size.height) +
+             "/" + std::to_string(particles))
                 .c_str(),
             [=](benchmark::State& state) { score_at_level(state, triangles, size, particles); })
             ->MeasureProcessCPUTime()

@@ -19,7 +19,8 @@ void add_calibrate(CLI::App& app) {
   CLI::App* command = app.add_subcommand("calibrate", "Offsets, camera poses and intrinsics from a whole log");
   command->footer(
       "Example:\n  bodyschema calibrate stills.log --config out/robot/estimator.yaml --out out/calibration\n\n"
-      "Exit status: 0 when the calibration is good, 3 when it is not (calibration.json, state and sentence, says why).");
+      "Exit status: 0 when the calibration is good, 3 when it is not (calibration.json, state and sentence, says "
+      "why).");
   command->add_option("log", a->log, "LCM log, of a moving arm or of stills (bodyschema import)")->required();
   command->add_option("-o,--out", a->out, "Folder for calibration.json, report.html, corrected.urdf, ...")->required();
   command->add_option("--rate", a->options.picture_rate_hz, "Pictures a second and camera that are looked at, at most")

@@ -143,8 +143,9 @@ void add_stills(CLI::App& import) {
   command->add_option("--camera-pose", a->camera_pose,
                       "camera_pose.json, or camera_pose.json:METHOD: writes LOG.cameras.yaml beside the log, for a "
                       "configuration to include. Never read otherwise");
-  command->add_option("--recorded-at", a->recorded_at_s,
-                      "When the first posture was taken, s since 1970; stamps begin at 0 without it")
+  command
+      ->add_option("--recorded-at", a->recorded_at_s,
+                   "When the first posture was taken, s since 1970; stamps begin at 0 without it")
       ->check(number_in(0.0, 8e9));
   command->callback([a] {
     const ImportTarget target = ImportTarget::from(a->source.load(), a->mapping);
@@ -213,13 +214,13 @@ void run_ros_bag(const BagArguments& a) {
   for (const auto& [key, topic] : a.sides) {
     const auto dash = key.find('-');
     if (!topic.empty()) {
-      (dash == std::string::npos ? options.pictures : options.masks)[key.substr(dash == std::string::npos ? 0 : dash + 1)] = topic;
+      (dash == std::string::npos ? options.pictures
+                                 : options.masks)[key.substr(dash == std::string::npos ? 0 : dash + 1)] = topic;
     }
   }
   const ImportTarget target = ImportTarget::from(a.source.load(), a.mapping);
   LazyBar bar;
-  const auto summary =
-      import_ros_bag(a.source.recording, target, options, a.source.out, say_set_up, std::ref(bar));
+  const auto summary = import_ros_bag(a.source.recording, target, options, a.source.out, say_set_up, std::ref(bar));
   bar.end();
   std::fputs(summary.text(a.source.out).c_str(), stdout);
 }

@@ -46,7 +46,8 @@ void add_new_robot(CLI::App& app) {
   command->add_option("--camera-info", a->camera_infos, "ROS CameraInfo as YAML, one for each camera in their order")
       ->expected(1)
       ->take_all();
-  command->add_flag("--rectified", a->options.rectified, "The pictures are rectified: P of the CameraInfo counts, not K");
+  command->add_flag("--rectified", a->options.rectified,
+                    "The pictures are rectified: P of the CameraInfo counts, not K");
   command->add_option("--camera-pose", a->options.camera_pose,
                       "camera_pose.json, or camera_pose.json:METHOD: poses of the cameras, taken as known");
   command->add_option("--size", a->size, "Size of the pictures in px, WIDTHxHEIGHT (default 640x480)");

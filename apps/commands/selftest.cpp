@@ -37,8 +37,9 @@ void add_selftest(CLI::App& app) {
   command->callback([a] {
     set_up_logging("error");
     if (a->bench) {
-      std::fputs(engine_table(find_data_file(a->config.empty() ? "config/icub_right/estimator.yaml" : a->config)).c_str(),
-                 stdout);
+      std::fputs(
+          engine_table(find_data_file(a->config.empty() ? "config/icub_right/estimator.yaml" : a->config)).c_str(),
+          stdout);
       return;
     }
     SelfTestOptions options;

@@ -53,7 +53,7 @@ std::string size_text(int width, int height) {
 
 std::string_view name_of(MessageFault fault) {
   static constexpr std::array<std::string_view, kMessageFaultCount> kNames{
-      "none",      "wrong_type", "truncated",  "trailing_bytes",     "bad_count",      "too_large", "bad_text",
+      "none",      "wrong_type", "truncated",  "trailing_bytes",     "bad_count",      "too_large",  "bad_text",
       "bad_stamp", "not_finite", "wrong_size", "unsupported_format", "broken_picture", "other_kind", "bad_mask"};
   return kNames[static_cast<std::size_t>(fault)];
 }

@@ -118,8 +118,7 @@ ObservationStream::ObservationStream(const std::vector<std::string>& joint_names
       throw ConfigurationError("cameras: '" + camera.name +
                                "': a rig is one camera or two, the one with the smaller number in messages first");
     }
-    cameras_.push_back(
-        {camera.name, camera.number(), camera.intrinsics.width, camera.intrinsics.height, 0, false, 0});
+    cameras_.push_back({camera.name, camera.number(), camera.intrinsics.width, camera.intrinsics.height, 0, false, 0});
   }
 }
 
@@ -249,8 +248,8 @@ void ObservationStream::receive_masks(Bytes message, std::int64_t arrival_us) {
       DecodeResult unpacked;
       if (view.width != camera.width || view.height != camera.height) {
         unpacked = {MessageFault::kBadMask, "mask of " + std::to_string(view.width) + "x" +
-                                                  std::to_string(view.height) + ", its pictures are " +
-                                                  std::to_string(camera.width) + "x" + std::to_string(camera.height)};
+                                                std::to_string(view.height) + ", its pictures are " +
+                                                std::to_string(camera.width) + "x" + std::to_string(camera.height)};
       } else if (view.pixelformat == bot_core::image_t::PIXEL_FORMAT_MJPEG) {
         unpacked = {MessageFault::kBadMask, "mask as JPEG, which changes its values; expected raw gray"};
       } else {

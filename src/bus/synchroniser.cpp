@@ -11,10 +11,9 @@ constexpr int kStepEvidence = 3;
 }  // namespace
 
 std::string_view name_of(DropReason reason) {
-  static constexpr std::array<std::string_view, kDropReasonCount> kNames{"unpaired",    "no_encoders",  "missing_joint",
-                                                                         "encoder_gap", "encoder_jump", "clock_step",
-                                                                         "overload",    "out_of_order", "duplicate",
-                                                                         "no_mask"};
+  static constexpr std::array<std::string_view, kDropReasonCount> kNames{
+      "unpaired",   "no_encoders", "missing_joint", "encoder_gap", "encoder_jump",
+      "clock_step", "overload",    "out_of_order",  "duplicate",   "no_mask"};
   return kNames[static_cast<std::size_t>(reason)];
 }
 

@@ -30,9 +30,11 @@ constexpr std::size_t kPlaces = 5;  ///< places of a searched camera that are tr
 /// Statistical. A place of the camera is taken for the only one where the next best fits this much worse: silhouettes
 /// of a wrong place are off by a third, of the right one by what masks get wrong.
 constexpr double kOnly = 1.25;
+constexpr double kAlone = 1e9;          ///< no other place was found at all
+constexpr double kSameAnswer_m = 0.02;  ///< physical, of the hand in the camera's frame, mean over the pictures
 /// Physical. Less of the outline found than this, and it is somebody else's.
 constexpr double kLeastFound = 0.6;
-constexpr double kNear_px = 2.5;            ///< physical, px of a 320x240 picture: residuals of outlines that belong together
+constexpr double kNear_px = 2.5;  ///< physical, px of a 320x240 picture: residuals of outlines that belong together
 constexpr double kBeyondBelief_sd = 4.0;    ///< statistical
 constexpr double kDisagreement = 4.0;       ///< statistical: mean NIS per direction
 constexpr std::size_t kFewestPostures = 3;  ///< fewer cannot disagree
@@ -54,11 +56,9 @@ class Calibrator {
   }
 
   Calibration run() {
-    WatchedLog watched = watch_log(pipeline_, {.log = options_.log,
-                                               .picture_rate_hz = options_.picture_rate_hz,
-                                               .kept = 12,
-                                               .quiet = options_.quiet},
-                                   false);
+    WatchedLog watched = watch_log(
+        pipeline_,
+        {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .kept = 12, .quiet = options_.quiet}, false);
     refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);
     log_ = &watched.pictures;
     if (!options_.quiet) bar_.emplace("calibration", 100);
@@ -91,17 +91,19 @@ class Calibrator {
     for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
       if (!to_be_searched(rig_.cameras[c])) continue;
       if (pipeline_.masks_need_estimates()) {
-        throw DataError(fmt::format("{}: camera '{}' is to be found, which takes masks of the robot, and vision.method "
-                                    "statistics makes none before it is known where the robot is; give masks (vision.method: "
-                                    "given) or say roughly where the camera is (cameras.{}.pose: roughly)",
-                                    options_.log.string(), rig_.cameras[c].name, rig_.cameras[c].name));
+        throw DataError(
+            fmt::format("{}: camera '{}' is to be found, which takes masks of the robot, and vision.method "
+                        "statistics makes none before it is known where the robot is; give masks (vision.method: "
+                        "given) or say roughly where the camera is (cameras.{}.pose: roughly)",
+                        options_.log.string(), rig_.cameras[c].name, rig_.cameras[c].name));
       }
       CameraSearch search(*log_, threads_of(options_));
       const auto places = search.find(c, kPlaces);
       if (places.empty()) {
-        throw DataError(fmt::format("{}: camera '{}' is to be found, and saw the robot in fewer than three postures; "
-                                    "record the arm{}",
-                                    options_.log.string(), rig_.cameras[c].name, kAdvice));
+        throw DataError(
+            fmt::format("{}: camera '{}' is to be found, and saw the robot in fewer than three postures; "
+                        "record the arm{}",
+                        options_.log.string(), rig_.cameras[c].name, kAdvice));
       }
       if (places.size() > 1) ambiguity_ = std::max(ambiguity_, places[0].distance / places[1].distance);
       std::vector<StereoRig> rigs;
@@ -142,21 +144,42 @@ class Calibrator {
   BatchFit fitted(LogFit& fit, const std::vector<StereoRig>& starts, const std::vector<std::size_t>& pictures) {
     std::optional<BatchFit> best;
     StereoRig best_rig;
-    double second = 1e9;
+    std::vector<std::pair<double, std::vector<Eigen::Vector3d>>> answers;
+    std::size_t best_answer = 0;
     for (const auto& rig : starts) {
       use(fit, rig);
       BatchFit batch = from(fit, pictures, kFrom_px);
-      if (!best || batch.misfit() < best->misfit()) {
-        if (best) second = std::min(second, best->misfit());
-        best.emplace(std::move(batch));
-        best_rig = rig;
-      } else {
-        second = std::min(second, batch.misfit());
-      }
+      answers.emplace_back(batch.misfit(), hands(fit, batch));
+      if (best && batch.misfit() >= best->misfit()) continue;
+      best.emplace(std::move(batch));
+      best_rig = rig;
+      best_answer = answers.size() - 1;
     }
     use(fit, best_rig);
-    if (starts.size() > 1) only_ = second / std::max(1e-9, best->misfit());
+    only_ = kAlone;
+    for (const auto& [misfit, places] : answers) {
+      // Two starts that end at one answer are no rivals.
+      if (apart(places, answers[best_answer].second) < kSameAnswer_m) continue;
+      only_ = std::min(only_, misfit / std::max(1e-9, best->misfit()));
+    }
     return std::move(*best);
+  }
+
+  /// Where the answer has the hand in each picture: all that is seen of an answer, whatever it is made of.
+  std::vector<Eigen::Vector3d> hands(LogFit& fit, const BatchFit& batch) const {
+    auto& projection = fit.measurement().projection();
+    std::vector<Eigen::Vector3d> places;
+    for (std::size_t p = 0; p < log_->pictures().size(); ++p) {
+      const auto& picture = log_->pictures()[p];
+      projection.place(picture.joints.q, batch.at().corrections[p], picture.camera);
+      places.push_back(projection.hand().translation());
+    }
+    return places;
+  }
+  static double apart(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b) {
+    double sum = 0.0;
+    for (std::size_t p = 0; p < a.size(); ++p) sum += (a[p] - b[p]).norm();
+    return sum / static_cast<double>(std::max<std::size_t>(1, a.size()));
   }
 
   /// What the log asks for besides: causes that a diagnosis of it names become part of the state.
@@ -239,8 +262,8 @@ class Calibrator {
             {p.name, p.unit, x[k] / p.si_per_unit, sd[k] / p.si_per_unit, p.prior_sd / p.si_per_unit});
       }
     }
-    result_.pictures = static_cast<std::size_t>(std::count_if(
-        batch.at().evidence.begin(), batch.at().evidence.end(), [](const auto& e) { return e.weight > 0.0; }));
+    result_.pictures = static_cast<std::size_t>(std::count_if(batch.at().evidence.begin(), batch.at().evidence.end(),
+                                                              [](const auto& e) { return e.weight > 0.0; }));
     result_.postures = batch.memory().postures();
     result_.dispersion = batch.memory().dispersion();
     result_.posture_sd_rad = batch.memory().posture_sd_rad();
@@ -365,9 +388,8 @@ class Calibrator {
     auto& measurement = fit.measurement();
     for (std::size_t p = 0; p < log_->pictures().size(); ++p) {
       if (log_->pictures()[p].camera != 0) continue;
-      const auto motion =
-          measurement.link_jacobian(log_->pictures()[p].joints.q, batch.at().corrections[p], 0, batch.at().coordinates,
-                                    measurement.projection().hand_link());
+      const auto motion = measurement.link_jacobian(log_->pictures()[p].joints.q, batch.at().corrections[p], 0,
+                                                    batch.at().coordinates, measurement.projection().hand_link());
       Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, state.size());
       for (Eigen::Index k = 0; k < state.size(); ++k) {
         for (const auto& step : directions[p][static_cast<std::size_t>(k)]) {
@@ -452,8 +474,8 @@ class Calibrator {
       if (!joint.told) untold += (untold.empty() ? "" : ", ") + joint.name;
     }
     say(CalibrationState::kGood,
-        fmt::format("Good: {} of {} joints told; the hand is known to {:.1f} mm in the camera's frame (one sigma){}.", told,
-                    result_.joints.size(), 1e3 * result_.hand_sd_m,
+        fmt::format("Good: {} of {} joints told; the hand is known to {:.1f} mm in the camera's frame (one sigma){}.",
+                    told, result_.joints.size(), 1e3 * result_.hand_sd_m,
                     untold.empty() ? "" : "; not told, and not to be applied: " + untold));
   }
 
@@ -467,9 +489,10 @@ class Calibrator {
     }
     if (worst < 0) return {};
     const auto& p = state.parameters()[static_cast<std::size_t>(worst)];
-    return fmt::format("Model misfit: the pictures ask for {} {:.3g} {}, {:.0f} times what is believed possible; "
-                       "something else is wrong with robot or cameras (estimator.state says what is believed).",
-                       p.name, state.x()[worst] / p.si_per_unit, p.unit, std::abs(away[worst]));
+    return fmt::format(
+        "Model misfit: the pictures ask for {} {:.3g} {}, {:.0f} times what is believed possible; "
+        "something else is wrong with robot or cameras (estimator.state says what is believed).",
+        p.name, state.x()[worst] / p.si_per_unit, p.unit, std::abs(away[worst]));
   }
 
   /// The posture that would tell most of what is told worst.
@@ -490,7 +513,7 @@ class Calibrator {
   PictureLog* log_ = nullptr;
   std::vector<StereoRig> starts_;
   double ambiguity_ = 0.0;
-  double only_ = 1e9;  ///< misfit of the second best place over that of the best
+  double only_ = kAlone;  ///< misfit of the second best place over that of the best
   Calibration result_;
   std::optional<ProgressBar> bar_;
 };

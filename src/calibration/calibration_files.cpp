@@ -48,7 +48,8 @@ Json to_json(const Calibration& c, const std::string& root) {
   for (const auto& camera : c.cameras) {
     auto& entry = json["cameras"][camera.name];
     entry["link"] = camera.link;
-    entry[camera.link == root ? "X_base_optical" : "X_" + camera.link + "_optical"] = matrix_json(camera.X_link_optical);
+    entry[camera.link == root ? "X_base_optical" : "X_" + camera.link + "_optical"] =
+        matrix_json(camera.X_link_optical);
     entry["estimated"] = camera.estimated;
     entry["sd_mm"] = 1e3 * camera.sd_m;
     entry["sd_deg"] = degrees(camera.sd_rad);
@@ -142,9 +143,10 @@ std::vector<RosCamera> ros_cameras_of(const Calibration& c, const StereoRig& rig
   std::vector<RosCamera> cameras;
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     const auto& camera = c.cameras[i];
-    const bool as_in_urdf = camera.link == rig.cameras[i].link && camera.X_link_optical.isApprox(Pose::Identity(), 1e-12);
-    cameras.push_back({camera.name, rig.cameras[i].intrinsics, rig.cameras[i].distortion,
-                       as_in_urdf ? "" : camera.link, camera.X_link_optical});
+    const bool as_in_urdf =
+        camera.link == rig.cameras[i].link && camera.X_link_optical.isApprox(Pose::Identity(), 1e-12);
+    cameras.push_back({camera.name, rig.cameras[i].intrinsics, rig.cameras[i].distortion, as_in_urdf ? "" : camera.link,
+                       camera.X_link_optical});
   }
   return cameras;
 }
@@ -154,7 +156,9 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
   Report page("Calibration of " + options.log.filename().string());
   page.verdict(c.sentence);
   page.heading("Offsets of the joints");
-  page.paragraph("encoder = true + offset; one standard deviation. What is not told keeps what was believed and is not to be applied.");
+  page.paragraph(
+      "encoder = true + offset; one standard deviation. What is not told keeps what was believed and is not to be "
+      "applied.");
   std::vector<std::vector<std::string>> rows;
   for (const auto& joint : c.joints) {
     rows.push_back({joint.name, fmt::format("{:.2f}", degrees(joint.offset_rad)),
@@ -174,8 +178,8 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
     page.heading("What else was estimated");
     rows.clear();
     for (const auto& p : c.parameters) {
-      rows.push_back({p.name, fmt::format("{:.3g}", p.value), fmt::format("{:.2g}", p.sd), fmt::format("{:.2g}", p.prior_sd),
-                      p.unit});
+      rows.push_back({p.name, fmt::format("{:.3g}", p.value), fmt::format("{:.2g}", p.sd),
+                      fmt::format("{:.2g}", p.prior_sd), p.unit});
     }
     page.table({"effect", "value", "sd", "sd believed before", "unit"}, rows);
   }
@@ -187,18 +191,22 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
   }
   page.heading("How well it fits");
   rows = {{"before", fmt::format("{:.2f}", c.outline_px.before)}, {"after", fmt::format("{:.2f}", c.outline_px.after)}};
-  if (c.outline_px.heldout) rows.push_back({"postures left out of the fit", fmt::format("{:.2f}", *c.outline_px.heldout)});
+  if (c.outline_px.heldout)
+    rows.push_back({"postures left out of the fit", fmt::format("{:.2f}", *c.outline_px.heldout)});
   page.table({"outline to outline, median", "px"}, rows);
-  page.paragraph(fmt::format(
-      "{} pictures of {} distinct postures. One point of an outline errs by {:.2f} px, {:.0f} neighbours alike; a posture "
-      "errs by {:.2f} deg per joint; postures disagree by {:.2f} times what is claimed.",
-      c.pictures, c.postures, c.outline_sd_px, c.outline_points_alike, degrees(c.posture_sd_rad),
-      std::sqrt(std::max(0.0, c.dispersion))));
+  page.paragraph(
+      fmt::format("{} pictures of {} distinct postures. One point of an outline errs by {:.2f} px, {:.0f} neighbours "
+                  "alike; a posture "
+                  "errs by {:.2f} deg per joint; postures disagree by {:.2f} times what is claimed.",
+                  c.pictures, c.postures, c.outline_sd_px, c.outline_points_alike, degrees(c.posture_sd_rad),
+                  std::sqrt(std::max(0.0, c.dispersion))));
   if (!c.next_posture_rad.empty()) {
     page.heading("What to record next");
     rows.clear();
-    for (const auto& [joint, angle] : c.next_posture_rad) rows.push_back({joint, fmt::format("{:.1f}", degrees(angle))});
-    page.paragraph("This posture would tell most of " + c.next_posture_for + ", of those drawn at random within the joints' limits and in view. Check it for collisions.");
+    for (const auto& [joint, angle] : c.next_posture_rad)
+      rows.push_back({joint, fmt::format("{:.1f}", degrees(angle))});
+    page.paragraph("This posture would tell most of " + c.next_posture_for +
+                   ", of those drawn at random within the joints' limits and in view. Check it for collisions.");
     page.table({"joint", "encoder, deg"}, rows);
   }
   page.heading("Pictures");
@@ -215,7 +223,8 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
       });
       if (picture == log.pictures().end()) continue;
       const auto& found = batch.at().corrections[static_cast<std::size_t>(picture - log.pictures().begin())];
-      views.push_back({&seen->image, preview.draw(picture->joints.q, nothing, k), preview.draw(picture->joints.q, found, k), {}});
+      views.push_back(
+          {&seen->image, preview.draw(picture->joints.q, nothing, k), preview.draw(picture->joints.q, found, k), {}});
     }
     if (views.empty()) continue;
     page.picture(draw_overlay(views, fmt::format("{:.1f} s", seconds(observation.utime - kept.front().utime)), 1,
@@ -258,20 +267,21 @@ std::string to_table(const Calibration& c) {
   }
   for (const auto& camera : c.cameras) {
     const Eigen::Vector3d p = camera.X_link_optical.translation();
-    text += fmt::format("\ncamera {:<16} at {:.4f} {:.4f} {:.4f} m in {}{}", camera.name, p.x(), p.y(), p.z(), camera.link,
-                        camera.estimated
-                            ? fmt::format(", known to {:.1f} mm and {:.2f} deg", 1e3 * camera.sd_m, degrees(camera.sd_rad))
-                            : ", as configured");
+    text += fmt::format(
+        "\ncamera {:<16} at {:.4f} {:.4f} {:.4f} m in {}{}", camera.name, p.x(), p.y(), p.z(), camera.link,
+        camera.estimated ? fmt::format(", known to {:.1f} mm and {:.2f} deg", 1e3 * camera.sd_m, degrees(camera.sd_rad))
+                         : ", as configured");
   }
   text += "\n";
   for (const auto& p : c.parameters) {
     if (p.name.starts_with("camera_")) continue;
-    text += fmt::format("\n{:<36} {:>9.3f} {:<3} sd {:.3f} (believed {:.3f})", p.name, p.value, p.unit, p.sd, p.prior_sd);
+    text +=
+        fmt::format("\n{:<36} {:>9.3f} {:<3} sd {:.3f} (believed {:.3f})", p.name, p.value, p.unit, p.sd, p.prior_sd);
   }
   for (const auto& effect : c.effects) text += "\nalso: " + effect.sentence;
-  text += fmt::format("\n\noutlines, median distance: {:.2f} px before, {:.2f} px after{}\n", c.outline_px.before,
-                      c.outline_px.after,
-                      c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out", *c.outline_px.heldout) : "");
+  text += fmt::format(
+      "\n\noutlines, median distance: {:.2f} px before, {:.2f} px after{}\n", c.outline_px.before, c.outline_px.after,
+      c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out", *c.outline_px.heldout) : "");
   if (!c.next_posture_rad.empty()) {
     text += "to tell " + c.next_posture_for + " better, record this posture as well (deg; check it for collisions):";
     for (const auto& [joint, angle] : c.next_posture_rad) text += fmt::format(" {} {:.0f}", joint, degrees(angle));

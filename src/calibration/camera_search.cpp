@@ -14,11 +14,11 @@
 namespace bodyschema {
 namespace {
 
-constexpr std::size_t kPostures = 6;      ///< that are looked at
-constexpr std::size_t kFewest = 3;        ///< fewer leave the distance open
-constexpr int kWidth_px = 128;            ///< pictures are looked at about this large
+constexpr std::size_t kPostures = 6;  ///< that are looked at
+constexpr std::size_t kFewest = 3;    ///< fewer leave the distance open
+constexpr int kWidth_px = 128;        ///< pictures are looked at about this large
 constexpr int kDirections = 160, kRolls = 12;
-constexpr std::size_t kSeeds = 30;        ///< places that are moved
+constexpr std::size_t kSeeds = 30;  ///< places that are moved
 constexpr int kRounds = 14, kSamples = 48, kElite = 8;
 
 /// A mask at a fraction of its size: pixels that are robot by more than half.
@@ -265,8 +265,7 @@ struct CameraSearch::Impl {
     std::vector<CameraPlace> seeds;
     for (const auto& place : places) {
       if (seeds.size() >= kSeeds) break;
-      const bool known =
-          std::any_of(seeds.begin(), seeds.end(), [&](const auto& seed) { return alike(seed, place); });
+      const bool known = std::any_of(seeds.begin(), seeds.end(), [&](const auto& seed) { return alike(seed, place); });
       if (!known) seeds.push_back(place);
     }
     for (std::size_t i = 0; i < seeds.size(); ++i) seeds[i] = narrowed(seeds[i], i);

@@ -54,7 +54,8 @@ std::optional<NextPosture> next_posture(LogFit& fit, const BatchFit& batch, cons
     Trial trial{log.pictures().front().joints.q, {}};
     for (const auto j : roles.arm) {
       const auto& info = joints[static_cast<std::size_t>(j)];
-      const double from = std::max(info.lower_rad, low[j] - kBeyond_rad), to = std::min(info.upper_rad, high[j] + kBeyond_rad);
+      const double from = std::max(info.lower_rad, low[j] - kBeyond_rad),
+                   to = std::min(info.upper_rad, high[j] + kBeyond_rad);
       trial.q[j] = std::uniform_real_distribution<double>(std::min(from, to), to)(random);
     }
     Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n);
@@ -89,8 +90,8 @@ std::optional<NextPosture> next_posture(LogFit& fit, const BatchFit& batch, cons
   for (Eigen::Index j = 0; j < state.joints(); ++j) order[static_cast<std::size_t>(j)] = j;
   std::sort(order.begin(), order.end(), [&](auto a, auto b) { return sd[a] > sd[b]; });
   for (const auto j : order) {
-    const auto best = std::min_element(trials.begin(), trials.end(),
-                                       [j](const auto& a, const auto& b) { return a.sd[j] < b.sd[j]; });
+    const auto best =
+        std::min_element(trials.begin(), trials.end(), [j](const auto& a, const auto& b) { return a.sd[j] < b.sd[j]; });
     if (best == trials.end() || best->sd[j] > kWorthIt * sd[j]) continue;
     NextPosture next;
     next.tells = state.parameters()[static_cast<std::size_t>(j)].name;

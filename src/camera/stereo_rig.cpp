@@ -34,10 +34,10 @@ Pose read_pose(const Configuration& section, const std::string& key) {
     const Configuration pose = section.section(key);
     X.translation() = three(pose, "xyz_m");
     const Eigen::Vector3d rpy = pose.has("rpy_rad") ? three(pose, "rpy_rad") : Eigen::Vector3d::Zero();
-    X.linear() = (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
-                  Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
-                  Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
-                     .toRotationMatrix();
+    X.linear() =
+        (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
+            .toRotationMatrix();
     return X;
   }
   const auto rows = section.rows(key);
@@ -75,7 +75,8 @@ CameraMount read_mount(const Configuration& section) {
     section.fail(pose_key, "the camera's pose in the other one, or 'pose: unknown'");
   }
   for (const char* sd : {"pose_sd_deg", "pose_sd_mm"}) {
-    if (section.has(sd) && mount.knowledge != PlaceKnowledge::kRoughly) section.fail(sd, "it only with 'pose: roughly'");
+    if (section.has(sd) && mount.knowledge != PlaceKnowledge::kRoughly)
+      section.fail(sd, "it only with 'pose: roughly'");
   }
   if (mount.knowledge == PlaceKnowledge::kRoughly) {
     mount.sd_rad = radians(section.number("pose_sd_deg", 1e-3, 90.0));
@@ -89,8 +90,8 @@ CameraModel read_camera(const Configuration& section, const std::string& name) {
   camera.name = name;
   camera.mount = read_mount(section);
   camera.place = section.place(camera.mount.relative ? "beside" : "link");
-  const bool is_link = !camera.mount.relative && !section.has("X_link_optical") &&
-                       camera.mount.knowledge != PlaceKnowledge::kUnknown;
+  const bool is_link =
+      !camera.mount.relative && !section.has("X_link_optical") && camera.mount.knowledge != PlaceKnowledge::kUnknown;
   camera.link = is_link ? camera.mount.parent : "camera:" + name;
   camera.image_type = static_cast<int>(section.has("image_type") ? section.integer("image_type", 0, 32'767) : -1);
   PinholeIntrinsics& k = camera.intrinsics;
@@ -141,8 +142,9 @@ void resolve_relative(const Configuration& section, std::vector<CameraModel>& ca
     const CameraModel& first = cameras.front();
     if (&camera == &first || camera.mount.parent != first.name || first.mount.relative) {
       section.section(camera.name)
-          .fail("beside", "the name of the other camera, the one with the smaller number in messages, which has a "
-                          "'link' of its own");
+          .fail("beside",
+                "the name of the other camera, the one with the smaller number in messages, which has a "
+                "'link' of its own");
     }
     camera.mount.parent = first.link;
   }

@@ -49,8 +49,7 @@ Eigen::VectorXd Scores::estimate() const {
 
 BlockRegression::BlockRegression(std::vector<BaseBlock> blocks, Eigen::VectorXd precision, Eigen::VectorXd away)
     : blocks_(std::move(blocks)), precision_(std::move(precision)), away_(std::move(away)),
-      pull_(-precision_.cwiseProduct(away_)),
-      H_(Eigen::MatrixXd::Zero(precision_.size(), precision_.size())) {
+      pull_(-precision_.cwiseProduct(away_)), H_(Eigen::MatrixXd::Zero(precision_.size(), precision_.size())) {
   Eigen::VectorXd g = pull_;
   for (const auto& block : blocks_) {
     H_ += block.H;
@@ -77,8 +76,8 @@ Scores BlockRegression::score(const AddedColumns& added) const {
   Eigen::MatrixXd share(k, n);  // of the information
   for (Eigen::Index b = 0; b < n; ++b) {
     const auto at = static_cast<std::size_t>(b);
-    s.u.col(b) = added.d[at] - added.B[at].transpose() * step_ -
-                 s.Y.transpose() * (blocks_[at].g - blocks_[at].H * step_);
+    s.u.col(b) =
+        added.d[at] - added.B[at].transpose() * step_ - s.Y.transpose() * (blocks_[at].g - blocks_[at].H * step_);
     for (Eigen::Index i = 0; i < k; ++i) {
       const auto y = s.Y.col(i);
       share(i, b) = added.C[at](i, i) - 2.0 * y.dot(added.B[at].col(i)) + y.dot(blocks_[at].H * y);
@@ -172,8 +171,8 @@ Eigen::MatrixXd BlockRegression::covariance() const {
 
 Eigen::MatrixXd BlockRegression::covariance(const Scores& scores) const {
   const Eigen::MatrixXd Q = symmetric_inverse(stiffened(scores.S));
-  const Eigen::MatrixXd meat = blocks_factor(blocks_.size()) * scores.u * scores.u.transpose() +
-                               scores.beliefs * scores.beliefs.transpose();
+  const Eigen::MatrixXd meat =
+      blocks_factor(blocks_.size()) * scores.u * scores.u.transpose() + scores.beliefs * scores.beliefs.transpose();
   Eigen::MatrixXd covariance = Q * meat * Q;
   covariance.diagonal() = covariance.diagonal().cwiseMax(Q.diagonal());
   return covariance;

@@ -44,9 +44,9 @@ struct Scores {
 
 /// A fit's loss on blocks that it has not seen.
 struct Heldout {
-  Eigen::VectorXd loss;       ///< per block
-  double beliefs = 0.0;       ///< what the whole fit departs from the beliefs, chi-square
-  Eigen::MatrixXd replicas;   ///< (base + added) x blocks: estimates without each block
+  Eigen::VectorXd loss;      ///< per block
+  double beliefs = 0.0;      ///< what the whole fit departs from the beliefs, chi-square
+  Eigen::MatrixXd replicas;  ///< (base + added) x blocks: estimates without each block
   Eigen::VectorXd estimate;
   [[nodiscard]] double total() const { return loss.sum() + beliefs; }
 };

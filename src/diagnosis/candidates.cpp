@@ -175,10 +175,12 @@ AddedColumns added_columns(const LogAbout& log, const std::vector<std::vector<Di
       for (const auto& step : direction) along += log.precision[p] * step.amount * evidence.A.col(step.coordinate);
       added.d[b][j] += log.precision[p] * gradient(evidence, direction);
       for (Eigen::Index i = 0; i < n; ++i) {
-        for (const auto& step : log.base[p][static_cast<std::size_t>(i)]) added.B[b](i, j) += step.amount * along[step.coordinate];
+        for (const auto& step : log.base[p][static_cast<std::size_t>(i)])
+          added.B[b](i, j) += step.amount * along[step.coordinate];
       }
       for (Eigen::Index i = 0; i < k; ++i) {
-        for (const auto& step : directions[p][static_cast<std::size_t>(i)]) added.C[b](i, j) += step.amount * along[step.coordinate];
+        for (const auto& step : directions[p][static_cast<std::size_t>(i)])
+          added.C[b](i, j) += step.amount * along[step.coordinate];
       }
     }
   }
@@ -206,7 +208,8 @@ std::pair<double, double> seen_span(const LogFit& fit, const LinearLog& at) {
   return {first, last};
 }
 
-std::vector<Candidate> catalogue_candidates(LogFit& fit, const LogAbout& log, const std::vector<NotTestable>& untestable) {
+std::vector<Candidate> catalogue_candidates(LogFit& fit, const LogAbout& log,
+                                            const std::vector<NotTestable>& untestable) {
   const auto& roles = log.state.model().roles();
   const auto [begin, end] = seen_span(fit, log.at);
   std::vector<Candidate> list;
@@ -215,7 +218,8 @@ std::vector<Candidate> catalogue_candidates(LogFit& fit, const LogAbout& log, co
     if (kind.get().name == "joint_offset" || kind.get().timing == EffectTiming::kFromATime) continue;
     for (const auto& target : kind.get().targets(roles)) {
       const CauseName cause{kind.get().name, target.joint, target.source};
-      if (is_excluded(untestable, cause) || std::find(log.found.begin(), log.found.end(), cause) != log.found.end()) continue;
+      if (is_excluded(untestable, cause) || std::find(log.found.begin(), log.found.end(), cause) != log.found.end())
+        continue;
       auto& effect = catalogue.add(cause.name, target);
       if (kind.get().timing == EffectTiming::kOverTheLog) {
         effect.parameters()[1].value = begin;
@@ -267,7 +271,8 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
   Slips result;
   for (Eigen::Index j = 0; j < log.state.joints(); ++j) {
     const CauseName cause{"slip", parameters[static_cast<std::size_t>(j)].name, ""};
-    if (is_excluded(untestable, cause) || std::find(log.found.begin(), log.found.end(), cause) != log.found.end()) continue;
+    if (is_excluded(untestable, cause) || std::find(log.found.begin(), log.found.end(), cause) != log.found.end())
+      continue;
     // A slip is an offset, with the opposite sign, of the pictures from a time on: from the last one back to the first.
     AddedColumns tail(log.blocks, n, 1);
     std::optional<Candidate> best;
@@ -277,7 +282,8 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
         const auto b = log.block_of[p];
         const auto& own = log.base[p][static_cast<std::size_t>(j)];
         for (Eigen::Index i = 0; i < n; ++i) {
-          tail.B[b](i, 0) -= log.precision[p] * product(log.at.evidence[p], log.base[p][static_cast<std::size_t>(i)], own);
+          tail.B[b](i, 0) -=
+              log.precision[p] * product(log.at.evidence[p], log.base[p][static_cast<std::size_t>(i)], own);
         }
         tail.C[b](0, 0) += log.precision[p] * product(log.at.evidence[p], own, own);
         tail.d[b][0] -= log.precision[p] * gradient(log.at.evidence[p], own);

@@ -16,9 +16,9 @@ namespace bodyschema::diagnosis {
 /// joint does ("unexplained").
 struct Candidate {
   CauseName cause;
-  std::string variable;                ///< of a free curve: what it follows
-  std::vector<std::size_t> parameters; ///< positions among the effect's fitted parameters
-  Microseconds from = 0;               ///< of a slip: the first picture after it
+  std::string variable;                        ///< of a free curve: what it follows
+  std::vector<std::size_t> parameters;         ///< positions among the effect's fitted parameters
+  Microseconds from = 0;                       ///< of a slip: the first picture after it
   std::vector<std::vector<double>> amounts{};  ///< of a free curve: [column][picture], rad of the joint
   AddedColumns columns{};
   Scores scores{};
@@ -31,16 +31,16 @@ struct Candidate {
 struct LogAbout {
   explicit LogAbout(State s) : state(std::move(s)) {}
   State state;
-  LinearLog at;                                   ///< over all coordinates
-  std::vector<double> precision;                  ///< per picture: 1 / variance of a residual, 1/px^2; 0: nothing seen
+  LinearLog at;                   ///< over all coordinates
+  std::vector<double> precision;  ///< per picture: 1 / variance of a residual, 1/px^2; 0: nothing seen
   /// [picture][column]: the state's parameters, the free curves that were found, and what is not estimated but may be
   /// wrong within the robot's tolerances or a picture's sharpness.
   std::vector<std::vector<Direction>> base;
-  std::vector<double> considered_sd;              ///< of the last columns
-  std::vector<std::size_t> block_of;              ///< per picture
+  std::vector<double> considered_sd;  ///< of the last columns
+  std::vector<std::size_t> block_of;  ///< per picture
   std::size_t blocks = 0;
   double block_s = 0.0;
-  std::vector<CauseName> found;                   ///< causes that are in the state already
+  std::vector<CauseName> found;  ///< causes that are in the state already
 };
 
 /// Values of a direction against a picture's evidence.
@@ -54,7 +54,8 @@ AddedColumns added_columns(const LogAbout& log, const std::vector<std::vector<Di
 
 /// Every candidate that this log can test beside the state, with its columns.
 /// @param untestable  by the motion alone; left out
-std::vector<Candidate> catalogue_candidates(LogFit& fit, const LogAbout& log, const std::vector<NotTestable>& untestable);
+std::vector<Candidate> catalogue_candidates(LogFit& fit, const LogAbout& log,
+                                            const std::vector<NotTestable>& untestable);
 /// Free curves of every arm joint over time, angle, velocity, acceleration and torque.
 std::vector<Candidate> free_curves(LogFit& fit, const LogAbout& log);
 /// How a joint's correction by these amounts moves the pictures: [picture][column].

@@ -48,7 +48,8 @@ class Diagnoser {
       if (alike_ <= limits::kNeighboursAlike || search_.about(2.0 * block_s_).blocks < limits::kFewestBlocks) break;
       block_s_ *= 2.0;
     }
-    while (drop_one()) {}
+    while (drop_one()) {
+    }
     search_.polish(block_s_);
     progress(0.85);
     findings.conclude(search_.about(block_s_), candidates_of_end());
@@ -76,7 +77,8 @@ class Diagnoser {
 
   void refuse_unusable() const {
     const auto pictures = fit_.log().pictures();
-    const double length = pictures.empty() ? 0.0 : seconds(pictures.back().joints.utime - pictures.front().joints.utime);
+    const double length =
+        pictures.empty() ? 0.0 : seconds(pictures.back().joints.utime - pictures.front().joints.utime);
     // Postures of stills: from one picture to the next the arm was moved.
     std::size_t postures = 1;
     Eigen::VectorXd first, last;
@@ -94,9 +96,10 @@ class Diagnoser {
       throw DataError("the arm stands still in every picture; move it through its range while recording");
     }
     if (length < options_.shortest_log_s && postures < options_.fewest_postures) {
-      throw DataError(fmt::format("{:.1f} s of pictures in {} postures are too few; record at least {:.0f} s, better 60 s, "
-                                  "or {} postures",
-                                  length, postures, options_.shortest_log_s, options_.fewest_postures));
+      throw DataError(
+          fmt::format("{:.1f} s of pictures in {} postures are too few; record at least {:.0f} s, better 60 s, "
+                      "or {} postures",
+                      length, postures, options_.shortest_log_s, options_.fewest_postures));
     }
   }
 
@@ -162,8 +165,8 @@ class Diagnoser {
     bool plausible;
   };
 
-  /// Candidates that may be there, those first that predict best what their fit has not seen. What would be larger than on
-  /// any robot comes last: it stands in for something else, if anything plausible does as well.
+  /// Candidates that may be there, those first that predict best what their fit has not seen. What would be larger than
+  /// on any robot comes last: it stands in for something else, if anything plausible does as well.
   std::vector<Trial> trials_of(const Field& field, bool first) {
     const Heldout without = field.base.heldout();
     std::vector<Trial> trials;
@@ -197,15 +200,17 @@ class Diagnoser {
   /// The best known cause, or a free curve where that explains much more than any known one. Of causes that explain
   /// alike the simplest.
   static const Trial* choose(const std::vector<Trial>& trials) {
-    const auto known = std::find_if(trials.begin(), trials.end(), [](const Trial& t) { return !t.candidate->generic(); });
-    const auto generic = std::find_if(trials.begin(), trials.end(), [](const Trial& t) { return t.candidate->generic(); });
+    const auto known =
+        std::find_if(trials.begin(), trials.end(), [](const Trial& t) { return !t.candidate->generic(); });
+    const auto generic =
+        std::find_if(trials.begin(), trials.end(), [](const Trial& t) { return t.candidate->generic(); });
     if (known == trials.end()) return &*generic;
     if (generic != trials.end() && generic->gain > limits::kGenericGain * known->gain) return &*generic;
     const double dof = static_cast<double>(known->heldout.loss.size()) - 1.0;
     const Trial* best = &*known;
     for (const auto& trial : trials) {
-      const bool simpler = !trial.candidate->generic() &&
-                           trial.candidate->parameters.size() < best->candidate->parameters.size();
+      const bool simpler =
+          !trial.candidate->generic() && trial.candidate->parameters.size() < best->candidate->parameters.size();
       if (!simpler || trial.gain < (1.0 - limits::kAlikeShare) * known->gain) continue;
       if (paired_t(trial.heldout.loss, known->heldout.loss) < student_quantile(limits::kRivalTail, dof)) best = &trial;
     }
@@ -296,11 +301,14 @@ class Diagnoser {
     for (const auto& candidate : field.candidates) {
       if (candidate.generic()) continue;
       if (candidate.scores.independent.maxCoeff() < limits::kRounding) {
-        report_.not_testable.push_back({candidate.cause, "joint offsets and usual nuisances make up for it in this log"});
+        report_.not_testable.push_back(
+            {candidate.cause, "joint offsets and usual nuisances make up for it in this log"});
         continue;
       }
       const bool told = is_told(candidate, roles, field.threshold);
-      if (!told) report_.not_testable.push_back({candidate.cause, fmt::format("not testable with {} postures", field.log.blocks)});
+      if (!told)
+        report_.not_testable.push_back(
+            {candidate.cause, fmt::format("not testable with {} postures", field.log.blocks)});
     }
   }
 

@@ -154,7 +154,8 @@ class Page {
     if (d_.small_causes.empty()) return;
     std::vector<std::string> items;
     for (const auto& cause : d_.small_causes) items.push_back(cause.sentence);
-    page_.paragraph(fmt::format("Also in the extended model, though it moves hand and outlines by less than {:.2g} mm:", d_.matters_mm));
+    page_.paragraph(fmt::format("Also in the extended model, though it moves hand and outlines by less than {:.2g} mm:",
+                                d_.matters_mm));
     page_.list(items);
   }
 
@@ -202,13 +203,14 @@ class Page {
     if (bars.empty()) return;
     page_.heading("All candidates");
     page_.paragraph(fmt::format(
-        "How far each cause of the catalogue, and each free curve over what a joint does, stands out of the noise when it "
+        "How far each cause of the catalogue, and each free curve over what a joint does, stands out of the noise when "
+        "it "
         "alone is added to the model: before, to the model of offsets and usual nuisances; after, to the extended one. "
         "The noise is judged by how the blocks of the log differ. Of all candidates together, chance alone reaches "
-        "z = {:.1f} in one log of a hundred; a cause must exceed it, and move the hand or the outlines by what matters.",
+        "z = {:.1f} in one log of a hundred; a cause must exceed it, and move the hand or the outlines by what "
+        "matters.",
         d_.z_threshold));
-    std::stable_sort(bars.begin(), bars.end(),
-                     [](const auto& a, const auto& b) { return a.z_before > b.z_before; });
+    std::stable_sort(bars.begin(), bars.end(), [](const auto& a, const auto& b) { return a.z_before > b.z_before; });
     const auto draw = [&](std::size_t from, std::size_t to, const std::string& title) {
       Chart chart;
       chart.kind = Chart::Kind::kBar;

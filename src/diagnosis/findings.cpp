@@ -21,8 +21,8 @@ Eigen::MatrixXd sum_of(const std::vector<Eigen::MatrixXd>& parts) {
 }
 
 /// A candidate's columns beside a base that lacks one of the model's causes, which is at zero in it.
-AddedColumns beside(const AddedColumns& columns, const std::vector<Eigen::Index>& kept, const std::vector<Eigen::Index>& out,
-                    const Eigen::VectorXd& value) {
+AddedColumns beside(const AddedColumns& columns, const std::vector<Eigen::Index>& kept,
+                    const std::vector<Eigen::Index>& out, const Eigen::VectorXd& value) {
   AddedColumns result = columns;
   for (std::size_t b = 0; b < columns.B.size(); ++b) {
     result.B[b] = columns.B[b](kept, Eigen::all);
@@ -49,9 +49,9 @@ Eigen::VectorXd values_of(const ModelSearch& search, const std::vector<Eigen::In
   return values;
 }
 
-/// How much worse another explanation is, in standard deviations of the difference: on blocks that neither has seen, and
-/// in how far nuisances must depart from what is believed of them for it (log likelihoods that are d apart in the mean
-/// differ by a variance of 4 d).
+/// How much worse another explanation is, in standard deviations of the difference: on blocks that neither has seen,
+/// and in how far nuisances must depart from what is believed of them for it (log likelihoods that are d apart in the
+/// mean differ by a variance of 4 d).
 double worse_by(const Heldout& other, const Heldout& best) {
   const Eigen::VectorXd d = other.loss - best.loss;
   const double n = static_cast<double>(d.size()), beliefs = other.beliefs - best.beliefs;
@@ -71,7 +71,8 @@ Reduced without(const ModelSearch& search, const BlockRegression& all, const std
     const auto& block = all.parts()[b];
     const Eigen::VectorXd g = block.g + block.H(Eigen::all, out) * value;
     blocks.push_back({block.H(kept, kept), g(kept),
-                      block.square + 2.0 * value.dot(block.g(out)) + value.dot(block.H(out, out) * value), block.weight});
+                      block.square + 2.0 * value.dot(block.g(out)) + value.dot(block.H(out, out) * value),
+                      block.weight});
     own.B[b] = block.H(kept, out);
     own.C[b] = block.H(out, out);
     own.d[b] = g(out);
@@ -146,10 +147,11 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
   const auto& roles = fit_.log().roles();
   std::vector<std::uint32_t> rig;
   for (const auto kind : {Coordinate::Kind::kRigShift, Coordinate::Kind::kRigTurn}) {
-    for (Eigen::Index axis = 0; axis < 3; ++axis) rig.push_back(static_cast<std::uint32_t>(coordinates.find({kind, axis})));
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      rig.push_back(static_cast<std::uint32_t>(coordinates.find({kind, axis})));
   }
-  double square = 0.0, weight = 0.0, hand = 0.0, turn = 0.0, pictures = 0.0, found = 0.0, sampled = 0.0, where_seen = 0.0,
-         sampled_seen = 0.0;
+  double square = 0.0, weight = 0.0, hand = 0.0, turn = 0.0, pictures = 0.0, found = 0.0, sampled = 0.0,
+         where_seen = 0.0, sampled_seen = 0.0;
   auto& measurement = fit_.measurement();
   for (std::size_t p = 0; p < log.base.size(); ++p) {
     const auto& evidence = log.at.evidence[p];
@@ -199,8 +201,8 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
     pictures += 1.0;
   }
   if (weight <= 0.0 || pictures <= 0.0) return {};
-  return {std::sqrt(square / weight), 1e3 * std::sqrt(hand / pictures), degrees(std::sqrt(turn / pictures)), found / sampled,
-          where_seen / sampled_seen};
+  return {std::sqrt(square / weight), 1e3 * std::sqrt(hand / pictures), degrees(std::sqrt(turn / pictures)),
+          found / sampled, where_seen / sampled_seen};
 }
 
 void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candidates) {
@@ -252,7 +254,8 @@ bool Findings::is_small(const LogAbout& log, const BlockRegression& all, std::si
   return search_.size_of(log, directions, amount, -H.ldlt().solve(B * amount)).metres() < options_.matters_m;
 }
 
-void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates) {
+void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
+                               const std::vector<Candidate>& candidates) {
   const auto& state = search_.state();
   const double loss = all.heldout().loss.sum();
   for (std::size_t c = 0; c < search_.causes().size(); ++c) {
@@ -273,7 +276,9 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all, 
         const auto& p = state.parameters()[static_cast<std::size_t>(i)];
         const auto& parameter = state.model()[p.ref.effect].parameters()[p.ref.parameter];
         const double value = state.x()[i], half = quantile(log) * std::sqrt(covariance_(i, i));
-        DiagnosedParameter e{parameter.name, p.unit, value / p.si_per_unit,
+        DiagnosedParameter e{parameter.name,
+                             p.unit,
+                             value / p.si_per_unit,
                              {(value - half) / p.si_per_unit, (value + half) / p.si_per_unit}};
         const auto timing = effect_kind(found.name.name).timing;
         if (timing == EffectTiming::kFromATime) e.from = found.from;
@@ -325,7 +330,8 @@ void Findings::find_class(const BlockRegression& all, std::size_t cause, const s
   std::vector<std::string> motions;
   for (const auto& name : out.same) {
     const auto& motion = effect_kind(name.name).splitting_motion;
-    if (!motion.empty() && std::find(motions.begin(), motions.end(), motion) == motions.end()) motions.push_back(motion);
+    if (!motion.empty() && std::find(motions.begin(), motions.end(), motion) == motions.end())
+      motions.push_back(motion);
   }
   for (const auto& motion : motions) out.advice += (out.advice.empty() ? "" : " ") + motion;
 }
@@ -334,7 +340,8 @@ void Findings::check_sides(const LogAbout& log) {
   const auto& roles = fit_.log().roles();
   constexpr std::size_t kSides = 4;
   const std::size_t groups = roles.segments.size() * fit_.log().rig().cameras.size() * kSides;
-  std::vector<Eigen::MatrixXd> sums(2, Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(groups), static_cast<Eigen::Index>(log.blocks)));
+  std::vector<Eigen::MatrixXd> sums(
+      2, Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(groups), static_cast<Eigen::Index>(log.blocks)));
   std::vector<std::size_t> segment_of(fit_.measurement().part_count(), 0);
   for (std::size_t s = 0; s < roles.segments.size(); ++s) {
     for (const auto part : roles.segments[s].parts) segment_of[part] = s;
@@ -371,12 +378,13 @@ void Findings::check_sides(const LogAbout& log) {
     const double depth = report_.samples.empty() ? 0.0 : report_.samples.front().depth_m;
     const double matters_px = depth > 0.0 ? options_.matters_m * camera.intrinsics.fx / depth : 0.0;
     const double least = std::max(matters_px, 3.0 * limits::kFloor_px * unit);
-    if (std::abs(mean) < least + student_quantile(tail, static_cast<double>(seen - 1)) * sd || std::abs(mean) <= worst) continue;
+    if (std::abs(mean) < least + student_quantile(tail, static_cast<double>(seen - 1)) * sd || std::abs(mean) <= worst)
+      continue;
     worst = std::abs(mean);
-    report_.side_left_over = fmt::format("the {} outline of {} lies {:.1f} px {} where the model has it in the pictures of {}",
-                                         kNames[group % kSides],
-                                         roles.segments[group / kSides / fit_.log().rig().cameras.size()].name, std::abs(mean),
-                                         mean > 0.0 ? "outside of" : "inside of", camera.name);
+    report_.side_left_over =
+        fmt::format("the {} outline of {} lies {:.1f} px {} where the model has it in the pictures of {}",
+                    kNames[group % kSides], roles.segments[group / kSides / fit_.log().rig().cameras.size()].name,
+                    std::abs(mean), mean > 0.0 ? "outside of" : "inside of", camera.name);
   }
 }
 
@@ -384,7 +392,8 @@ void Findings::check_surplus(const LogAbout& log) {
   const auto found = surplus(fit_, log, search_.raster());
   if (found.blocks < limits::kMostOfTheLog) return;
   constexpr double kCm2 = 1e-4;
-  report_.not_in_model = fmt::format("{:.0f} cm2 beside the robot, in {:.0f} % of the log", found.area_m2 / kCm2, 100.0 * found.blocks);
+  report_.not_in_model =
+      fmt::format("{:.0f} cm2 beside the robot, in {:.0f} % of the log", found.area_m2 / kCm2, 100.0 * found.blocks);
 }
 
 void Findings::exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates) {

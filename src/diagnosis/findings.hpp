@@ -9,8 +9,8 @@
 
 namespace bodyschema::diagnosis {
 
-/// A model's regression with some of its parameters taken out: the base without them, at their value zero, their columns,
-/// and which of the base's parameters stay.
+/// A model's regression with some of its parameters taken out: the base without them, at their value zero, their
+/// columns, and which of the base's parameters stay.
 struct Reduced {
   BlockRegression base;
   AddedColumns own;

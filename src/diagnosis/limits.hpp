@@ -7,32 +7,32 @@
 namespace bodyschema::diagnosis::limits {
 
 // Physical.
-constexpr double kFrom_px = 32.0;     ///< px of a 320x240 picture: outlines may lie so far off at first
-constexpr double kSearch_px = 8.0;    ///< ... and once near
-constexpr double kJump_rad = 0.14;    ///< between two pictures: the arm was moved from posture to posture
-constexpr double kFloor_px = 0.1;     ///< no picture places a flank nearer (OutlineNoise::Prior::floor_px)
-constexpr double kImplausible = 20.0; ///< of an effect's typical size: no robot is so wrong
-constexpr double kLeastFound = 0.6;   ///< share of the outline that must be found where the robot is seen at all
-constexpr double kMostOfTheLog = 0.5; ///< of the blocks: what is seen there beside the robot is no passer-by
-constexpr double kLostContrast = 0.5; ///< between the shares of two parts of the log that are seen
+constexpr double kFrom_px = 32.0;      ///< px of a 320x240 picture: outlines may lie so far off at first
+constexpr double kSearch_px = 8.0;     ///< ... and once near
+constexpr double kJump_rad = 0.14;     ///< between two pictures: the arm was moved from posture to posture
+constexpr double kFloor_px = 0.1;      ///< no picture places a flank nearer (OutlineNoise::Prior::floor_px)
+constexpr double kImplausible = 20.0;  ///< of an effect's typical size: no robot is so wrong
+constexpr double kLeastFound = 0.6;    ///< share of the outline that must be found where the robot is seen at all
+constexpr double kMostOfTheLog = 0.5;  ///< of the blocks: what is seen there beside the robot is no passer-by
+constexpr double kLostContrast = 0.5;  ///< between the shares of two parts of the log that are seen
 
 // Statistical.
-constexpr double kRivalTail = 0.02;     ///< two-sided, Student's t of paired blocks: clearly worse than the best
-constexpr double kRivalShare = 0.5;     ///< of the best one's gain: less explains something else
-constexpr double kAlikeShare = 0.1;     ///< of a gain: of causes that explain so much alike the simplest is taken
-constexpr double kConfidence = 0.05;    ///< two-sided, of intervals
-constexpr double kSameChange = 1e-3;    ///< share of a column that another cause cannot make up for: it is the same
-constexpr double kNeighboursAlike = 0.3; ///< correlation of neighbouring blocks: they are made longer
-constexpr double kLeastGain = 1e-3;     ///< share of the misfit: points of an outline come and go
-constexpr double kGenericGain = 2.0;    ///< a free curve must explain so much more than any known cause
+constexpr double kRivalTail = 0.02;       ///< two-sided, Student's t of paired blocks: clearly worse than the best
+constexpr double kRivalShare = 0.5;       ///< of the best one's gain: less explains something else
+constexpr double kAlikeShare = 0.1;       ///< of a gain: of causes that explain so much alike the simplest is taken
+constexpr double kConfidence = 0.05;      ///< two-sided, of intervals
+constexpr double kSameChange = 1e-3;      ///< share of a column that another cause cannot make up for: it is the same
+constexpr double kNeighboursAlike = 0.3;  ///< correlation of neighbouring blocks: they are made longer
+constexpr double kLeastGain = 1e-3;       ///< share of the misfit: points of an outline come and go
+constexpr double kGenericGain = 2.0;      ///< a free curve must explain so much more than any known cause
 
 // Computational.
-constexpr double kRounding = 1e-7;          ///< share of a column beyond others: less is rounding
-constexpr double kWide = 4.0;              ///< typical sizes: a belief that is none
+constexpr double kRounding = 1e-7;  ///< share of a column beyond others: less is rounding
+constexpr double kWide = 4.0;       ///< typical sizes: a belief that is none
 constexpr std::size_t kMostCauses = 6;
 constexpr std::size_t kMostTried = 4;      ///< candidates a round that are fitted for real
-constexpr double kWorthATrial_z = 2.5;      ///< less does not stand out even of one candidate's noise
-constexpr std::size_t kFewestBlocks = 16;   ///< blocks are not made longer where fewer would be left
+constexpr double kWorthATrial_z = 2.5;     ///< less does not stand out even of one candidate's noise
+constexpr std::size_t kFewestBlocks = 16;  ///< blocks are not made longer where fewer would be left
 constexpr std::size_t kPicturesForSize = 60;
 
 }  // namespace bodyschema::diagnosis::limits

@@ -16,16 +16,15 @@
 namespace bodyschema {
 namespace {
 
-constexpr double kTolerableLoss = 0.05;            // of all pictures
-constexpr double kStill_rad = 0.5 * kPi / 180.0;   // and rad/s
+constexpr double kTolerableLoss = 0.05;           // of all pictures
+constexpr double kStill_rad = 0.5 * kPi / 180.0;  // and rad/s
 constexpr const char* kAdvice = " for 60 to 120 s: slow and fast, the same postures in both directions, 15 s of rest";
 
 class LogDiagnosis {
  public:
   LogDiagnosis(const Configuration& configuration, const LogDiagnosisOptions& options,
                std::optional<SegmentationMethod> method = std::nullopt)
-      : options_(options), pipeline_(configuration, method),
-        watched_(watch(configuration)) {
+      : options_(options), pipeline_(configuration, method), watched_(watch(configuration)) {
     // Said at once: it may well be why the log is refused.
     if (const auto turn = describe(pipeline_.background_turn()); !turn.empty()) {
       spdlog::warn("{}: {}", options_.log.string(), turn);
@@ -72,8 +71,8 @@ class LogDiagnosis {
                                "': diagnose starts from the URDF as it is; leave it out "
                                "(--set robot.extended_model='')");
     }
-    return watch_log(pipeline_, {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .quiet = options_.quiet},
-                     true);
+    return watch_log(pipeline_,
+                     {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .quiet = options_.quiet}, true);
   }
 
   /// Where the estimator was when it had converged.

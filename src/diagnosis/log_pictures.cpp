@@ -25,7 +25,8 @@ std::optional<std::size_t> find(const PictureLog& log, const CameraObservation& 
 }
 
 /// Those that show most of what the extension gains; without causes, spread over the log.
-std::vector<std::size_t> choose(const PictureLog& log, const std::vector<Observation>& kept, const DiagnosisReport& report) {
+std::vector<std::size_t> choose(const PictureLog& log, const std::vector<Observation>& kept,
+                                const DiagnosisReport& report) {
   const bool found = !report.causes.empty();
   std::vector<std::pair<double, std::size_t>> gain;
   for (std::size_t i = 0; i < kept.size(); ++i) {
@@ -69,7 +70,8 @@ std::vector<std::pair<Image, std::string>> draw_pictures(LogFit& fit, const std:
       const auto p = seen ? find(log, *seen, c) : std::nullopt;
       if (!p || seen->image.empty()) continue;
       const auto& q = log.pictures()[*p].joints.q;
-      OverlayView view{&seen->image, preview.draw(q, before.corrections[*p], c), preview.draw(q, after.corrections[*p], c), {}};
+      OverlayView view{
+          &seen->image, preview.draw(q, before.corrections[*p], c), preview.draw(q, after.corrections[*p], c), {}};
       const auto& k = log.rig().cameras[c].intrinsics;
       const int size = std::min({2 * kHalfPart_px, k.width, k.height});
       if (const Eigen::Vector2d hand = preview.hand(); hand.allFinite()) {
@@ -81,8 +83,8 @@ std::vector<std::pair<Image, std::string>> draw_pictures(LogFit& fit, const std:
     if (views.empty()) continue;
     const double time_s = seconds(kept[i].utime - report.begin_utime);
     pictures.emplace_back(draw_overlay(views, fmt::format("{:.1f} s", time_s), kEnlargement, names),
-                          fmt::format("{:.1f} s into the log: outlines of {} (red) and of the extended model (green)", time_s,
-                                      found ? "the fit of offsets and nuisances" : "the encoders as they are"));
+                          fmt::format("{:.1f} s into the log: outlines of {} (red) and of the extended model (green)",
+                                      time_s, found ? "the fit of offsets and nuisances" : "the encoders as they are"));
   }
   return pictures;
 }

@@ -94,8 +94,8 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
   for (const auto joint : roles.arm) {
     result.arm_joints.push_back(roles.names[static_cast<std::size_t>(joint)]);
   }
-  result.not_testable = diagnosis::untestable(
-      roles, diagnosis::log_motion(pictures, exposures.cameras(), encoders, model, setup, roles));
+  result.not_testable =
+      diagnosis::untestable(roles, diagnosis::log_motion(pictures, exposures.cameras(), encoders, model, setup, roles));
   for (const auto& name : effect_names()) {
     if (name == "joint_offset") continue;  // always fitted, never a finding
     for (const auto& target : effect_targets(name, roles)) {

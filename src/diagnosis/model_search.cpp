@@ -46,8 +46,9 @@ std::vector<std::size_t> raster_of(const PictureLog& log, std::size_t most) {
 
 ModelSearch::ModelSearch(LogFit& fit, const std::vector<Belief>& beliefs, const std::vector<Belief>& tolerances,
                          const DiagnosisOptions& options)
-    : fit_(fit), beliefs_(beliefs), tolerances_(tolerances), options_(options), raster_(raster_of(fit.log(), options.most_pictures)),
-      state_(fit.log().roles(), beliefs), noise_(fit.log().rig().cameras.size(), OutlineNoise(options.noise)) {}
+    : fit_(fit), beliefs_(beliefs), tolerances_(tolerances), options_(options),
+      raster_(raster_of(fit.log(), options.most_pictures)), state_(fit.log().roles(), beliefs),
+      noise_(fit.log().rig().cameras.size(), OutlineNoise(options.noise)) {}
 
 OutlineSearch ModelSearch::search() const {
   double robust_px = 0.0;
@@ -260,8 +261,8 @@ void ModelSearch::group_blocks(LogAbout& log) const {
     const Eigen::VectorXd q = posture_of(picture.joints.q, state_.model().roles());
     const double t = seconds(picture.joints.utime);
     // Where postures beside each other err alike they go into one block.
-    const bool jumped = last.size() > 0 && log.block_s <= options_.block_s &&
-                        (q - last).cwiseAbs().maxCoeff() > limits::kJump_rad;
+    const bool jumped =
+        last.size() > 0 && log.block_s <= options_.block_s && (q - last).cwiseAbs().maxCoeff() > limits::kJump_rad;
     const bool moved = begin.size() == 0 || (q - begin).cwiseAbs().maxCoeff() > options_.same_posture_rad;
     if (begin.size() == 0 || jumped || (moved && t - begin_s >= log.block_s)) {
       begin = q;
@@ -286,13 +287,14 @@ BlockRegression ModelSearch::regression(const LogAbout& log) const {
   return {base_blocks(log), precision, away};
 }
 
-Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Direction>>& columns, const Eigen::VectorXd& amount,
-                          const Eigen::VectorXd& of_base) {
+Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Direction>>& columns,
+                          const Eigen::VectorXd& amount, const Eigen::VectorXd& of_base) {
   Size size;
   double pictures = 0.0, weight = 0.0, depth = 0.0, focal = 0.0;
   auto& measurement = fit_.measurement();
   std::vector<std::size_t> some;
-  for (std::size_t i = 0; i < raster_.size(); i += std::max<std::size_t>(1, raster_.size() / limits::kPicturesForSize)) {
+  for (std::size_t i = 0; i < raster_.size();
+       i += std::max<std::size_t>(1, raster_.size() / limits::kPicturesForSize)) {
     some.push_back(raster_[i]);
   }
   Eigen::VectorXd moved(fit_.coordinates().size());
@@ -300,14 +302,16 @@ Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Dir
     if (log.precision[p] <= 0.0) continue;
     moved.setZero();
     for (Eigen::Index k = 0; k < amount.size(); ++k) {
-      for (const auto& step : columns[p][static_cast<std::size_t>(k)]) moved[step.coordinate] += amount[k] * step.amount;
+      for (const auto& step : columns[p][static_cast<std::size_t>(k)])
+        moved[step.coordinate] += amount[k] * step.amount;
     }
     for (Eigen::Index i = 0; i < of_base.size(); ++i) {
-      for (const auto& step : log.base[p][static_cast<std::size_t>(i)]) moved[step.coordinate] += of_base[i] * step.amount;
+      for (const auto& step : log.base[p][static_cast<std::size_t>(i)])
+        moved[step.coordinate] += of_base[i] * step.amount;
     }
     const auto& picture = fit_.log().pictures()[p];
-    const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera, log.at.coordinates,
-                                                    measurement.projection().hand_link());
+    const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera,
+                                                    log.at.coordinates, measurement.projection().hand_link());
     const auto& evidence = log.at.evidence[p];
     size.hand_m += (jacobian.topRows<3>() * moved).squaredNorm();
     size.outline_px += moved.dot(evidence.A * moved);
@@ -373,7 +377,12 @@ void ModelSearch::look_for_lost_part() {
   }
   if (lost.size() < 2 * static_cast<std::size_t>(state_.size())) return;
   State there = state_;
-  fit_.fit(there, {.iterations = 12, .from_px = limits::kFrom_px, .finest_px = limits::kSearch_px, .spacing_px = options_.spacing_px}, lost);
+  fit_.fit(there,
+           {.iterations = 12,
+            .from_px = limits::kFrom_px,
+            .finest_px = limits::kSearch_px,
+            .spacing_px = options_.spacing_px},
+           lost);
   const Eigen::VectorXd change = there.x() - state_.x();
   const double sign = before < after ? 1.0 : -1.0;  // a slip moves the joint against its offset, from its time on
   std::optional<State> best;
@@ -381,7 +390,8 @@ void ModelSearch::look_for_lost_part() {
   double cost = cost_ * (1.0 - limits::kLeastGain);
   for (Eigen::Index j = 0; j < state_.joints(); ++j) {
     const FoundCause slip{.name = {"slip", state_.parameters()[static_cast<std::size_t>(j)].name, ""},
-                          .variable = {}, .from = pictures[split].joints.utime};
+                          .variable = {},
+                          .from = pictures[split].joints.utime};
     State state = state_with({slip});
     take_over(state, before < after ? there : state_);
     Eigen::VectorXd x = state.x();
@@ -398,7 +408,8 @@ void ModelSearch::look_for_lost_part() {
   if (!best) return;
   // It explains the part only if the part is seen then.
   const auto now = fit_.linearise(best->model(), {}, search());
-  const auto explained = std::count_if(lost.begin(), lost.end(), [&](std::size_t p) { return now.evidence[p].weight > 0.0; });
+  const auto explained =
+      std::count_if(lost.begin(), lost.end(), [&](std::size_t p) { return now.evidence[p].weight > 0.0; });
   if (static_cast<double>(explained) < limits::kLostContrast * static_cast<double>(lost.size())) return;
   spdlog::debug("diagnosis: a part of the log out of sight is explained by {}", found.name.text());
   state_ = std::move(*best);

@@ -13,11 +13,11 @@ namespace bodyschema::diagnosis {
 /// A cause that was found.
 struct FoundCause {
   CauseName name;
-  std::string variable;                       ///< of a free curve
-  Microseconds from = 0;                      ///< of a slip
-  double begin_s = 0.0, duration_s = 0.0;     ///< of a drift
-  std::vector<std::vector<double>> amounts{}; ///< of a free curve
-  bool small = false;                         ///< it moves less than what matters: not named, but in the model
+  std::string variable;                        ///< of a free curve
+  Microseconds from = 0;                       ///< of a slip
+  double begin_s = 0.0, duration_s = 0.0;      ///< of a drift
+  std::vector<std::vector<double>> amounts{};  ///< of a free curve
+  bool small = false;                          ///< it moves less than what matters: not named, but in the model
   [[nodiscard]] bool generic() const { return !variable.empty(); }
 };
 

@@ -30,7 +30,8 @@ std::string capitalised(std::string text) {
 
 std::string sentence_of(const DiagnosedCause& cause, const DiagnosisReport& report, const JointRoles& roles) {
   if (cause.cause.name == "unexplained") {
-    return fmt::format("something follows the {} of {} that no known cause explains", cause.variable, cause.cause.joint);
+    return fmt::format("something follows the {} of {} that no known cause explains", cause.variable,
+                       cause.cause.joint);
   }
   const auto effect = make_effect(cause.cause.name, {cause.cause.joint, cause.cause.source}, roles);
   std::vector<std::string> amounts;
@@ -79,9 +80,10 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles) {
     report.exclusion_limits.clear();
   };
   if (const double found = report.after.outline_found; found < limits::kLeastFound) {
-    return unexplained(fmt::format("No cause can be told from this log: only {:.0f} % of the predicted outlines are found in "
-                                   "the pictures. The parts have another shape, or the masks miss some of them.",
-                                   100.0 * found));
+    return unexplained(
+        fmt::format("No cause can be told from this log: only {:.0f} % of the predicted outlines are found in "
+                    "the pictures. The parts have another shape, or the masks miss some of them.",
+                    100.0 * found));
   }
   if (std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.implausible; })) {
     return unexplained("No known cause explains this log: what fits is larger than on any robot.");
@@ -96,16 +98,20 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles) {
   report.crowded = causes.empty() && report.small_causes.size() > 1;
   if (!causes.empty()) {
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });
-    report.verdict = std::any_of(causes.begin(), causes.end(), is_unexplained) ? "unexplained" : several ? "class" : "named";
+    report.verdict = std::any_of(causes.begin(), causes.end(), is_unexplained) ? "unexplained"
+                     : several                                                 ? "class"
+                                                                               : "named";
     report.sentence = capitalised(list) + ".";
     if (report.verdict == "unexplained") report.exclusion_limits.clear();
     return;
   }
   report.verdict = "none";
-  report.sentence = small.empty() ? "The model explains the log to its noise: nothing but joint offsets was found."
-                                  : fmt::format("Nothing that matters was found but joint offsets. What is there moves hand and "
-                                                "outlines by less than {:.2g} mm: {}.",
-                                                report.matters_mm, small);
+  report.sentence = small.empty()
+                        ? "The model explains the log to its noise: nothing but joint offsets was found."
+                        : fmt::format(
+                              "Nothing that matters was found but joint offsets. What is there moves hand and "
+                              "outlines by less than {:.2g} mm: {}.",
+                              report.matters_mm, small);
 }
 
 }  // namespace bodyschema::diagnosis

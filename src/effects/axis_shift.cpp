@@ -13,15 +13,15 @@ EffectKind axis_shift() {
               [](const JointRoles& roles) {
                 // The first two of an arm look like a shifted base.
                 auto targets = arm_targets(roles);
-                targets.erase(targets.begin(), targets.begin() + static_cast<std::ptrdiff_t>(
-                                                                     std::min<std::size_t>(2, targets.size())));
+                targets.erase(targets.begin(),
+                              targets.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(2, targets.size())));
                 return targets;
               },
           .make =
               [](const EffectTarget& target, const JointRoles& roles) {
                 return plain("axis_shift", target, {in_mm("shift_1", 3.0), in_mm("shift_2", 3.0)},
-                             [joint = static_cast<std::size_t>(roles.index(target.joint))](
-                                 Parameters p, const Instant&, Corrections& c) {
+                             [joint = static_cast<std::size_t>(roles.index(target.joint))](Parameters p, const Instant&,
+                                                                                           Corrections& c) {
                                c.adjustments[joint].shift_1_m += p[0].value;
                                c.adjustments[joint].shift_2_m += p[1].value;
                              });

@@ -11,8 +11,8 @@ EffectKind axis_tilt() {
           .make =
               [](const EffectTarget& target, const JointRoles& roles) {
                 return plain("axis_tilt", target, {in_degrees("tilt_1", 0.5), in_degrees("tilt_2", 0.5)},
-                             [joint = static_cast<std::size_t>(roles.index(target.joint))](
-                                 Parameters p, const Instant&, Corrections& c) {
+                             [joint = static_cast<std::size_t>(roles.index(target.joint))](Parameters p, const Instant&,
+                                                                                           Corrections& c) {
                                c.adjustments[joint].tilt_1_rad += p[0].value;
                                c.adjustments[joint].tilt_2_rad += p[1].value;
                              });

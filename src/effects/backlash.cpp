@@ -10,12 +10,9 @@ namespace {
 class Backlash final : public ClonableEffect<Backlash> {
  public:
   Backlash(const EffectTarget& target, Eigen::Index joint)
-      : ClonableEffect("backlash", target,
-                       {{.name = "width",
-                         .unit = "deg",
-                         .si_per_unit = kDeg,
-                         .typical = 0.5 * kDeg,
-                         .at_least = 1e-5}}),
+      : ClonableEffect(
+            "backlash", target,
+            {{.name = "width", .unit = "deg", .si_per_unit = kDeg, .typical = 0.5 * kDeg, .at_least = 1e-5}}),
         joint_(joint) {}
 
   [[nodiscard]] bool has_memory() const override { return true; }
@@ -94,10 +91,8 @@ std::string needs_motion_that_was_seen(const LogMotion& motion) {
 EffectKind backlash() {
   return {.name = "backlash",
           .targets = arm_targets,
-          .make =
-              [](const EffectTarget& target, const JointRoles& roles) {
-                return std::make_unique<Backlash>(target, roles.index(target.joint));
-              },
+          .make = [](const EffectTarget& target,
+                     const JointRoles& roles) { return std::make_unique<Backlash>(target, roles.index(target.joint)); },
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
                 return e.target().joint + " has " + amounts[0] + " of play between encoder and link";

@@ -16,7 +16,8 @@ EffectKind base_shift() {
               },
           .sentence =
               [](const Effect&, const JointRoles&, std::span<const std::string> amounts) {
-                std::string text = "the arm is mounted elsewhere, seen from the cameras: moved along the root's axes by ";
+                std::string text =
+                    "the arm is mounted elsewhere, seen from the cameras: moved along the root's axes by ";
                 for (std::size_t i = 0; i < amounts.size(); ++i) text += (i > 0 ? ", " : "") + amounts[i];
                 return text;
               },

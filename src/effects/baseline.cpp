@@ -15,8 +15,8 @@ EffectKind baseline() {
               },
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return "the cameras are " + amounts[0] + by_sign(e.parameters()[0], " further apart", " nearer together") +
-                       " than configured";
+                return "the cameras are " + amounts[0] +
+                       by_sign(e.parameters()[0], " further apart", " nearer together") + " than configured";
               },
           .not_testable = [](const EffectTarget&, const JointRoles&,
                              const LogMotion& motion) { return needs_two_cameras(motion); },

@@ -13,17 +13,19 @@ namespace effects {
 #undef BODYSCHEMA_EFFECT
 
 std::string camera_place(Parameters p, std::span<const std::string> amounts) {
-  const char* const ways[][2] = {{"further right", "further left"}, {"lower", "higher"}, {"further forward", "further back"},
-                                 {"further up", "further down"}, {"further right", "further left"},
-                                 {"clockwise", "anticlockwise"}};
+  const char* const ways[][2] = {{"further right", "further left"},   {"lower", "higher"},
+                                 {"further forward", "further back"}, {"further up", "further down"},
+                                 {"further right", "further left"},   {"clockwise", "anticlockwise"}};
   std::vector<std::string> moves, turns;
-  const bool told = std::any_of(amounts.begin(), amounts.end(),
-                                [](const auto& a) { return a.find("at most") == std::string::npos; });
+  const bool told =
+      std::any_of(amounts.begin(), amounts.end(), [](const auto& a) { return a.find("at most") == std::string::npos; });
   for (std::size_t i = 0; i < amounts.size(); ++i) {
     if (told && amounts[i].find("at most") != std::string::npos) continue;
     const auto by = amounts[i] + " " + by_sign(p[i], ways[i][0], ways[i][1]);
-    if (i < 3) moves.push_back(by);
-    else turns.push_back((i == 5 ? "rolled by " : "looking ") + by);
+    if (i < 3)
+      moves.push_back(by);
+    else
+      turns.push_back((i == 5 ? "rolled by " : "looking ") + by);
   }
   std::string text;
   for (const auto* list : {&moves, &turns}) {

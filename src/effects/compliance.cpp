@@ -4,34 +4,34 @@ namespace bodyschema::effects {
 
 /// The joint gives way under the torque of gravity: dq = compliance * torque. Positive: it sags.
 EffectKind compliance() {
-  return {.name = "compliance",
-          .targets = arm_targets,
-          .make =
-              [](const EffectTarget& target, const JointRoles& roles) {
-                return plain(
-                    "compliance", target,
-                    {{.name = "compliance", .unit = "deg/Nm", .si_per_unit = kDeg, .typical = 0.3 * kDeg}},
-                    [joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
-                      if (at.gravity_torque.size() > 0) c.dq[joint] += p[0].value * at.gravity_torque[joint];
-                    },
-                    Follows::kGravity);
-              },
-          .sentence =
-              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return e.target().joint + by_sign(e.parameters()[0], " gives way", " rises") +
-                       " under gravity's torque by " + amounts[0];
-              },
-          .not_testable =
-              [](const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) -> std::string {
-            constexpr double kLeastTorque_nm = 0.05;
-            if (!motion.has_masses) return "the robot's URDF has no masses";
-            const double range = motion.torque_range_nm[roles.index(target.joint)];
-            if (range >= kLeastTorque_nm) return {};
-            return "gravity's torque on " + target.joint + " changed by " + short_number(range, 3) + " Nm";
+  return {
+      .name = "compliance",
+      .targets = arm_targets,
+      .make =
+          [](const EffectTarget& target, const JointRoles& roles) {
+            return plain(
+                "compliance", target,
+                {{.name = "compliance", .unit = "deg/Nm", .si_per_unit = kDeg, .typical = 0.3 * kDeg}},
+                [joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
+                  if (at.gravity_torque.size() > 0) c.dq[joint] += p[0].value * at.gravity_torque[joint];
+                },
+                Follows::kGravity);
           },
-          .lookalikes = {"payload"},
-          .splitting_motion = "Record one log with and one without the load.",
-          .remark = "the joint gives way with gravity's torque, which depends on the posture"};
+      .sentence =
+          [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+            return e.target().joint + by_sign(e.parameters()[0], " gives way", " rises") +
+                   " under gravity's torque by " + amounts[0];
+          },
+      .not_testable = [](const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) -> std::string {
+        constexpr double kLeastTorque_nm = 0.05;
+        if (!motion.has_masses) return "the robot's URDF has no masses";
+        const double range = motion.torque_range_nm[roles.index(target.joint)];
+        if (range >= kLeastTorque_nm) return {};
+        return "gravity's torque on " + target.joint + " changed by " + short_number(range, 3) + " Nm";
+      },
+      .lookalikes = {"payload"},
+      .splitting_motion = "Record one log with and one without the load.",
+      .remark = "the joint gives way with gravity's torque, which depends on the posture"};
 }
 
 }  // namespace bodyschema::effects

@@ -10,8 +10,7 @@ EffectKind eccentricity() {
               [](const EffectTarget& target, const JointRoles& roles) {
                 return plain("eccentricity", target, {in_degrees("sine", 0.5), in_degrees("cosine", 0.5)},
                              [joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
-                               c.dq[joint] +=
-                                   p[0].value * std::sin(at.q[joint]) + p[1].value * std::cos(at.q[joint]);
+                               c.dq[joint] += p[0].value * std::sin(at.q[joint]) + p[1].value * std::cos(at.q[joint]);
                              });
               },
           .sentence =

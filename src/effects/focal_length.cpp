@@ -9,9 +9,7 @@ EffectKind focal_length() {
           .make =
               [](const EffectTarget& target, const JointRoles&) {
                 return plain("focal_length", target, {in_percent("scale", 1.0)},
-                             [](Parameters p, const Instant&, Corrections& c) {
-                               c.camera.focal_scale += p[0].value;
-                             });
+                             [](Parameters p, const Instant&, Corrections& c) { c.camera.focal_scale += p[0].value; });
               },
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {

@@ -27,32 +27,32 @@ Targets neighbours(const JointRoles& roles) {
 
 /// Tendons of one joint run past another: dq_joint = ratio * q_source.
 EffectKind joint_coupling() {
-  return {.name = "joint_coupling",
-          .targets = neighbours,
-          .make =
-              [](const EffectTarget& target, const JointRoles& roles) {
-                if (target.joint == target.source) {
-                  throw ConfigurationError("joint_coupling of '" + target.joint + "': expected another joint as source");
-                }
-                return plain("joint_coupling", target, {in_percent("ratio", 2.0)},
-                             [joint = roles.index(target.joint), source = roles.index(target.source)](
-                                 Parameters p, const Instant& at, Corrections& c) {
-                               c.dq[joint] += p[0].value * at.q[source];
-                             });
-              },
-          .sentence =
-              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return e.target().joint + " turns by " + amounts[0] + " of the angle of " + e.target().source +
-                       by_sign(e.parameters()[0], "", ", the other way");
-              },
-          .not_testable =
-              [](const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) {
-                const auto source = too_little_motion(target.source, roles, motion);
-                return source.empty() ? too_little_motion(target.joint, roles, motion) : source;
-              },
-          .lookalikes = {"axis_tilt"},
-          .splitting_motion = "Move the joint and its neighbours one at a time through their full ranges.",
-          .remark = "correct the coupling matrix where encoders are read"};
+  return {
+      .name = "joint_coupling",
+      .targets = neighbours,
+      .make =
+          [](const EffectTarget& target, const JointRoles& roles) {
+            if (target.joint == target.source) {
+              throw ConfigurationError("joint_coupling of '" + target.joint + "': expected another joint as source");
+            }
+            return plain(
+                "joint_coupling", target, {in_percent("ratio", 2.0)},
+                [joint = roles.index(target.joint), source = roles.index(target.source)](
+                    Parameters p, const Instant& at, Corrections& c) { c.dq[joint] += p[0].value * at.q[source]; });
+          },
+      .sentence =
+          [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+            return e.target().joint + " turns by " + amounts[0] + " of the angle of " + e.target().source +
+                   by_sign(e.parameters()[0], "", ", the other way");
+          },
+      .not_testable =
+          [](const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) {
+            const auto source = too_little_motion(target.source, roles, motion);
+            return source.empty() ? too_little_motion(target.joint, roles, motion) : source;
+          },
+      .lookalikes = {"axis_tilt"},
+      .splitting_motion = "Move the joint and its neighbours one at a time through their full ranges.",
+      .remark = "correct the coupling matrix where encoders are read"};
 }
 
 }  // namespace bodyschema::effects

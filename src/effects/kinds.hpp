@@ -89,9 +89,9 @@ inline std::string by_sign(const EffectParameter& p, const char* positive, const
 /// "3.1 deg": a number of two decimals at the most, for reasons.
 std::string short_number(double value, int decimals = 1);
 
-/// "1.2 mm (1.1 to 1.3) lower, and looks 0.7 deg (0.6 to 0.8) further up": how a camera's place departs, by its own axes
-/// (x right, y down, z forward), from three shifts and three turns about them. Amounts whose intervals hold zero ("at
-/// most") are left out, unless all do.
+/// "1.2 mm (1.1 to 1.3) lower, and looks 0.7 deg (0.6 to 0.8) further up": how a camera's place departs, by its own
+/// axes (x right, y down, z forward), from three shifts and three turns about them. Amounts whose intervals hold zero
+/// ("at most") are left out, unless all do.
 std::string camera_place(Parameters shifts_and_turns, std::span<const std::string> amounts);
 
 /// Reasons that several effects share; empty: testable.

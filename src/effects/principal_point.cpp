@@ -39,8 +39,8 @@ EffectKind principal_point() {
                 const std::string where = source == "common"       ? "of the cameras"
                                           : source == "difference" ? "of the first camera, against the second's,"
                                                                    : "of camera '" + source + "'";
-                return "the principal point " + where + " lies elsewhere than configured, by " + amounts[0] + " along x and " +
-                       amounts.back() + " along y";
+                return "the principal point " + where + " lies elsewhere than configured, by " + amounts[0] +
+                       " along x and " + amounts.back() + " along y";
               },
           .not_testable =
               [](const EffectTarget& target, const JointRoles&, const LogMotion& motion) {

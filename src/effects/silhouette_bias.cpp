@@ -16,8 +16,9 @@ EffectKind silhouette_bias() {
               },
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return "the outline " + (e.target().source.empty() ? "" : "of " + e.target().source + " ") + "in the pictures lies " +
-                       amounts[0] + by_sign(e.parameters()[0], " outside", " inside") + " that of the meshes";
+                return "the outline " + (e.target().source.empty() ? "" : "of " + e.target().source + " ") +
+                       "in the pictures lies " + amounts[0] + by_sign(e.parameters()[0], " outside", " inside") +
+                       " that of the meshes";
               },
           .lookalikes = {"mesh_scale", "focal_length"},
           .splitting_motion = "Show the hand near and far, and from palm and back.",

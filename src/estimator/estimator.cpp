@@ -58,8 +58,7 @@ Observation with_eyes_exchanged(Observation observation) {
 std::vector<Eigen::Index> in_order(const Eigen::VectorXd& values) {
   std::vector<Eigen::Index> order(static_cast<std::size_t>(values.size()));
   std::iota(order.begin(), order.end(), Eigen::Index{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](Eigen::Index a, Eigen::Index b) { return values(a) < values(b); });
+  std::stable_sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) { return values(a) < values(b); });
   return order;
 }
 
@@ -100,13 +99,11 @@ struct Estimator::Impl {
       : options(estimator_options), setup(robot_setup), rig(stereo_rig),
         model(robot, setup, rig, known.roles(), State(without_offsets(known), beliefs.state),
               effects_of(beliefs.tolerances, known.roles())),
-        joints(model.state().joints()),
-        scorer(model, silhouette_model(*robot, setup), rig.intrinsics(), options.silhouette, options.filter.particles,
-               !particles_only()),
-        filter(joints, options.filter),
-        memory(memory_layout(model.state(), beliefs.tolerances), options.memory),
-        fitter(model, scorer, options, rig.cameras.size()), state(model.state().prior_mean()), in_frame(memory.estimate()),
-        stalled(joints) {
+        joints(model.state().joints()), scorer(model, silhouette_model(*robot, setup), rig.intrinsics(),
+                                               options.silhouette, options.filter.particles, !particles_only()),
+        filter(joints, options.filter), memory(memory_layout(model.state(), beliefs.tolerances), options.memory),
+        fitter(model, scorer, options, rig.cameras.size()), state(model.state().prior_mean()),
+        in_frame(memory.estimate()), stalled(joints) {
     first_guesses = filter.states();
     cloud_covariance = filter.covariance();
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
@@ -307,7 +304,7 @@ struct Estimator::Impl {
     innovation = memory.innovation(fit.quadratic);
     const double ratio = innovation.dof > 0.0 ? innovation.nis / innovation.dof : 0.0;
     const double limit = chi_square_quantile(limits::kDoubt_tail, std::max(1.0, innovation.dof)) * usual();
-    verdict = !near ? FrameVerdict::kContradicts
+    verdict = !near                    ? FrameVerdict::kContradicts
               : innovation.nis > limit ? FrameVerdict::kDoubtful
                                        : FrameVerdict::kAgrees;
     if (verdict != FrameVerdict::kAgrees || innovation.dof <= 0.0) return;
@@ -323,7 +320,9 @@ struct Estimator::Impl {
       return;
     }
     fitter.learn_noise(fit);
-    if (const auto block = memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.quadratic, fit.x)) keep_frame(*block);
+    if (const auto block =
+            memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.quadratic, fit.x))
+      keep_frame(*block);
     look_again();
     settle_on(fit);
   }
@@ -331,7 +330,8 @@ struct Estimator::Impl {
   /// The first frame of every posture is kept, to be looked at again where the estimate has moved on.
   void keep_frame(std::uint64_t block) {
     const auto kept = memory.blocks();
-    std::erase_if(keyframes, [&](const auto& item) { return std::find(kept.begin(), kept.end(), item.first) == kept.end(); });
+    std::erase_if(keyframes,
+                  [&](const auto& item) { return std::find(kept.begin(), kept.end(), item.first) == kept.end(); });
     auto& keyframe = keyframes[block];
     keyframe.frame = frame;
     keyframe.pictures.resize(frame.seen.size());
@@ -624,7 +624,8 @@ struct Estimator::Impl {
     if (options.converged_hand_sd_m > 0.0) return options.converged_hand_sd_m;
     if (estimate.X_CP.empty()) return 0.0;
     constexpr double kMore = 1.5;
-    const double tolerated = std::sqrt(std::max(0.0, (hand_covariance_m2(frame.exposures[0]) - own_hand_covariance_m2()).trace()));
+    const double tolerated =
+        std::sqrt(std::max(0.0, (hand_covariance_m2(frame.exposures[0]) - own_hand_covariance_m2()).trace()));
     return std::hypot(limits::kHandPerDistance * estimate.X_CP.front().translation().norm(), kMore * tolerated);
   }
 
@@ -714,7 +715,7 @@ struct Estimator::Impl {
   RobotSetup setup;
   StereoRig rig;
   FrameModel model;
-  Frame frame;  ///< the last one; its observation is gone once `step` has returned
+  Frame frame;          ///< the last one; its observation is gone once `step` has returned
   Eigen::Index joints;  ///< estimated ones; the first entries of a state
   HypothesisScorer scorer;
   ParticleFilter filter;
@@ -724,7 +725,7 @@ struct Estimator::Impl {
     std::vector<CameraObservation> pictures;  ///< per camera: masks, not the pictures themselves
   };
   std::map<std::uint64_t, Keyframe> keyframes;  ///< by the memory's blocks
-  std::optional<PostureMemory> alternative;  ///< the memory that the last change of mind cost
+  std::optional<PostureMemory> alternative;     ///< the memory that the last change of mind cost
   double alternative_s = 0.0;
   OutlineFitter fitter;
 
@@ -808,8 +809,7 @@ Eigen::Matrix3d Estimator::hand_covariance_m2(const Exposure& exposure) {
 }
 
 std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& exposure, bool corrected) {
-  auto& projection =
-      corrected ? impl_->model.project(exposure, impl_->state) : impl_->model.project_nominal(exposure);
+  auto& projection = corrected ? impl_->model.project(exposure, impl_->state) : impl_->model.project_nominal(exposure);
   std::vector<Eigen::Vector3d> tips;
   for (const auto& X_CT : projection.fingertips()) tips.push_back(X_CT.translation());
   return tips;

@@ -45,10 +45,10 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
   m.memory_s = best.number_or("memory_s", m.memory_s, 0.1, 1e9);
   m.block_s = best.number_or("posture_s", m.block_s, 1e-3, 1e3);
   m.same_posture_rad = radians(best.number_or("same_posture_deg", degrees(m.same_posture_rad), 0.0, 90.0));
-  m.most_blocks = static_cast<std::size_t>(
-      best.integer_or("most_postures", static_cast<std::int64_t>(m.most_blocks), 4, 10000));
-  o.least_postures = static_cast<std::size_t>(
-      best.integer_or("least_postures", static_cast<std::int64_t>(o.least_postures), 1, 1000));
+  m.most_blocks =
+      static_cast<std::size_t>(best.integer_or("most_postures", static_cast<std::int64_t>(m.most_blocks), 4, 10000));
+  o.least_postures =
+      static_cast<std::size_t>(best.integer_or("least_postures", static_cast<std::int64_t>(o.least_postures), 1, 1000));
   if (!best.has("converged_hand_sd_mm") || best.text("converged_hand_sd_mm") == "auto") {
     o.converged_hand_sd_m = 0.0;
     static_cast<void>(best.text_or("converged_hand_sd_mm", "auto"));

@@ -6,8 +6,8 @@
 
 namespace bodyschema {
 
-std::optional<Explanation> explain(const std::vector<Hypothesis>& hypotheses, const PostureMemory& known, const OutlineFit& held,
-                                   double time_s, const Frame& frame, OutlineFitter& fitter) {
+std::optional<Explanation> explain(const std::vector<Hypothesis>& hypotheses, const PostureMemory& known,
+                                   const OutlineFit& held, double time_s, const Frame& frame, OutlineFitter& fitter) {
   std::optional<Explanation> best;
   double least = held.misfit - limits::kClearlyBetter;
   for (const auto& hypothesis : hypotheses) {

@@ -27,9 +27,9 @@ struct FrameEvidence {
 
 /// The pictures of one frame with what is known of their exposures: all that is needed to look at them again.
 struct Frame {
-  std::vector<Exposure> exposures;                ///< per camera; where one saw nothing, another's
-  std::vector<const CameraObservation*> seen;     ///< per camera; null: nothing. Not owned
-  [[nodiscard]] bool exposed() const;             ///< whether any camera saw anything
+  std::vector<Exposure> exposures;             ///< per camera; where one saw nothing, another's
+  std::vector<const CameraObservation*> seen;  ///< per camera; null: nothing. Not owned
+  [[nodiscard]] bool exposed() const;          ///< whether any camera saw anything
 };
 
 /// What a state predicts, and what pictures say of it: plays the encoders through the state's effects, turns their
@@ -51,7 +51,9 @@ class FrameModel {
   [[nodiscard]] const JointRoles& roles() const { return roles_; }
   [[nodiscard]] std::size_t part_count() const { return measurement_.part_count(); }
   [[nodiscard]] Eigen::Index beside_count() const { return static_cast<Eigen::Index>(beside_.parameters().size()); }
-  [[nodiscard]] double picture_unit_px(std::size_t camera) const { return picture_unit(rig_.cameras[camera].intrinsics); }
+  [[nodiscard]] double picture_unit_px(std::size_t camera) const {
+    return picture_unit(rig_.cameras[camera].intrinsics);
+  }
   /// An exposure that has not been taken: its motion as far as it is known so far.
   [[nodiscard]] Exposure preview(const JointSample& joints, std::size_t camera);
   /// One of an arm at rest, known by its encoders alone.
@@ -67,8 +69,7 @@ class FrameModel {
   /// @param search  one per camera
   /// @param look  called with a camera's matched points
   void linearise(const Frame& frame, const Eigen::VectorXd& x, std::span<const OutlineSearch> search, bool with_beside,
-                 FrameEvidence& out,
-                 const std::function<void(std::size_t, std::span<const OutlinePoint>)>& look = {});
+                 FrameEvidence& out, const std::function<void(std::size_t, std::span<const OutlinePoint>)>& look = {});
 
   [[nodiscard]] Pose hand_pose(const Exposure& exposure, const Eigen::VectorXd& x);
   [[nodiscard]] Pose nominal_hand_pose(const Exposure& exposure);
@@ -85,8 +86,8 @@ class FrameModel {
   JointRoles roles_;
   StereoRig rig_;
   State state_;
-  bool sags_ = false;        ///< some effect follows gravity
-  bool remembers_ = false;   ///< some effect has a memory
+  bool sags_ = false;       ///< some effect follows gravity
+  bool remembers_ = false;  ///< some effect has a memory
   OutlineMeasurement measurement_;
   EncoderTrack track_;
   EffectProbes probes_, beside_;

@@ -14,7 +14,8 @@ namespace bodyschema {
 HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes,
                                    std::vector<PinholeIntrinsics> cameras, const SilhouetteOptions& options,
                                    std::size_t slots, bool for_search)
-    : model_(model), cameras_(std::move(cameras)), observed_(cameras_.size()), coarse_(cameras_.size()), slots_(slots), X_CB_((slots + 1) * cameras_.size() * model.part_count()), counts_(slots * cameras_.size()),
+    : model_(model), cameras_(std::move(cameras)), observed_(cameras_.size()), coarse_(cameras_.size()), slots_(slots),
+      X_CB_((slots + 1) * cameras_.size() * model.part_count()), counts_(slots * cameras_.size()),
       distances_(static_cast<Eigen::Index>(slots)), one_distance_(1) {
   const std::size_t at_once = slots * cameras_.size();
   if (!for_search) {
@@ -38,8 +39,7 @@ HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& sil
   level_text_ = fmt::format(", 1/{} of the pictures' rows and columns, {} of {} triangles", step_, drawn, triangles);
 }
 
-bool HypothesisScorer::observe(const Observation& observation, const Frame& frame, double min_share,
-                               bool every_pixel) {
+bool HypothesisScorer::observe(const Observation& observation, const Frame& frame, double min_share, bool every_pixel) {
   frame_ = &frame;
   camera_mask_ = 0;
   double seen_px = 0.0, pixels = 0.0;

@@ -15,8 +15,9 @@ namespace bodyschema {
 
 /// Hammoude distances of hypotheses about the state to one frame's masks, equation (3) over all its
 /// pictures. Where the estimate is no hypothesis but what the outline makes of the best ones, they are compared on a
-/// SearchLevel, unless so little of the robot is in the pictures that every pixel counts. Hypotheses are placed in slots and scored together; what they hold beyond the joints' offsets is that of
-/// the frame model's last `settle`. One thread.
+/// SearchLevel, unless so little of the robot is in the pictures that every pixel counts. Hypotheses are placed in
+/// slots and scored together; what they hold beyond the joints' offsets is that of the frame model's last `settle`. One
+/// thread.
 class HypothesisScorer {
  public:
   /// @param slots  hypotheses that can be scored at once
@@ -25,8 +26,8 @@ class HypothesisScorer {
   HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes, std::vector<PinholeIntrinsics> cameras,
                    const SilhouetteOptions& options, std::size_t slots, bool for_search);
 
-  /// The observation that hypotheses are compared with until the next call, and its exposures; both must live as long. A camera without
-  /// a mask is not used. False when less than this share of the pictures is robot.
+  /// The observation that hypotheses are compared with until the next call, and its exposures; both must live as long.
+  /// A camera without a mask is not used. False when less than this share of the pictures is robot.
   /// @param every_pixel  compares full pictures, whatever the scorer is for
   bool observe(const Observation& observation, const Frame& frame, double min_share, bool every_pixel = false);
 
@@ -40,9 +41,7 @@ class HypothesisScorer {
   [[nodiscard]] bool can_be_exchanged() const;
 
   /// The predicted silhouette of one pose of all parts in a camera.
-  BinaryMask render(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera) {
-    return full_->render(X_CB, camera);
-  }
+  BinaryMask render(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera) { return full_->render(X_CB, camera); }
   /// The engine that scores, and why it was taken.
   [[nodiscard]] std::string description() const;
   /// Wall clock spent drawing and counting since the last call.
@@ -55,11 +54,11 @@ class HypothesisScorer {
   const Frame* frame_ = nullptr;
   std::vector<PinholeIntrinsics> cameras_;
   std::string engine_reason_, level_text_;
-  int step_ = 1;                               ///< of the search's level
-  std::unique_ptr<SilhouetteScorer> full_;     ///< every pixel, every triangle
-  std::unique_ptr<SilhouetteScorer> search_;   ///< of the search's level; null: there is none
-  SilhouetteScorer* scorer_ = nullptr;         ///< which of the two has the observation
-  std::uint32_t camera_mask_ = 0;  ///< cameras that have a mask
+  int step_ = 1;                              ///< of the search's level
+  std::unique_ptr<SilhouetteScorer> full_;    ///< every pixel, every triangle
+  std::unique_ptr<SilhouetteScorer> search_;  ///< of the search's level; null: there is none
+  SilhouetteScorer* scorer_ = nullptr;        ///< which of the two has the observation
+  std::uint32_t camera_mask_ = 0;             ///< cameras that have a mask
   std::vector<ObservedSilhouette> observed_, coarse_;
   std::size_t slots_;                    ///< and one more behind them, for `distance`
   std::vector<Eigen::Isometry3f> X_CB_;  ///< [slot][camera][part]

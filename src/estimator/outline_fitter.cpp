@@ -44,7 +44,8 @@ void OutlineFitter::look(const Frame& frame, double search_px, bool last, Outlin
   fit.quadratic.b += fit.quadratic.A.leftCols(n) * fit.x;
 }
 
-void OutlineFitter::refine(const Frame& frame, const PostureMemory& memory, std::span<const double> search_px, OutlineFit& fit) {
+void OutlineFitter::refine(const Frame& frame, const PostureMemory& memory, std::span<const double> search_px,
+                           OutlineFit& fit) {
   const Eigen::Index joints = model_.state().joints();
   for (const double reach_px : search_px) {
     look(frame, reach_px, false, fit);
@@ -72,7 +73,8 @@ OutlineFit OutlineFitter::follow_from(const Frame& frame, const Eigen::VectorXd&
   return fit;
 }
 
-OutlineFit OutlineFitter::search(const Frame& frame, std::span<const Eigen::VectorXd> starts, const PostureMemory& memory) {
+OutlineFit OutlineFitter::search(const Frame& frame, std::span<const Eigen::VectorXd> starts,
+                                 const PostureMemory& memory) {
   OutlineFit best;
   double least = 2.0;
   for (const auto& start : starts) {

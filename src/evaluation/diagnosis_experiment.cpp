@@ -74,7 +74,7 @@ bool wrong(const Outcome& o) {
   });
 }
 
-double hand_error_mm(const DiagnosisReport& report, const HandTruth& truth, Remainder ResidualSample::* which) {
+double hand_error_mm(const DiagnosisReport& report, const HandTruth& truth, Remainder ResidualSample::*which) {
   double square = 0.0, n = 0.0;
   for (const auto& sample : report.samples) {
     const auto at = truth.find({sample.utime, sample.camera});
@@ -98,7 +98,8 @@ class Trials {
   std::vector<Outcome> run() {
     std::vector<std::pair<Row, std::uint64_t>> jobs;
     for (int row = 0; row < kRows; ++row) {
-      const auto count = std::max(1L, std::lround(kLogsOf60[static_cast<std::size_t>(row)] * context_.options.trials / 60.0));
+      const auto count =
+          std::max(1L, std::lround(kLogsOf60[static_cast<std::size_t>(row)] * context_.options.trials / 60.0));
       for (long i = 0; i < count; ++i) {
         jobs.emplace_back(static_cast<Row>(row), context_.options.seed + 1000u * static_cast<std::uint64_t>(row) +
                                                      static_cast<std::uint64_t>(i));
@@ -122,8 +123,9 @@ class Trials {
         bar.set(++done);
       }
     };
-    const int wanted = context_.options.threads > 0 ? context_.options.threads
-                                                    : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    const int wanted = context_.options.threads > 0
+                           ? context_.options.threads
+                           : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
     std::vector<std::jthread> threads;
     for (int t = 1; t < wanted; ++t) threads.emplace_back(work);
     work();
@@ -230,9 +232,11 @@ double quantile(std::vector<double> values, double share) {
 class Table {
  public:
   Table(ExperimentContext& context) : context_(context) {
-    context_.table += fmt::format("\n{:<44} {:>6} {:>9}   {}\n", "through pictures, 60 s at 10 Hz", "logs", "measured", "demand");
+    context_.table +=
+        fmt::format("\n{:<44} {:>6} {:>9}   {}\n", "through pictures, 60 s at 10 Hz", "logs", "measured", "demand");
   }
-  void add(const char* row, const char* name, std::size_t logs, double value, double demand, bool at_most, double upper = 1e9) {
+  void add(const char* row, const char* name, std::size_t logs, double value, double demand, bool at_most,
+           double upper = 1e9) {
     context_.summary[row][name] = std::isfinite(value) ? Json(value) : Json(nullptr);
     context_.summary[row]["trials"] = logs;
     if (!std::isfinite(value)) return;
@@ -240,8 +244,8 @@ class Table {
     const bool met = at_most ? value <= demand + kRounding : value >= demand - kRounding && value <= upper + kRounding;
     const auto text = upper < 1e8 ? fmt::format("{:.2f} to {:.2f}", demand, upper)
                                   : fmt::format("{} {:.2f}", at_most ? "at most" : "at least", demand);
-    context_.table += fmt::format("{:<44} {:>6} {:>9.3f}   {:<14} {}\n", fmt::format("{} {}", row, name), logs, value, text,
-                                  met ? "" : "missed");
+    context_.table += fmt::format("{:<44} {:>6} {:>9.3f}   {:<14} {}\n", fmt::format("{} {}", row, name), logs, value,
+                                  text, met ? "" : "missed");
   }
 
  private:
@@ -258,8 +262,8 @@ double rate(const std::vector<const Outcome*>& outcomes, Test test) {
 void add_curve(ExperimentContext& context, const std::vector<const Outcome*>& single) {
   // By the larger of mm at the hand over 2 mm and px of outline over 1 px.
   constexpr std::array<double, 7> kEdges = {0.0, 0.125, 0.25, 0.5, 1.0, 2.0, 1e9};
-  context.table += fmt::format("\n{:<44} {:>6} {:>9} {:>9} {:>9}\n", "size, of what matters (2 mm or 1 px)", "logs", "first",
-                               "in class", "wrong");
+  context.table += fmt::format("\n{:<44} {:>6} {:>9} {:>9} {:>9}\n", "size, of what matters (2 mm or 1 px)", "logs",
+                               "first", "in class", "wrong");
   for (std::size_t i = 0; i + 1 < kEdges.size(); ++i) {
     std::vector<const Outcome*> in;
     for (const auto* o : single) {
@@ -271,7 +275,8 @@ void add_curve(ExperimentContext& context, const std::vector<const Outcome*>& si
     });
     const double named = rate(in, [](const Outcome& o) { return found(o, o.faults.front()); });
     const double off = rate(in, wrong);
-    const auto label = kEdges[i + 1] < 1e8 ? fmt::format("{} to {}", kEdges[i], kEdges[i + 1]) : fmt::format("{} and more", kEdges[i]);
+    const auto label =
+        kEdges[i + 1] < 1e8 ? fmt::format("{} to {}", kEdges[i], kEdges[i + 1]) : fmt::format("{} and more", kEdges[i]);
     context.table += fmt::format("{:<44} {:>6} {:>9.2f} {:>9.2f} {:>9.2f}\n", label, in.size(), first, named, off);
     context.summary["detection"].push_back(
         {{"from", kEdges[i]}, {"logs", in.size()}, {"first", first}, {"in_class", named}, {"wrong", off}});
@@ -281,8 +286,9 @@ void add_curve(ExperimentContext& context, const std::vector<const Outcome*>& si
 Json json_of(const Outcome& o) {
   Json faults = Json::array(), answer = Json::array();
   for (const auto& fault : o.faults) faults.push_back(fault.text());
-  for (const auto& c : o.report.causes) answer.push_back({{"sentence", c.sentence}, {"class", c.same.size()}, {"z", c.z}});
-  return {{"row", kNames[o.row]}, {"seed", o.seed},         {"faults", faults},         {"answer", answer},
+  for (const auto& c : o.report.causes)
+    answer.push_back({{"sentence", c.sentence}, {"class", c.same.size()}, {"z", c.z}});
+  return {{"row", kNames[o.row]},        {"seed", o.seed},       {"faults", faults},     {"answer", answer},
           {"verdict", o.report.verdict}, {"size_mm", o.size_mm}, {"size_px", o.size_px}, {"left_mm", o.left_mm}};
 }
 
@@ -314,30 +320,38 @@ void run_diagnosis(ExperimentContext& context) {
   Table table(context);
   const auto named = [](const Outcome& o) { return !o.report.causes.empty(); };
   table.add("null", "false_alarm_rate", rows[kNull].size(), rate(rows[kNull], named), 0.04, true);
-  table.add("single", "in_class_rate", single.size(), rate(single, [](const auto& o) { return found(o, o.faults[0]); }), 0.95, false);
-  table.add("single", "first_rate", single.size(), rate(single, [](const auto& o) {
-              return !o.report.causes.empty() && same(o.faults[0], o.report.causes[0].cause);
-            }), 0.88, false);
+  table.add("single", "in_class_rate", single.size(), rate(single, [](const auto& o) { return found(o, o.faults[0]); }),
+            0.95, false);
+  table.add("single", "first_rate", single.size(),
+            rate(single,
+                 [](const auto& o) { return !o.report.causes.empty() && same(o.faults[0], o.report.causes[0].cause); }),
+            0.88, false);
   table.add("single", "wrong_rate", single.size(), rate(single, wrong), 0.02, true);
   table.add("limit", "wrong_rate", limit.size(), rate(limit, wrong), 0.05, true);
-  table.add("two", "both_rate", rows[kTwo].size(), rate(rows[kTwo], [](const auto& o) {
-              return std::all_of(o.faults.begin(), o.faults.end(), [&](const auto& f) { return found(o, f); });
-            }), 0.88, false);
-  table.add("outside", "unexplained_rate", rows[kOutside].size(), rate(rows[kOutside], [](const auto& o) {
-              return o.report.verdict == "unexplained" || o.report.verdict == "class";
-            }), 0.90, false);
+  table.add("two", "both_rate", rows[kTwo].size(),
+            rate(rows[kTwo],
+                 [](const auto& o) {
+                   return std::all_of(o.faults.begin(), o.faults.end(), [&](const auto& f) { return found(o, f); });
+                 }),
+            0.88, false);
+  table.add("outside", "unexplained_rate", rows[kOutside].size(),
+            rate(rows[kOutside],
+                 [](const auto& o) { return o.report.verdict == "unexplained" || o.report.verdict == "class"; }),
+            0.90, false);
   table.add("outside", "none_rate", rows[kOutside].size(),
             rate(rows[kOutside], [](const auto& o) { return o.report.verdict == "none"; }), 0.0, true);
   const auto inside = [&](double widths) {
     if (sizes.ratio.empty()) return std::nan("");
-    return static_cast<double>(std::count_if(sizes.ratio.begin(), sizes.ratio.end(), [&](double r) { return r <= widths; })) /
+    return static_cast<double>(
+               std::count_if(sizes.ratio.begin(), sizes.ratio.end(), [&](double r) { return r <= widths; })) /
            static_cast<double>(sizes.ratio.size());
   };
   const auto n = sizes.error.size();
   table.add("parameters", "coverage95", n, inside(1.0), 0.90, false, 0.99);
   table.add("parameters", "error_median", n, quantile(sizes.error, kMedian), 0.04, true);
   table.add("parameters", "error_p90", n, quantile(sizes.error, kNinth), 0.15, true);
-  table.add("parameters", "sign_rate", n, n > 0 ? static_cast<double>(sizes.right_sign) / static_cast<double>(n) : std::nan(""), 1.0, false);
+  table.add("parameters", "sign_rate", n,
+            n > 0 ? static_cast<double>(sizes.right_sign) / static_cast<double>(n) : std::nan(""), 1.0, false);
   table.add("gain", "hand_improvement_median", gain.size(), quantile(gain, kMedian), 3.0, false);
   add_curve(context, rows[kSingle]);
   // Reliability of the intervals: what share of the truths lies within so much of their width.

@@ -18,8 +18,9 @@
 #include "experiments.hpp"
 
 /// Photographs of physical robots, calibrated from pictures and intrinsics alone. What is true is what is hidden in
-/// them: offsets added to the recorded joint angles. That the robots' own encoders are right, to a tenth of a degree, is
-/// an assumption: the arms are calibrated by their maker. Camera poses that others published are a witness, not truth.
+/// them: offsets added to the recorded joint angles. That the robots' own encoders are right, to a tenth of a degree,
+/// is an assumption: the arms are calibrated by their maker. Camera poses that others published are a witness, not
+/// truth.
 namespace bodyschema {
 namespace {
 
@@ -55,7 +56,8 @@ void copy_with(const fs::path& from, const fs::path& to, const std::map<std::str
     for (std::size_t i = 0; std::getline(cells, cell, ','); ++i) {
       if (text.empty()) names.push_back(cell);
       const auto offset = offsets_deg.find(names[i]);
-      if (!text.empty() && offset != offsets_deg.end()) cell = fmt::format("{:.12g}", std::stod(cell) + radians(offset->second));
+      if (!text.empty() && offset != offsets_deg.end())
+        cell = fmt::format("{:.12g}", std::stod(cell) + radians(offset->second));
       row += (i > 0 ? "," : "") + cell;
     }
     text += row + '\n';
@@ -175,9 +177,9 @@ void run_real(ExperimentContext& context) {
     return;
   }
   const int trials = std::clamp(context.options.trials, 1, 10);
-  context.table += fmt::format("\n{:<34} {:>6} {:>7} {:>7} {:>7} {:>6} {:>5} {:>8} {:>8} {:>6}\n",
-                               "real robots, camera unknown", "seeds", "rms deg", "repeat", "worst z", "rms z", "told",
-                               "cam mm", "cam deg", "good");
+  context.table +=
+      fmt::format("\n{:<34} {:>6} {:>7} {:>7} {:>7} {:>6} {:>5} {:>8} {:>8} {:>6}\n", "real robots, camera unknown",
+                  "seeds", "rms deg", "repeat", "worst z", "rms z", "told", "cam mm", "cam deg", "good");
   const fs::path urdf = data / "robots" / "lbr_med7" / "lbr_med7.urdf";
   for (const auto& demand : kSets) {
     ProgressBar bar(demand.name, static_cast<std::uint64_t>(trials));
@@ -203,13 +205,18 @@ void run_real(ExperimentContext& context) {
       if (list[t].calibration.state == CalibrationState::kGood) continue;
       context.table += fmt::format("  seed {}: {}\n", context.options.seed + t, list[t].calibration.sentence);
     }
-    context.table += fmt::format("{:<34} {:>6} {:>7.3f} {:>7.3f} {:>7.2f} {:>6} {:>5} {:>8.1f} {:>8.2f}\n", "  demanded", "",
-                                 demand.rms_deg, demand.repeat_deg, 2.5, "", 4, 15.0, 0.7);
-    context.summary["real"][demand.set] = {{"trials", f.trials},         {"rms_deg", rms},
-                                           {"repeat_deg", repeat},       {"worst_z", f.worst_z},
-                                           {"rms_z", rms_z},             {"told", f.fewest_told},
-                                           {"camera_mm", f.camera_mm},   {"camera_deg", f.camera_deg},
-                                           {"heldout_px", f.heldout_px}, {"good", f.good},
+    context.table += fmt::format("{:<34} {:>6} {:>7.3f} {:>7.3f} {:>7.2f} {:>6} {:>5} {:>8.1f} {:>8.2f}\n",
+                                 "  demanded", "", demand.rms_deg, demand.repeat_deg, 2.5, "", 4, 15.0, 0.7);
+    context.summary["real"][demand.set] = {{"trials", f.trials},
+                                           {"rms_deg", rms},
+                                           {"repeat_deg", repeat},
+                                           {"worst_z", f.worst_z},
+                                           {"rms_z", rms_z},
+                                           {"told", f.fewest_told},
+                                           {"camera_mm", f.camera_mm},
+                                           {"camera_deg", f.camera_deg},
+                                           {"heldout_px", f.heldout_px},
+                                           {"good", f.good},
                                            {"dishonest", f.dishonest}};
   }
 }

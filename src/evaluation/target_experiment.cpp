@@ -21,7 +21,8 @@ Eigen::VectorXd correct_reach(Estimator& estimator, const std::vector<Eigen::Ind
     for (std::size_t k = 0; k < joints.size(); ++k) {
       Eigen::VectorXd moved = q;
       moved(joints[k]) += kStep;
-      J.col(static_cast<Eigen::Index>(k)) = (estimator.hand_pose(estimator.at_rest(moved, 0), true).translation() - hand) / kStep;
+      J.col(static_cast<Eigen::Index>(k)) =
+          (estimator.hand_pose(estimator.at_rest(moved, 0), true).translation() - hand) / kStep;
     }
     const Eigen::VectorXd step = J.completeOrthogonalDecomposition().solve(target_C - hand);
     for (std::size_t k = 0; k < joints.size(); ++k) q(joints[k]) += step(static_cast<Eigen::Index>(k));

@@ -169,7 +169,7 @@ void BatchFit::fuse(const std::vector<std::size_t>& pictures) {
       }
       if (total > 0.0) {
         posture.b += posture.A.leftCols(n) * x;
-        memory_.add(seconds(all[first].joints.utime) , bodyschema::posture_of(all[first].joints.q, fit_.log().roles()),
+        memory_.add(seconds(all[first].joints.utime), bodyschema::posture_of(all[first].joints.q, fit_.log().roles()),
                     posture, x);
       }
       first = last;

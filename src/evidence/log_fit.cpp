@@ -14,7 +14,7 @@ namespace {
 /// A picture in which fewer points of the outline are found shows something else.
 constexpr double kFewestPoints = 20.0;
 constexpr double kLeastShare = 0.3;
-constexpr double kNarrow = 0.75;    ///< of the search, a step
+constexpr double kNarrow = 0.75;  ///< of the search, a step
 
 /// Plays the encoder log: `observe` sees every sample up to each picture, then `visit` the picture.
 template <class Observe, class Visit>
@@ -75,7 +75,7 @@ void LogFit::refresh() {
 }
 
 void LogFit::weigh_parts() {
-  constexpr double kStill = 1e-3;             // m, and rad
+  constexpr double kStill = 1e-3;  // m, and rad
   constexpr double kSamePosture_rad = 0.05;
   auto& projection = workers_.front()->projection();
   const auto nothing = log_.roles().no_corrections();
@@ -207,9 +207,8 @@ std::vector<StateEvidence> LogFit::project(const LinearLog& at, const ErrorModel
 std::vector<OutlineNoise> LogFit::noise(const ErrorModel& model, const OutlineSearch& search,
                                         const OutlineNoise::Prior& prior, std::span<const std::size_t> pictures) {
   std::vector<std::vector<OutlinePoint>> points(log_.pictures().size());
-  linearise(model, {}, search, pictures, [&](std::size_t p, std::span<const OutlinePoint> seen) {
-    points[p].assign(seen.begin(), seen.end());
-  });
+  linearise(model, {}, search, pictures,
+            [&](std::size_t p, std::span<const OutlinePoint> seen) { points[p].assign(seen.begin(), seen.end()); });
   std::vector<OutlineNoise> noise(log_.rig().cameras.size(), OutlineNoise(prior));
   for (std::size_t p = 0; p < points.size(); ++p) {
     const auto camera = log_.pictures()[p].camera;
@@ -233,7 +232,7 @@ std::vector<std::uint32_t> LogFit::moved_by(const ErrorModel& model, const std::
   return {moved.begin(), moved.end()};
 }
 
-double LogFit::mean_cost(const LinearLog& at, double usual_points, double OutlineEvidence::* cost) const {
+double LogFit::mean_cost(const LinearLog& at, double usual_points, double OutlineEvidence::*cost) const {
   double sum = 0.0, points = 0.0, worst = 0.0;
   for (std::size_t p = 0; p < at.evidence.size(); ++p) {
     const auto& evidence = at.evidence[p];

@@ -7,12 +7,12 @@
 namespace bodyschema {
 namespace {
 
-constexpr double kSameSide = 0.5;        // cosine between normals
-constexpr double kScale_sd = 4.0;        // robust scale: 96 % of a Gaussian's efficiency
-constexpr double kLeastScale_px = 1.0;   // a fraction of a pixel is what pictures place an outline to
-constexpr double kMostScale_px = 4.0;    // what lies further off is something else
-constexpr double kMedianToSd = 1.4826;   // of a Gaussian
-constexpr std::size_t kFewest = 20;      // points
+constexpr double kSameSide = 0.5;       // cosine between normals
+constexpr double kScale_sd = 4.0;       // robust scale: 96 % of a Gaussian's efficiency
+constexpr double kLeastScale_px = 1.0;  // a fraction of a pixel is what pictures place an outline to
+constexpr double kMostScale_px = 4.0;   // what lies further off is something else
+constexpr double kMedianToSd = 1.4826;  // of a Gaussian
+constexpr std::size_t kFewest = 20;     // points
 /// Physical: a flank of a limb at arm's length, in points 3 px apart: over so many light and shadow err alike.
 constexpr double kFlankPoints = 12.0;
 
@@ -89,7 +89,8 @@ double OutlineNoise::correlation_px() const {
 double OutlineNoise::variance_px2() const {
   const double prior = prior_.sd_px * prior_.sd_px;
   double own = prior;
-  if (points_ > 0.0 && slope_ > 0.0) own = (psi_square_ / points_) * (weight_ / points_) / std::pow(slope_ / points_, 2);
+  if (points_ > 0.0 && slope_ > 0.0)
+    own = (psi_square_ / points_) * (weight_ / points_) / std::pow(slope_ / points_, 2);
   return kFlankPoints * prior_.floor_px * prior_.floor_px +
          correlated_points() * (prior_.pictures * prior + pictures_ * own) / (prior_.pictures + pictures_);
 }

@@ -38,9 +38,9 @@ void PictureLog::add(const Observation& observation) {
   if (repeats_the_last(pictures)) return;
   for (auto& picture : pictures) {
     // Left and right of one observation may carry stamps in either order.
-    const auto at = std::upper_bound(
-        pictures_.begin(), pictures_.end(), picture.joints.utime,
-        [](Microseconds utime, const Picture& other) { return utime < other.joints.utime; });
+    const auto at =
+        std::upper_bound(pictures_.begin(), pictures_.end(), picture.joints.utime,
+                         [](Microseconds utime, const Picture& other) { return utime < other.joints.utime; });
     pictures_.insert(at, std::move(picture));
   }
 }

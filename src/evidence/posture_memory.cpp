@@ -147,10 +147,10 @@ PostureMemory::Step PostureMemory::step(const Quadratic& frame, std::span<const 
   const Eigen::MatrixXd to_x = root.asDiagonal() * U.transpose() * layout_.prior_sd.cwiseInverse().asDiagonal();
   Eigen::MatrixXd S = Eigen::MatrixXd::Identity(told, told) + to_x * known.own * to_x.transpose();
   if (m > 0) {
-    const Eigen::MatrixXd E =
-        root.cwiseInverse().asDiagonal() * (U.transpose() * (scale * seen.A.topRightCorner(n, m))) *
-            layout_.considered_sd.asDiagonal() +
-        to_x * known.sensitivity * layout_.considered_sd.asDiagonal();
+    const Eigen::MatrixXd E = root.cwiseInverse().asDiagonal() *
+                                  (U.transpose() * (scale * seen.A.topRightCorner(n, m))) *
+                                  layout_.considered_sd.asDiagonal() +
+                              to_x * known.sensitivity * layout_.considered_sd.asDiagonal();
     S += E * E.transpose();
   }
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(S);
@@ -192,9 +192,8 @@ std::optional<std::uint64_t> PostureMemory::add(double time_s, const Eigen::Vect
   Block block{++begun_, time_s, time_s, q, frame, x};
   if (!empty()) learn_posture_error(block);
   // The posture again: it counts as one still.
-  std::erase_if(blocks_, [&](const Block& other) {
-    return (q - other.q).cwiseAbs().maxCoeff() < options_.same_posture_rad;
-  });
+  std::erase_if(blocks_,
+                [&](const Block& other) { return (q - other.q).cwiseAbs().maxCoeff() < options_.same_posture_rad; });
   blocks_.push_back(std::move(block));
   while (blocks_.size() > options_.most_blocks) fold_oldest();
   changed();
@@ -210,8 +209,8 @@ std::vector<std::uint64_t> PostureMemory::blocks() const {
 std::optional<PostureMemory::Stale> PostureMemory::most_stale() const {
   // Physical: a joint turned by this moves an outline by a tenth of a pixel otherwise than its derivative says ...
   constexpr double kLinear_rad = 0.007;
-  constexpr double kLinear = 0.5;      // of what was believed, for what is no angle
-  constexpr double kFarthest = 5.0;    // ... and by this many times that at once, outlines are lost from sight
+  constexpr double kLinear = 0.5;    // of what was believed, for what is no angle
+  constexpr double kFarthest = 5.0;  // ... and by this many times that at once, outlines are lost from sight
   const auto& x = estimate().x;
   std::optional<Stale> stalest;
   double most = 1.0;
@@ -287,8 +286,7 @@ void PostureMemory::learn_posture_error(const Block& block) {
   error_square_ += error.squaredNorm();
   error_directions_ += told;
   const double prior = std::pow(options_.posture_sd_rad, 2);
-  posture_variance_ =
-      (options_.posture_prior * prior + error_square_) / (options_.posture_prior + error_directions_);
+  posture_variance_ = (options_.posture_prior * prior + error_square_) / (options_.posture_prior + error_directions_);
   changed();
 }
 

@@ -98,8 +98,8 @@ std::vector<Belief> read_beliefs(const Configuration& mapping, const JointRoles&
     } catch (const ConfigurationError& e) {
       const std::string what = e.what();
       const auto place = mapping.place(key);
-      throw ConfigurationError(what.find(place.substr(0, place.find(": key"))) == std::string::npos ? place + ": " + what
-                                                                                                 : what);
+      throw ConfigurationError(
+          what.find(place.substr(0, place.find(": key"))) == std::string::npos ? place + ": " + what : what);
     }
   }
   // Offsets first: particles are hypotheses about these.
@@ -116,7 +116,8 @@ State::State(const ErrorModel& known, const std::vector<Belief>& beliefs) : mode
       if ((belief.effect == "joint_offset") != offsets) continue;
       model_.add(belief.effect, belief.target);
       std::size_t e = 0;
-      while (!(std::as_const(model_)[e].name() == belief.effect && std::as_const(model_)[e].target() == belief.target)) ++e;
+      while (!(std::as_const(model_)[e].name() == belief.effect && std::as_const(model_)[e].target() == belief.target))
+        ++e;
       const Effect& effect = std::as_const(model_)[e];
       std::size_t fitted = 0;
       for (std::size_t p = 0; p < effect.parameters().size(); ++p) {
@@ -125,8 +126,7 @@ State::State(const ErrorModel& known, const std::vector<Belief>& beliefs) : mode
         const double sd = belief.sd.at(fitted++);
         if (sd <= 0.0) continue;
         const Eigen::Index joint = offsets ? model_.roles().index(belief.target.joint) : -1;
-        parameters_.push_back(
-            {{e, p}, name_of(effect, parameter), parameter.unit, parameter.si_per_unit, sd, joint});
+        parameters_.push_back({{e, p}, name_of(effect, parameter), parameter.unit, parameter.si_per_unit, sd, joint});
       }
     }
     if (offsets) joints_ = static_cast<Eigen::Index>(parameters_.size());

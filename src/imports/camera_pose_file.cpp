@@ -64,9 +64,8 @@ CameraPoses CameraPoses::read(const std::filesystem::path& file, const std::stri
   std::vector<std::string> methods;
   for (const auto& [name, unused] : poses->items()) methods.push_back(name);
   if (method.empty() && methods.size() > 1) {
-    throw FileError(
-        fmt::format("{}: poses by {} methods, {}: name one (--camera-pose FILE:METHOD)", file.string(),
-                    methods.size(), fmt::join(methods, ", ")));
+    throw FileError(fmt::format("{}: poses by {} methods, {}: name one (--camera-pose FILE:METHOD)", file.string(),
+                                methods.size(), fmt::join(methods, ", ")));
   }
   result.method = method.empty() ? methods.front() : method;
   const auto chosen = poses->find(result.method);

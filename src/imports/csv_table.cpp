@@ -114,8 +114,8 @@ CsvTable CsvTable::read(const std::filesystem::path& file) {
     for (std::size_t c = 0; c < fields.size(); ++c) {
       double value = std::numeric_limits<double>::quiet_NaN();
       if (!fields[c].empty() && !read_number(fields[c], value)) {
-        table.bad.add(FileError(where + ": '" + fields[c] + "' in column '" + table.names[c] +
-                                "' is not a finite number"));
+        table.bad.add(
+            FileError(where + ": '" + fields[c] + "' in column '" + table.names[c] + "' is not a finite number"));
         break;
       }
       row.values.push_back(value);

@@ -53,11 +53,11 @@ class Episodes {
     if (builder_) close(out_.path);
     if (result_.logs.empty()) {
       if (result_.episodes_left_out.count == 0) throw FileError("no episode was asked for");
-      throw FileError(result_.episodes_left_out.first +
-                      (result_.episodes_left_out.count > 1
-                           ? fmt::format(" (the first of {} episodes, none of which can be used)",
-                                         result_.episodes_left_out.count)
-                           : ""));
+      throw FileError(
+          result_.episodes_left_out.first +
+          (result_.episodes_left_out.count > 1
+               ? fmt::format(" (the first of {} episodes, none of which can be used)", result_.episodes_left_out.count)
+               : ""));
     }
     return std::move(result_);
   }
@@ -73,8 +73,8 @@ class Episodes {
     constexpr std::int64_t kMost = 1 << 28;
     if (rows < 0 || columns < 0 || rows > kMost || columns > kMost ||
         columns != static_cast<std::int64_t>(set_.columns.size())) {
-      throw FileError(fmt::format("episode {}: {} rows of {} readings, expected {}", episode_, rows, columns,
-                                  set_.columns.size()));
+      throw FileError(
+          fmt::format("episode {}: {} rows of {} readings, expected {}", episode_, rows, columns, set_.columns.size()));
     }
     const auto numbers = record.numbers(static_cast<std::size_t>(rows * (columns + 1)));
     rows_ = {};
@@ -93,7 +93,8 @@ class Episodes {
         continue;
       }
       rows_.utime.push_back(base_ + microseconds(time_s));
-      const auto from = numbers.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(rows) + i * rows_.columns);
+      const auto from =
+          numbers.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(rows) + i * rows_.columns);
       rows_.values.insert(rows_.values.end(), from, from + static_cast<std::ptrdiff_t>(rows_.columns));
     }
     next_row_ = 0;
@@ -126,7 +127,8 @@ class Episodes {
     const auto c = static_cast<std::size_t>(std::find(cameras_.begin(), cameras_.end(), key) - cameras_.begin());
     if (c == cameras_.size() || key.empty()) return;
     const std::int64_t time_us = record.integer("time_us");
-    const std::string where = fmt::format("episode {}, {} at {:.3f} s", episode_, key, 1e-6 * static_cast<double>(time_us));
+    const std::string where =
+        fmt::format("episode {}, {} at {:.3f} s", episode_, key, 1e-6 * static_cast<double>(time_us));
     const std::string what = "pictures of camera " + target_.rig.cameras[c].name;
     constexpr std::int64_t kDay_us = 86'400'000'000;
     if (time_us < 0 || time_us > kDay_us) return builder_->leave_out(what, where + ": its stamp is none");
@@ -140,7 +142,8 @@ class Episodes {
       if (record.kind() == "compressed" && is_jpeg(record.payload)) {
         return builder_->add_jpeg(utime, c, utime, record.payload, where);
       }
-      const Image image = record.kind() == "compressed" ? read_picture(record.payload, where) : pixels_of(record, where);
+      const Image image =
+          record.kind() == "compressed" ? read_picture(record.payload, where) : pixels_of(record, where);
       if (options_.raw) return builder_->add_picture(utime, c, utime, image, where);
       builder_->add_jpeg(utime, c, utime, to_jpeg_message(image, utime, kJpegQuality).data, where);
     } catch (const FileError& error) {
@@ -164,7 +167,8 @@ class Episodes {
   }
 
   void broken(const Record& record) {
-    builder_->leave_out("videos", fmt::format("episode {}, {}: {}", episode_, record.text("camera"), record.text("message")));
+    builder_->leave_out("videos",
+                        fmt::format("episode {}, {}: {}", episode_, record.text("camera"), record.text("message")));
   }
 
   void end() {
@@ -187,7 +191,8 @@ class Episodes {
     try {
       result_.logs.push_back({log, builder_->finish()});
     } catch (const FileError& error) {
-      result_.episodes_left_out.add(out_.one_log ? error.what() : fmt::format("episode {}: {}", episode_, error.what()));
+      result_.episodes_left_out.add(out_.one_log ? error.what()
+                                                 : fmt::format("episode {}: {}", episode_, error.what()));
     }
     builder_.reset();
   }
@@ -341,11 +346,10 @@ LerobotImport import_lerobot(const fs::path& folder, const ImportTarget& target,
   const auto count = [&](std::uint64_t done) {
     if (progress) progress(done, episodes.size());
   };
-  return read_with_python("lerobot", {kReader, folder.string(), "read", wanted.dump()}, folder.string(), say,
-                          [&](ByteSource& records) {
-                            return import_lerobot_records(records, folder.string(), set, cameras, target, options, out,
-                                                          count);
-                          });
+  return read_with_python(
+      "lerobot", {kReader, folder.string(), "read", wanted.dump()}, folder.string(), say, [&](ByteSource& records) {
+        return import_lerobot_records(records, folder.string(), set, cameras, target, options, out, count);
+      });
 }
 
 }  // namespace bodyschema

@@ -108,8 +108,8 @@ LogBuilder::Column LogBuilder::column_of(const std::string& name) {
   };
   if (const auto rule = target_.mapping.joints.find(name); rule != target_.mapping.joints.end()) {
     if (rule->second.joint.empty()) return {};
-    return {target_.robot->joint_index(rule->second.joint),
-            rule->second.scale.value_or(in_source(rule->second.joint)), rule->second.offset};
+    return {target_.robot->joint_index(rule->second.joint), rule->second.scale.value_or(in_source(rule->second.joint)),
+            rule->second.offset};
   }
   if (const auto joint = target_.robot->find_joint(name)) return {*joint, in_source(name), 0.0};
   ignored_.insert(name);
@@ -153,7 +153,7 @@ void LogBuilder::add_joints(Microseconds arrival, Microseconds utime, std::span<
   const bool fits = names.size() == values.size() && (velocities.empty() || velocities.size() == names.size());
   if (!fits || names.size() > kMostNames) {
     return leave_out("joint messages", fmt::format("{} names, {} positions and {} velocities", names.size(),
-                                                  values.size(), velocities.size()));
+                                                   values.size(), velocities.size()));
   }
   if (!stamp_is_good(utime, "joint messages", "joint message")) return;
   Columns& columns = columns_of(names);
@@ -209,8 +209,8 @@ void LogBuilder::add_picture(Microseconds arrival, std::size_t camera, Microseco
   }
   if (channels_of_[camera] == 0) channels_of_[camera] = picture.channels;
   if (channels_of_[camera] != picture.channels) {
-    return leave_out(what, fmt::format("{} is {}, those before it are not", where,
-                                       picture.channels == 1 ? "gray" : "in colour"));
+    return leave_out(
+        what, fmt::format("{} is {}, those before it are not", where, picture.channels == 1 ? "gray" : "in colour"));
   }
   write(channels_.cameras, arrival, utime, camera, to_message(picture, utime));
   ++summary_.cameras[camera].pictures;

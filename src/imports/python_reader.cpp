@@ -97,9 +97,8 @@ fs::path python_for(const std::string& kind, const std::function<void(const std:
   const FileLock lock(folder.parent_path() / (kind + ".lock"));
   if (ready()) return python;
   say(fmt::format("Python packages for this import are set up once, in {}", folder.string()));
-  const std::string otherwise =
-      fmt::format("or name an interpreter that has the packages of {}: BODYSCHEMA_PYTHON=/usr/bin/python3",
-                  wanted_file.string());
+  const std::string otherwise = fmt::format(
+      "or name an interpreter that has the packages of {}: BODYSCHEMA_PYTHON=/usr/bin/python3", wanted_file.string());
   run_step({"python3", kOwnPackagesOnly, "-m", "venv", "--clear", folder.string()}, "python3 -m venv",
            "install Python 3 with venv (Debian: python3-venv), " + otherwise);
   run_step({python.string(), kOwnPackagesOnly, "-m", "pip", "install", "--quiet", "--disable-pip-version-check",

@@ -59,7 +59,8 @@ bool is_picture(const BagTopic& topic) {
 /// Pictures of something else than what a camera saw, by the words of the name.
 bool is_derived(const BagTopic& topic) {
   const auto words = words_of(topic.name);
-  constexpr std::array<const char*, 7> kDerived = {"mask", "masks", "segmentation", "depth", "disparity", "labels", "debug"};
+  constexpr std::array<const char*, 7> kDerived = {"mask",      "masks",  "segmentation", "depth",
+                                                   "disparity", "labels", "debug"};
   return std::any_of(kDerived.begin(), kDerived.end(), [&](const char* word) { return words.contains(word); });
 }
 
@@ -113,7 +114,8 @@ class Chooser {
   }
 
   void choose_joints() {
-    for (const std::string& name : options_.joints) selection_.joints.push_back(named(name, "--joints", {"JointState"}).name);
+    for (const std::string& name : options_.joints)
+      selection_.joints.push_back(named(name, "--joints", {"JointState"}).name);
     if (!selection_.joints.empty()) return;
     std::vector<const BagTopic*> all, of_robot;
     for (const BagTopic& topic : topics_) {
@@ -124,11 +126,14 @@ class Chooser {
       });
       if (any) of_robot.push_back(&topic);
     }
-    if (all.empty()) throw ConfigurationError("the bag has no messages of sensor_msgs/JointState, so no joint readings");
+    if (all.empty())
+      throw ConfigurationError("the bag has no messages of sensor_msgs/JointState, so no joint readings");
     const auto& fitting = of_robot.empty() ? all : of_robot;
     if (fitting.size() > 1) {
-      throw ConfigurationError("several topics have joint readings. Which are the encoders? --joints TOPIC, repeated "
-                               "where each has some of the joints" + list_text(fitting));
+      throw ConfigurationError(
+          "several topics have joint readings. Which are the encoders? --joints TOPIC, repeated "
+          "where each has some of the joints" +
+          list_text(fitting));
     }
     selection_.joints.push_back(fitting.front()->name);
     if (all.size() > 1) selection_.notes.push_back("joints are taken from " + fitting.front()->name);
@@ -189,7 +194,8 @@ class Chooser {
   }
 
   void say_of_masks() {
-    const bool any = std::any_of(selection_.masks.begin(), selection_.masks.end(), [](const auto& t) { return !t.empty(); });
+    const bool any =
+        std::any_of(selection_.masks.begin(), selection_.masks.end(), [](const auto& t) { return !t.empty(); });
     for (const BagTopic& topic : topics_) {
       const auto words = words_of(topic.name);
       if (any || !is_picture(topic) || !(words.contains("mask") || words.contains("masks"))) continue;
@@ -253,7 +259,8 @@ class Frames {
     const double turned_deg = degrees(rotation_distance(X.linear(), mount.X_PC.linear()));
     constexpr double kSame_m = 1e-3, kSame_deg = 0.1;
     if (!moves && apart_m < kSame_m && turned_deg < kSame_deg) return std::nullopt;
-    return text + fmt::format("; the configuration has it {:.0f} mm and {:.1f} deg from there", 1e3 * apart_m, turned_deg);
+    return text +
+           fmt::format("; the configuration has it {:.0f} mm and {:.1f} deg from there", 1e3 * apart_m, turned_deg);
   }
 
  private:
@@ -265,8 +272,8 @@ class Frames {
   static std::string pose_text(const Pose& X) {
     const Eigen::Vector3d t = X.translation();
     const Eigen::Quaterniond q(X.linear());
-    return fmt::format("xyz {:.4f} {:.4f} {:.4f} m, quaternion x y z w {:.5f} {:.5f} {:.5f} {:.5f}", t.x(), t.y(), t.z(),
-                       q.x(), q.y(), q.z(), q.w());
+    return fmt::format("xyz {:.4f} {:.4f} {:.4f} m, quaternion x y z w {:.5f} {:.5f} {:.5f} {:.5f}", t.x(), t.y(),
+                       t.z(), q.x(), q.y(), q.z(), q.w());
   }
   std::map<std::string, Edge> parents_;
 };
@@ -299,8 +306,10 @@ class BagImport {
     }
     constexpr double kOtherClock_s = 1.0;
     if (joints_late_s_ && pictures_late_s_ && std::abs(*joints_late_s_ - *pictures_late_s_) > kOtherClock_s) {
-      builder_.note(fmt::format("joints were recorded {:.3f} s after their stamps, pictures {:.3f} s after theirs: "
-                                "are they stamped by one clock?", *joints_late_s_, *pictures_late_s_));
+      builder_.note(
+          fmt::format("joints were recorded {:.3f} s after their stamps, pictures {:.3f} s after theirs: "
+                      "are they stamped by one clock?",
+                      *joints_late_s_, *pictures_late_s_));
     }
     return builder_.finish();
   }
@@ -328,7 +337,7 @@ class BagImport {
     const auto count = static_cast<std::int64_t>(names.size());
     if (positions != count) {
       return builder_.leave_out("joint messages", fmt::format("{}: {} names and {} positions", record.text("topic"),
-                                                             names.size(), positions));
+                                                              names.size(), positions));
     }
     const auto values = record.numbers(names.size() + (velocities == count ? names.size() : 0));
     const auto place = place_of(record, joints_late_s_);
@@ -401,8 +410,10 @@ std::string BagTopic::text() const {
   if (!picture.empty()) line += ", " + picture;
   if (!joints.empty()) {
     constexpr std::size_t kMost = 8;
-    line += fmt::format(", {}{}", fmt::join(joints.begin(), joints.begin() + static_cast<std::ptrdiff_t>(std::min(joints.size(), kMost)), " "),
-                        joints.size() > kMost ? " ..." : "");
+    line += fmt::format(
+        ", {}{}",
+        fmt::join(joints.begin(), joints.begin() + static_cast<std::ptrdiff_t>(std::min(joints.size(), kMost)), " "),
+        joints.size() > kMost ? " ..." : "");
   }
   if (!broken.empty()) line += ", cannot be read: " + broken;
   return line;
@@ -438,8 +449,10 @@ std::vector<BagTopic> read_bag_topics(ByteSource& records, const std::string& ba
     if (record.has("names")) topic.joints = record.texts("names");
     if (record.has("encoding")) topic.picture = record.text("encoding");
     if (record.has("format")) topic.picture = record.text("format");
-    if (record.has("width")) topic.width = static_cast<int>(std::clamp<std::int64_t>(record.integer("width"), 0, 1 << 30));
-    if (record.has("height")) topic.height = static_cast<int>(std::clamp<std::int64_t>(record.integer("height"), 0, 1 << 30));
+    if (record.has("width"))
+      topic.width = static_cast<int>(std::clamp<std::int64_t>(record.integer("width"), 0, 1 << 30));
+    if (record.has("height"))
+      topic.height = static_cast<int>(std::clamp<std::int64_t>(record.integer("height"), 0, 1 << 30));
     if (record.has("info")) topic.camera_info = record.json("info");
     if (record.has("broken")) topic.broken = record.text("broken");
     topics.push_back(std::move(topic));
@@ -466,9 +479,8 @@ std::vector<BagTopic> list_bag(const std::filesystem::path& bag, const std::func
                           [&](ByteSource& records) { return read_bag_topics(records, bag.string()); });
 }
 
-ImportSummary import_ros_bag(const std::filesystem::path& bag, const ImportTarget& target,
-                             const RosBagOptions& options, const std::filesystem::path& log,
-                             const std::function<void(const std::string&)>& say,
+ImportSummary import_ros_bag(const std::filesystem::path& bag, const ImportTarget& target, const RosBagOptions& options,
+                             const std::filesystem::path& log, const std::function<void(const std::string&)>& say,
                              const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
   const auto topics = list_bag(bag, say);
   const BagSelection selection = BagSelection::choose(topics, target, options);
@@ -487,10 +499,9 @@ ImportSummary import_ros_bag(const std::filesystem::path& bag, const ImportTarge
   const auto bounded = [&](std::uint64_t done) {
     if (progress) progress(std::min(done, total), total);
   };
-  return read_with_python("ros-bag", {kReader, bag.string(), "read", wanted.dump()}, bag.string(), say,
-                          [&](ByteSource& records) {
-                            return import_bag_records(records, bag.string(), selection, target, log, bounded);
-                          });
+  return read_with_python(
+      "ros-bag", {kReader, bag.string(), "read", wanted.dump()}, bag.string(), say,
+      [&](ByteSource& records) { return import_bag_records(records, bag.string(), selection, target, log, bounded); });
 }
 
 }  // namespace bodyschema

@@ -95,7 +95,7 @@ class StillsImport {
       const bool any = has_picture(posture);
       if (posture.number && !any) {
         builder_.leave_out("postures", fmt::format("{}: no picture of posture {} in any camera",
-                                                  table_.where(*posture.row), *posture.number));
+                                                   table_.where(*posture.row), *posture.number));
       }
       if (moving_) {
         builder_.add_joints(posture.utime, posture.utime, joint_names_, joints_of(posture), velocities(i));
@@ -119,9 +119,9 @@ class StillsImport {
       const std::string& camera = target_.rig.cameras[c].name;
       if (image_folders_[c].empty() && std::all_of(image_folders_.begin(), image_folders_.end(),
                                                    [](const auto& folder) { return folder.empty(); })) {
-        throw FileError(fmt::format(
-            "{}/images: no folder of camera '{}'; it has {}. Which is it? import: {{cameras: {{{}: {}}}}}",
-            folder_.folder.string(), camera, fmt::join(there, ", "), camera, nearest_name(camera, there)));
+        throw FileError(
+            fmt::format("{}/images: no folder of camera '{}'; it has {}. Which is it? import: {{cameras: {{{}: {}}}}}",
+                        folder_.folder.string(), camera, fmt::join(there, ", "), camera, nearest_name(camera, there)));
       }
     }
     for (const std::string& name : there) {
@@ -185,8 +185,7 @@ class StillsImport {
             throw FileError(fmt::format("{}: time_s is not after the row before", table_.where(row)));
           }
         } else {
-          posture.utime =
-              options_.recorded_at + static_cast<Microseconds>(postures_.size() + 1) * kStillPeriod;
+          posture.utime = options_.recorded_at + static_cast<Microseconds>(postures_.size() + 1) * kStillPeriod;
         }
         for (const std::size_t c : joint_columns_) {
           if (!std::isnan(row.values[c]) || moving_) continue;
@@ -279,7 +278,8 @@ class StillsImport {
     const bool has_masks = std::any_of(mask_folders_.begin(), mask_folders_.end(),
                                        [](const std::string& folder) { return !folder.empty(); });
     if (has_masks && !options_.masks) builder_.note("masks are there and are left out, as asked (--no-masks)");
-    for (const std::string& name : folder_.not_read) builder_.note(name + "/ is not read: nothing here makes use of it");
+    for (const std::string& name : folder_.not_read)
+      builder_.note(name + "/ is not read: nothing here makes use of it");
   }
 
   const ImportTarget& target_;

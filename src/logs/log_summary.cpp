@@ -330,8 +330,8 @@ std::string LogSummary::text() const {
   }
   if (!pictures.empty()) {
     out += fmt::format("pictures show {}{} (a joint apart by {:.0f} deg or more)\n",
-                       postures == kMostPostures ? "at least " : "",
-                       plural(postures, "different posture"), degrees(kSamePosture_rad));
+                       postures == kMostPostures ? "at least " : "", plural(postures, "different posture"),
+                       degrees(kSamePosture_rad));
   }
   if (!sliding_joints) out += "in deg as if every joint turned: a log does not say which slide, a configuration does\n";
   return out;

@@ -89,7 +89,8 @@ Json json_of(const JointStateMessage& m, const std::set<std::string>& sliding_jo
 
 /// Estimated joints turn, all of them.
 Json json_of(const joint_offsets_t& m, const std::set<std::string>&) {
-  Json mean = Json::object(), sd = Json::object(), told = Json::object(), hand = Json::object(), others = Json::object();
+  Json mean = Json::object(), sd = Json::object(), told = Json::object(), hand = Json::object(),
+       others = Json::object();
   for (std::size_t i = 0; i < m.joint_name.size(); ++i) {
     mean[m.joint_name[i]] = number(degrees(m.mean_rad[i]));
     sd[m.joint_name[i]] = number(degrees(std::sqrt(std::max(0.0, m.covariance_rad2[i][i]))));

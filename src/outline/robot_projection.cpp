@@ -18,8 +18,8 @@ std::vector<std::string> camera_links(const StereoRig& rig) {
 
 }  // namespace
 
-RobotProjection::RobotProjection(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
-                                 const StereoRig& rig, const JointRoles& roles)
+RobotProjection::RobotProjection(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                                 const JointRoles& roles)
     : intrinsics_(rig.intrinsics()), segment_of_part_(setup.model.rendered_links.size(), 0),
       part_count_(setup.model.rendered_links.size()),
       kinematics_(std::move(robot), placed_links(setup), camera_links(rig)),

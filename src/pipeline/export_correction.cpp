@@ -184,8 +184,8 @@ std::string cameras_yaml(const StereoRig& rig) {
     text += fmt::format(
         "  {}:\n{}    image_type: {}\n    width: {}\n    height: {}\n    fx: {:.4f}\n    fy: {:.4f}\n"
         "    cx: {:.4f}\n    cy: {:.4f}\n    distortion: [{:.6g}, {:.6g}, {:.6g}, {:.6g}, {:.6g}]\n",
-        camera.name, mount_yaml(camera, rig.cameras.front()), camera.number(), k.width, k.height, k.fx, k.fy, k.cx, k.cy, d[0], d[1], d[2],
-        d[3], d[4]);
+        camera.name, mount_yaml(camera, rig.cameras.front()), camera.number(), k.width, k.height, k.fx, k.fy, k.cx,
+        k.cy, d[0], d[1], d[2], d[3], d[4]);
   }
   return text;
 }
@@ -309,7 +309,8 @@ ErrorModel known_effects(const std::optional<ErrorModel>& model, const JointRole
     try {
       auto& effect = all.add(p.effect, {p.joint, p.source});
       const auto parameters = effect.parameters();
-      const auto at = std::find_if(parameters.begin(), parameters.end(), [&](const auto& q) { return q.name == p.parameter; });
+      const auto at =
+          std::find_if(parameters.begin(), parameters.end(), [&](const auto& q) { return q.name == p.parameter; });
       if (at == parameters.end()) throw ConfigurationError("'" + p.effect + "' has no parameter '" + p.parameter + "'");
       at->value = p.value * at->si_per_unit;
     } catch (const ConfigurationError& e) {

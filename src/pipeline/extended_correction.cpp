@@ -80,8 +80,8 @@ bool is_link_of_urdf(const CameraModel& camera) {
 
 }  // namespace
 
-StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
-                        const StereoRig& rig) {
+StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
+                        const RobotSetup& setup, const StereoRig& rig) {
   StereoRig result = model.corrected(rig);
   std::vector<Pose> moved(rig.cameras.size(), Pose::Identity());
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
@@ -101,7 +101,7 @@ StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const Rob
 }
 
 std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
-                                              const RobotSetup& setup, const StereoRig& rig, Correction& correction) {
+                                       const RobotSetup& setup, const StereoRig& rig, Correction& correction) {
   const auto joints = robot->joint_count();
   std::vector<AppliedEffect> list;
   std::vector<Corrections> cameras(rig.cameras.size(), model.roles().no_corrections());
@@ -118,7 +118,8 @@ std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::share
         effect.apply(at_rest(joints, c), cameras[c]);
         Corrections own = model.roles().no_corrections();
         effect.apply(at_rest(joints, c), own);
-        if (!is_link_of_urdf(rig.cameras[c]) && camera_motion(robot, setup, rig, c, own)) entry.applied = "cameras.yaml";
+        if (!is_link_of_urdf(rig.cameras[c]) && camera_motion(robot, setup, rig, c, own))
+          entry.applied = "cameras.yaml";
       }
       Corrections change = model.roles().no_corrections();
       effect.apply(at_rest(joints, 0), change);  // what is no camera's changes for all of them alike

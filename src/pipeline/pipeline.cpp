@@ -56,8 +56,7 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
       beliefs_(Beliefs::from(configuration, JointRoles::of(robot_, setup_, rig_), rig_, options_)),
       background_watch_(robot_, links_of(rig_)), background_turned_rad_(rig_.cameras.size(), 0.0),
       estimator_(robot_, setup_, rig_, beliefs_, options_, without_intrinsics(error_model_, robot_, setup_, rig_)),
-      configuration_hash_(configuration.hash()),
-      model_hash_(model_hash_of(setup_, *robot_, error_model_)) {
+      configuration_hash_(configuration.hash()), model_hash_(model_hash_of(setup_, *robot_, error_model_)) {
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
   if (configuration.has("import")) JointMapping::from(configuration.section("import"));

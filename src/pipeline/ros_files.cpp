@@ -33,7 +33,9 @@ std::vector<std::pair<std::string, Origin>> origins_of(const std::filesystem::pa
        joint = joint->NextSiblingElement("joint")) {
     if (joint->Attribute("name") == nullptr || joint->Attribute("type") == nullptr) continue;  // of a transmission
     const XMLElement* origin = joint->FirstChildElement("origin");
-    const auto triple = [&](const char* key) { return urdf_triple(origin != nullptr ? origin->Attribute(key) : nullptr); };
+    const auto triple = [&](const char* key) {
+      return urdf_triple(origin != nullptr ? origin->Attribute(key) : nullptr);
+    };
     all.emplace_back(joint->Attribute("name"), Origin{triple("xyz"), triple("rpy")});
   }
   return all;
@@ -91,7 +93,8 @@ std::string calibration_yaml(const std::filesystem::path& urdf, const std::files
       "#   <xacro:property name=\"calibration\" value=\"${xacro.load_yaml('joint_calibration.yaml')}\"/>\n"
       "#   <xacro:property name=\"c\" value=\"${calibration['joints']['NAME']}\"/>\n"
       "#   <origin xyz=\"${c['x']} ${c['y']} ${c['z']}\" rpy=\"${c['roll']} ${c['pitch']} ${c['yaw']}\"/>\n"
-      "# x to yaw: the joint's origin (m, rad) with which the encoders, as they are, are right. offset (rad; m of a joint\n"
+      "# x to yaw: the joint's origin (m, rad) with which the encoders, as they are, are right. offset (rad; m of a "
+      "joint\n"
       "# that slides): encoder = true + offset; it is in the origin already, for whoever corrects encoders instead.\n";
   text += warnings_of(correction, "# ") + "joints:\n";
   const auto offsets = offsets_of(correction);
@@ -102,14 +105,14 @@ std::string calibration_yaml(const std::filesystem::path& urdf, const std::files
   for (const auto& [joint, origin] : origins_of(corrected)) {
     const auto old = known.find(joint);
     const auto offset = offsets.find(joint);
-    const bool moved = old != known.end() &&
-                       (old->second.xyz != origin.xyz || old->second.rpy != origin.rpy);
+    const bool moved = old != known.end() && (old->second.xyz != origin.xyz || old->second.rpy != origin.rpy);
     if (!moved && offset == offsets.end()) continue;
     any = true;
-    text += fmt::format("  {}:\n    x: {:.12g}\n    y: {:.12g}\n    z: {:.12g}\n    roll: {:.12g}\n    pitch: {:.12g}\n"
-                        "    yaw: {:.12g}\n    offset: {:.9g}\n",
-                        quoted(joint), origin.xyz.x(), origin.xyz.y(), origin.xyz.z(), origin.rpy.x(), origin.rpy.y(),
-                        origin.rpy.z(), offset == offsets.end() ? 0.0 : offset->second);
+    text += fmt::format(
+        "  {}:\n    x: {:.12g}\n    y: {:.12g}\n    z: {:.12g}\n    roll: {:.12g}\n    pitch: {:.12g}\n"
+        "    yaw: {:.12g}\n    offset: {:.9g}\n",
+        quoted(joint), origin.xyz.x(), origin.xyz.y(), origin.xyz.z(), origin.rpy.x(), origin.rpy.y(), origin.rpy.z(),
+        offset == offsets.end() ? 0.0 : offset->second);
     if (const auto sd = sds.find(joint); sd != sds.end()) text += fmt::format("    offset_sd: {:.6g}\n", sd->second);
   }
   return any ? text : text + "  {}\n";
@@ -133,7 +136,8 @@ std::string static_transforms(const std::vector<RosCamera>& cameras, const Corre
   std::string text =
       "#!/bin/sh\n"
       "# Publishes where the cameras are, for ROS 2; the lines of ROS 1 stand above. Optical axes: x right, y down,\n"
-      "# z forward.\n" + warnings_of(correction, "# ");
+      "# z forward.\n" +
+      warnings_of(correction, "# ");
   bool any = false;
   for (const RosCamera& camera : cameras) {
     if (camera.parent.empty()) {
@@ -144,24 +148,28 @@ std::string static_transforms(const std::vector<RosCamera>& cameras, const Corre
     const Eigen::Vector3d t = camera.X_PC.translation();
     const Eigen::Quaterniond q(camera.X_PC.linear());
     const std::string parent = shell_word(camera.parent), child = shell_word(ros_frame_of(camera.name));
-    text += fmt::format("# rosrun tf2_ros static_transform_publisher {:.9g} {:.9g} {:.9g} {:.12g} {:.12g} {:.12g} {:.12g} {} {}\n",
-                        t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), parent, child);
-    text += fmt::format("ros2 run tf2_ros static_transform_publisher --x {:.9g} --y {:.9g} --z {:.9g} --qx {:.12g} "
-                        "--qy {:.12g} --qz {:.12g} --qw {:.12g} --frame-id {} --child-frame-id {} &\n",
-                        t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), parent, child);
+    text += fmt::format(
+        "# rosrun tf2_ros static_transform_publisher {:.9g} {:.9g} {:.9g} {:.12g} {:.12g} {:.12g} {:.12g} {} {}\n",
+        t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), parent, child);
+    text += fmt::format(
+        "ros2 run tf2_ros static_transform_publisher --x {:.9g} --y {:.9g} --z {:.9g} --qx {:.12g} "
+        "--qy {:.12g} --qz {:.12g} --qw {:.12g} --frame-id {} --child-frame-id {} &\n",
+        t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), parent, child);
   }
   return any ? text + "wait\n" : text;
 }
 
 std::string transmissions_xml(const Correction& correction) {
   std::string notes = warnings_of(correction, "     ");
-  for (auto at = notes.find("--"); at != std::string::npos; at = notes.find("--")) notes.erase(at, 1);  // ends a comment
+  for (auto at = notes.find("--"); at != std::string::npos; at = notes.find("--"))
+    notes.erase(at, 1);  // ends a comment
   std::string text =
       "<?xml version=\"1.0\"?>\n"
-      "<!-- Transmissions for the <ros2_control> block of the URDF as it was: <offset> takes the encoders' error out (rad;\n"
+      "<!-- Transmissions for the <ros2_control> block of the URDF as it was: <offset> takes the encoders' error out "
+      "(rad;\n"
       "     m of a joint that slides; what stands there already is to be added). Not beside corrected.urdf or\n"
-      "     joint_calibration.yaml, which hold the same correction. Reduction and actuator names are yours.\n" + notes +
-      "-->\n<ros2_control>\n";
+      "     joint_calibration.yaml, which hold the same correction. Reduction and actuator names are yours.\n" +
+      notes + "-->\n<ros2_control>\n";
   for (const auto& [joint, offset] : offsets_of(correction)) {
     if (offset == 0.0) continue;
     const std::string name = escaped(joint);

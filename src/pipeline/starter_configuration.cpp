@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kGuessedFieldOfView_rad = 1.05;  // 60 deg across, a common camera
+constexpr double kGuessedFieldOfView_rad = 1.05;       // 60 deg across, a common camera
 constexpr double kPairSd_deg = 0.1, kPairSd_mm = 1.0;  // of a stereo pair that was calibrated as one
 
 bool among(const std::vector<std::string>& names, const std::string& name) {
@@ -100,11 +100,11 @@ Parts parts_of(const UrdfOutline& urdf, const std::string& hand_link, const std:
 /// One camera as it will stand in the configuration.
 struct StarterCamera {
   std::string name;
-  std::string link;        ///< with OpenCV axes; empty: none is known
+  std::string link;            ///< with OpenCV axes; empty: none is known
   std::optional<Pose> X_base;  ///< on `link`, where it was given
   PinholeIntrinsics k;
   std::array<double, 5> distortion{};
-  std::string source;      ///< of the intrinsics; empty: guessed
+  std::string source;           ///< of the intrinsics; empty: guessed
   std::optional<Pose> X_first;  ///< in the first camera, where a calibration of the pair says so
   [[nodiscard]] bool unknown() const { return link.empty(); }
 };
@@ -158,10 +158,9 @@ class Starter {
     if (!hand_.empty()) return urdf_.require(hand_, "--hand");
     const auto guess = urdf_.guess_hand();
     hand_ = guess.link;
-    notes_.push_back(fmt::format("hand: a guess, {}{}", hand_,
-                                 guess.others.empty()
-                                     ? ""
-                                     : fmt::format("; it could be {} as well (--hand)", fmt::join(guess.others, " or "))));
+    notes_.push_back(fmt::format(
+        "hand: a guess, {}{}", hand_,
+        guess.others.empty() ? "" : fmt::format("; it could be {} as well (--hand)", fmt::join(guess.others, " or "))));
   }
 
   void find_cameras() {
@@ -208,8 +207,8 @@ class Starter {
       for (const auto& name : names) cameras_.emplace_back().name = name;
     }
     if (o_.camera_infos.size() > cameras_.size()) {
-      throw ConfigurationError(fmt::format("--camera-info: {} files for {} cameras", o_.camera_infos.size(),
-                                           cameras_.size()));
+      throw ConfigurationError(
+          fmt::format("--camera-info: {} files for {} cameras", o_.camera_infos.size(), cameras_.size()));
     }
     std::vector<std::optional<CameraInfo>> infos;
     for (std::size_t c = 0; c < cameras_.size(); ++c) infos.push_back(find_intrinsics(c));
@@ -242,9 +241,10 @@ class Starter {
       camera.k.cx = 0.5 * (camera.k.width - 1);
       camera.k.cy = 0.5 * (camera.k.height - 1);
       if (o_.focal_px <= 0.0) {
-        notes_.push_back(fmt::format("camera {}: focal length: a guess, {:.0f} px; fill in your cameras' in robot.yaml, "
-                                     "or give --camera-info",
-                                     camera.name, camera.k.fx));
+        notes_.push_back(
+            fmt::format("camera {}: focal length: a guess, {:.0f} px; fill in your cameras' in robot.yaml, "
+                        "or give --camera-info",
+                        camera.name, camera.k.fx));
       }
       notes_.push_back(fmt::format("camera {}: principal point: a guess, the picture's middle", camera.name));
       return std::nullopt;
@@ -254,15 +254,16 @@ class Starter {
     camera.k = o_.rectified ? info.rectified : info.intrinsics;
     if (!o_.rectified) camera.distortion = info.distortion;
     if (!o_.rectified && !info.is_rectified()) {
-      notes_.push_back(fmt::format("camera {}: its pictures are taken for those that the lens makes, not for rectified "
-                                   "ones (--rectified)",
-                                   camera.name));
+      notes_.push_back(
+          fmt::format("camera {}: its pictures are taken for those that the lens makes, not for rectified "
+                      "ones (--rectified)",
+                      camera.name));
     }
     if (picture && *picture != PictureSize{camera.k.width, camera.k.height}) {
-      wrong_.push_back(fmt::format("{} is of pictures of {}x{} px, those of camera {} are {}x{}: calibrate at this size, "
-                                   "or scale the numbers in robot.yaml",
-                                   file.string(), camera.k.width, camera.k.height, camera.name, picture->width,
-                                   picture->height));
+      wrong_.push_back(
+          fmt::format("{} is of pictures of {}x{} px, those of camera {} are {}x{}: calibrate at this size, "
+                      "or scale the numbers in robot.yaml",
+                      file.string(), camera.k.width, camera.k.height, camera.name, picture->width, picture->height));
     }
     return info;
   }
@@ -350,9 +351,9 @@ class Starter {
     if (!missing.empty()) {
       wrong_.push_back(fmt::format(
           "joints.csv has no column of {}; {}", fmt::join(missing, ", "),
-          strangers_.empty() ? "a joint that was not recorded needs a value under robot.fixed_joints_deg"
-                             : fmt::format("say which of {} is which in estimator.yaml, import.joints",
-                                           fmt::join(strangers_, ", "))));
+          strangers_.empty()
+              ? "a joint that was not recorded needs a value under robot.fixed_joints_deg"
+              : fmt::format("say which of {} is which in estimator.yaml, import.joints", fmt::join(strangers_, ", "))));
     } else if (!strangers_.empty()) {
       notes_.push_back(fmt::format("columns of joints.csv that are no joints: {}", fmt::join(strangers_, ", ")));
     }
@@ -363,8 +364,8 @@ class Starter {
     }
     in_degrees_ = largest > kMostRadians;
     if (in_degrees_) {
-      notes_.push_back(fmt::format("joints.csv goes up to {:.4g} and is taken for deg (estimator.yaml: import.unit)",
-                                   largest));
+      notes_.push_back(
+          fmt::format("joints.csv goes up to {:.4g} and is taken for deg (estimator.yaml: import.unit)", largest));
     }
   }
 
@@ -413,9 +414,10 @@ class Starter {
     const StarterCamera& camera = cameras_[c];
     std::string text = fmt::format("  {}:\n", yaml(camera.name));
     if (camera.X_base) {
-      text += fmt::format("    link: {}\n    pose: known                     # or roughly, with pose_sd_deg and "
-                          "pose_sd_mm, or unknown\n    X_link_optical: {}\n",
-                          yaml(camera.link), pose_yaml(*camera.X_base));
+      text += fmt::format(
+          "    link: {}\n    pose: known                     # or roughly, with pose_sd_deg and "
+          "pose_sd_mm, or unknown\n    X_link_optical: {}\n",
+          yaml(camera.link), pose_yaml(*camera.X_base));
     } else if (!camera.unknown()) {
       text += fmt::format("    link: {}\n", yaml(camera.link));
     } else if (camera.X_first) {
@@ -457,8 +459,8 @@ class Starter {
     if (strangers_.empty()) return text;
     text += "  joints:\n";
     for (const auto& name : strangers_) {
-      text += fmt::format("    {}: \"-\"   # a joint of {}; \"-\": left out\n", yaml(name),
-                          o_.urdf.filename().string());
+      text +=
+          fmt::format("    {}: \"-\"   # a joint of {}; \"-\": left out\n", yaml(name), o_.urdf.filename().string());
     }
     return text;
   }

@@ -148,9 +148,8 @@ std::vector<std::string> UrdfOutline::movable_joints() const {
 
 int UrdfOutline::turning_above(const std::string& link) const {
   const auto joints = chain(link);
-  return static_cast<int>(std::count_if(joints.begin(), joints.end(), [&](const Joint& joint) {
-    return joint.movable && !slides(joint.name);
-  }));
+  return static_cast<int>(std::count_if(joints.begin(), joints.end(),
+                                        [&](const Joint& joint) { return joint.movable && !slides(joint.name); }));
 }
 
 /// Joints that move, by themselves or as mimics, and begin at this link or one fixed to it.
@@ -199,8 +198,9 @@ UrdfOutline::Hand UrdfOutline::guess_hand() const {
     if (has_shape(link) && !behind_slider(link)) most = std::max(most, turning_above(link));
   }
   if (most == 0) {
-    throw FileError(urdf_.string() + ": no link with a <visual> shape is moved by a joint that turns; say which is "
-                                     "the hand (--hand)");
+    throw FileError(urdf_.string() +
+                    ": no link with a <visual> shape is moved by a joint that turns; say which is "
+                    "the hand (--hand)");
   }
   std::vector<std::string> ends;
   for (const auto& link : names_) {

@@ -52,8 +52,9 @@ class Kept {
 class Watcher {
  public:
   Watcher(Pipeline& pipeline, const WatchOptions& options)
-      : pipeline_(pipeline), options_(options),
-        result_{PictureLog(pipeline.shared_robot(), pipeline.setup(), pipeline.rig()), {}, {}, {}, {}} {}
+      : pipeline_(pipeline),
+        options_(options), result_{
+                               PictureLog(pipeline.shared_robot(), pipeline.setup(), pipeline.rig()), {}, {}, {}, {}} {}
 
   WatchedLog run(bool estimate_first) {
     if (pipeline_.learns_background()) learn();
@@ -130,8 +131,8 @@ class Watcher {
         if (!seen) continue;
         ++result_.pictures_seen;
         const double pixels = static_cast<double>(seen->mask.width()) * static_cast<double>(seen->mask.height());
-        result_.pictures_with_robot +=
-            !seen->mask.empty() && static_cast<double>(seen->mask.count()) >= pipeline_.options().min_mask_share * pixels;
+        result_.pictures_with_robot += !seen->mask.empty() && static_cast<double>(seen->mask.count()) >=
+                                                                  pipeline_.options().min_mask_share * pixels;
       }
       result_.pictures.add(observation);
       kept.offer(observation);

@@ -71,8 +71,8 @@ SilhouetteOptions fastest_of(std::span<const EngineTiming> timings, const Silhou
   const EngineTiming* best = nullptr;
   std::string figures;
   for (const auto& t : timings) {
-    figures += fmt::format("{}{}{}{} {}", figures.empty() ? "" : ", ", t.engine, t.gl_pass.empty() ? "" : " ", t.gl_pass,
-                           t.error.empty() ? fmt::format("{:.2f} ms", t.ms) : t.error);
+    figures += fmt::format("{}{}{}{} {}", figures.empty() ? "" : ", ", t.engine, t.gl_pass.empty() ? "" : " ",
+                           t.gl_pass, t.error.empty() ? fmt::format("{:.2f} ms", t.ms) : t.error);
     const bool open = (options.engine == "auto" || options.engine == t.engine) &&
                       (options.gl_pass == "auto" || t.gl_pass.empty() || options.gl_pass == t.gl_pass);
     if (open && t.error.empty() && (best == nullptr || t.ms < best->ms)) best = &t;

@@ -20,8 +20,8 @@ int shorter_side(std::span<const PinholeIntrinsics> cameras) {
 PinholeIntrinsics every_nth_pixel(const PinholeIntrinsics& camera, int step) {
   const auto count = [&](int size) { return (size - step / 2 + step - 1) / step; };
   const double first = step / 2;
-  return {count(camera.width),      count(camera.height),          camera.fx / step,
-          camera.fy / step, (camera.cx - first) / step, (camera.cy - first) / step};
+  return {count(camera.width), count(camera.height),       camera.fx / step,
+          camera.fy / step,    (camera.cx - first) / step, (camera.cy - first) / step};
 }
 
 BinaryMask every_nth_pixel(const BinaryMask& mask, int step) {

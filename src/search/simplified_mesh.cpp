@@ -120,9 +120,9 @@ TriangleMesh simplify(const TriangleMesh& mesh, double bound_m) {
   constexpr int kTries = 8;
   double target_m = 4.0 * bound_m;
   for (int attempt = 0; attempt < kTries; ++attempt, target_m *= 0.7) {
-    const std::size_t count = meshopt_simplify(simpler.data(), indices.data(), indices.size(), positions,
-                                               mesh.vertices.size(), sizeof(mesh.vertices[0]), 0,
-                                               static_cast<float>(target_m) / scale, 0, nullptr);
+    const std::size_t count =
+        meshopt_simplify(simpler.data(), indices.data(), indices.size(), positions, mesh.vertices.size(),
+                         sizeof(mesh.vertices[0]), 0, static_cast<float>(target_m) / scale, 0, nullptr);
     TriangleMesh candidate = without_unused_vertices(mesh, std::span(simpler).first(count));
     if (!candidate.triangles.empty() && views.outline_distance_m(candidate) <= bound_m) return candidate;
   }
@@ -146,10 +146,11 @@ std::optional<TriangleMesh> unpack(const std::string& bytes, const Head& expecte
   if (bytes.size() < sizeof head) return std::nullopt;
   std::memcpy(&head, bytes.data(), sizeof head);
   TriangleMesh mesh;
-  if (head.magic != expected.magic || head.bound_m != expected.bound_m || head.full_vertices != expected.full_vertices ||
-      head.full_triangles != expected.full_triangles || head.vertices > head.full_vertices ||
-      head.triangles > head.full_triangles ||
-      bytes.size() != sizeof head + head.vertices * sizeof(mesh.vertices[0]) + head.triangles * sizeof(mesh.triangles[0])) {
+  if (head.magic != expected.magic || head.bound_m != expected.bound_m ||
+      head.full_vertices != expected.full_vertices || head.full_triangles != expected.full_triangles ||
+      head.vertices > head.full_vertices || head.triangles > head.full_triangles ||
+      bytes.size() !=
+          sizeof head + head.vertices * sizeof(mesh.vertices[0]) + head.triangles * sizeof(mesh.triangles[0])) {
     return std::nullopt;
   }
   mesh.vertices.resize(head.vertices);

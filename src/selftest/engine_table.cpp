@@ -25,16 +25,16 @@ std::string engine_table(const std::filesystem::path& config) {
   for (const auto& part : level.model.parts) triangles += part.triangles.size();
   const std::size_t silhouettes = options.filter.particles * cameras.size();
   const auto timings = time_engines(level.model, level.cameras, options.silhouette, silhouettes, kSeconds);
-  std::string table = fmt::format("{} silhouettes of {}, {} triangles, {}x{} px\n\n{:<8} {:<8} {:>9}\n", silhouettes,
-                                  robot->name(), triangles, level.cameras[0].width, level.cameras[0].height, "engine",
-                                  "gl_pass", "ms");
+  std::string table =
+      fmt::format("{} silhouettes of {}, {} triangles, {}x{} px\n\n{:<8} {:<8} {:>9}\n", silhouettes, robot->name(),
+                  triangles, level.cameras[0].width, level.cameras[0].height, "engine", "gl_pass", "ms");
   for (const auto& t : timings) {
-    table += fmt::format("{:<8} {:<8} {:>9}  {}\n", t.engine, t.gl_pass.empty() ? "-" : t.gl_pass,
-                         t.error.empty() ? fmt::format("{:.2f}", t.ms) : "-", t.error.empty() ? t.description : t.error);
+    table +=
+        fmt::format("{:<8} {:<8} {:>9}  {}\n", t.engine, t.gl_pass.empty() ? "-" : t.gl_pass,
+                    t.error.empty() ? fmt::format("{:.2f}", t.ms) : "-", t.error.empty() ? t.description : t.error);
   }
   std::string reason;
-  const auto chosen =
-      fastest_engine(level.model, level.cameras, options.silhouette, silhouettes, reason);
+  const auto chosen = fastest_engine(level.model, level.cameras, options.silhouette, silhouettes, reason);
   return table + fmt::format("\nsilhouette.engine in force: {} ({})\n",
                              chosen.engine + (chosen.engine == "atlas" ? " " + chosen.gl_pass : ""), reason);
 }

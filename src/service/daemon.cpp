@@ -51,8 +51,8 @@ double ms_between(std::int64_t from_us, std::int64_t to_us) {
 
 /// Called before there are threads. glibc would give each of some ten threads an arena of its own (up to eight per
 /// core), and each would keep the room for the most that was ever waiting in it; and it would take pictures from the
-/// arenas once the first had been freed. Over four reloads under load resident memory rose to 173 MiB by that, instead of
-/// 149. Two arenas, and pictures from the system, keep it flat.
+/// arenas once the first had been freed. Over four reloads under load resident memory rose to 173 MiB by that, instead
+/// of 149. Two arenas, and pictures from the system, keep it flat.
 void keep_memory_flat() {
 #ifdef __GLIBC__
   mallopt(M_ARENA_MAX, 2);

@@ -42,8 +42,8 @@ std::vector<EngineTiming> time_engines(const SilhouetteModel& model, std::span<c
   silhouettes = std::max<std::size_t>(1, silhouettes / cameras.size()) * cameras.size();
   const auto X_CB = poses_before(cameras, model, silhouettes);
   std::vector<SilhouetteCounts> counts(silhouettes);
-  std::vector<EngineTiming> timings{{"contour", "", 0.0, "", ""}, {"atlas", "raster", 0.0, "", ""},
-                                    {"atlas", "compute", 0.0, "", ""}};
+  std::vector<EngineTiming> timings{
+      {"contour", "", 0.0, "", ""}, {"atlas", "raster", 0.0, "", ""}, {"atlas", "compute", 0.0, "", ""}};
   for (auto& timing : timings) {
     SilhouetteOptions own = options;
     own.engine = timing.engine;
@@ -54,7 +54,8 @@ std::vector<EngineTiming> time_engines(const SilhouetteModel& model, std::span<c
       const auto scorer = make_silhouette_scorer(model, cameras, own);
       std::vector<ObservedSilhouette> observed;
       for (std::size_t c = 0; c < cameras.size(); ++c) {
-        observed.push_back({scorer->render(std::span(X_CB).subspan(c * model.parts.size(), model.parts.size()), c), {}});
+        observed.push_back(
+            {scorer->render(std::span(X_CB).subspan(c * model.parts.size(), model.parts.size()), c), {}});
       }
       timing.ms = std::numeric_limits<double>::infinity();
       for (int round = 0; round < 2 || since(begin) < seconds / static_cast<double>(timings.size()); ++round) {

@@ -137,8 +137,8 @@ struct Segmenter::Impl {
   ComponentFilter components;
   MaskMorphology morphology;
   BinaryMask detected, sure, uncertain, robot;
-  std::vector<float> rows;         // see detect()
-  std::vector<std::uint8_t> hits;  // of one row, 0 or 1, padded to whole words
+  std::vector<float> rows;           // see detect()
+  std::vector<std::uint8_t> hits;    // of one row, 0 or 1, padded to whole words
   std::vector<std::uint64_t> words;  // of one row
 };
 

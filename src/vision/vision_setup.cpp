@@ -6,8 +6,9 @@ namespace bodyschema {
 
 VisionSetup VisionSetup::from(const Configuration& vision) {
   VisionSetup setup;
-  const auto method = vision.choice_or("method", "learned_background",
-                                       {"single_colour", "background_picture", "learned_background", "statistics", "given"});
+  const auto method =
+      vision.choice_or("method", "learned_background",
+                       {"single_colour", "background_picture", "learned_background", "statistics", "given"});
   if (method == "single_colour") setup.method = SegmentationMethod::kSingleColour;
   if (method == "background_picture") setup.method = SegmentationMethod::kBackgroundPicture;
   if (method == "learned_background") setup.method = SegmentationMethod::kLearnedBackground;

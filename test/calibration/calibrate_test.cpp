@@ -18,8 +18,9 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-const std::map<std::string, double> kOffsets_deg = {{"joint1", 3.0}, {"joint2", -2.0}, {"joint3", 4.0}, {"joint4", 2.0},
-                                                    {"joint5", -3.0}, {"joint6", 2.0}, {"joint7", 5.0}};
+const std::map<std::string, double> kOffsets_deg = {{"joint1", 3.0}, {"joint2", -2.0}, {"joint3", 4.0},
+                                                    {"joint4", 2.0}, {"joint5", -3.0}, {"joint6", 2.0},
+                                                    {"joint7", 5.0}};
 
 Configuration arm7(const char* file, std::vector<std::string> overrides) {
   return Configuration::load(fs::path(BODYSCHEMA_SOURCE_DIR) / "config/arm7" / file, std::move(overrides));
@@ -49,7 +50,8 @@ class Calibrated : public ::testing::Test {
     plan.output = simulator::Output::kSilhouettes;
     simulator::Simulator simulator(load_robot(setup, rig), setup, rig, settings, plan);
     LogWriter log(folder_ / "log");
-    simulator::FramePublisher publisher(simulator.joint_names(), {.channels = Channels::with_prefix("ARM7"), .format = simulator::PictureFormat::kMasks});
+    simulator::FramePublisher publisher(simulator.joint_names(), {.channels = Channels::with_prefix("ARM7"),
+                                                                  .format = simulator::PictureFormat::kMasks});
     while (const auto frame = simulator.next()) publisher.publish(*frame, log);
     return folder_ / "log";
   }
@@ -74,7 +76,8 @@ TEST_F(Calibrated, OffsetsAreFoundWithinWhatIsClaimedAndTheFilesSayTheSame) {
   for (const auto& joint : result.joints) {
     if (!joint.told) continue;
     ++told;
-    EXPECT_NEAR(degrees(joint.offset_rad), kOffsets_deg.at(joint.name), 3.0 * degrees(joint.sd_rad) + 0.05) << joint.name;
+    EXPECT_NEAR(degrees(joint.offset_rad), kOffsets_deg.at(joint.name), 3.0 * degrees(joint.sd_rad) + 0.05)
+        << joint.name;
     EXPECT_LT(degrees(joint.sd_rad), 0.5) << joint.name;
   }
   EXPECT_GE(told, 5);

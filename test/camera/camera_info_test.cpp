@@ -59,7 +59,8 @@ TEST(CameraInfo, AsTheMessageIsPrinted) {
 
 TEST(CameraInfo, OfRos1) {
   std::string text = kEcho;
-  for (const auto& [small, capital] : {std::pair{"\nd:", "\nD:"}, {"\nk:", "\nK:"}, {"\nr:", "\nR:"}, {"\np:", "\nP:"}}) {
+  for (const auto& [small, capital] :
+       {std::pair{"\nd:", "\nD:"}, {"\nk:", "\nK:"}, {"\nr:", "\nR:"}, {"\np:", "\nP:"}}) {
     text = with(text, small, capital);
   }
   EXPECT_EQ(read(text).intrinsics, (PinholeIntrinsics{640, 480, 600, 601, 321, 241}));
@@ -80,7 +81,8 @@ projection_matrix: {rows: 3, cols: 4, data: [600, 0, 321, 0, 0, 601, 241, 0, 0, 
 }
 
 TEST(CameraInfo, OfRectifiedPictures) {
-  const CameraInfo info = read("width: 64\nheight: 48\nk: [60, 0, 32, 0, 60, 24, 0, 0, 1]\nd: [0, 0, 0, 0, 0, 0, 0, 0]\n");
+  const CameraInfo info =
+      read("width: 64\nheight: 48\nk: [60, 0, 32, 0, 60, 24, 0, 0, 1]\nd: [0, 0, 0, 0, 0, 0, 0, 0]\n");
   EXPECT_TRUE(info.is_rectified());
   EXPECT_EQ(info.intrinsics, info.rectified);
 }

@@ -110,9 +110,10 @@ TEST(StereoRig, TakesCamerasOfAnyNameInTheOrderOfTheirNumbers) {
 }
 
 TEST(StereoRig, ReadsWhereACameraIsFixedAndHowWellThatIsKnown) {
-  const CameraModel known = parse("cameras:\n  a: {link: base, X_link_optical: {xyz_m: [1, 2, 3], rpy_rad: "
-                                  "[-1.5707963267948966, 0, -1.5707963267948966]}, " +
-                                  kLens + "}\n")
+  const CameraModel known = parse(
+                                "cameras:\n  a: {link: base, X_link_optical: {xyz_m: [1, 2, 3], rpy_rad: "
+                                "[-1.5707963267948966, 0, -1.5707963267948966]}, " +
+                                kLens + "}\n")
                                 .cameras[0];
   EXPECT_EQ(known.mount.parent, "base");
   EXPECT_EQ(known.link, "camera:a");
@@ -121,9 +122,10 @@ TEST(StereoRig, ReadsWhereACameraIsFixedAndHowWellThatIsKnown) {
   EXPECT_TRUE((known.mount.X_PC * Eigen::Vector3d(0, 0, 1)).isApprox(Eigen::Vector3d(2, 2, 3), 1e-12));
   EXPECT_TRUE((known.mount.X_PC * Eigen::Vector3d(1, 0, 0)).isApprox(Eigen::Vector3d(1, 1, 3), 1e-12));
 
-  const CameraModel roughly = parse("cameras:\n  a: {link: base, X_link_optical: [[0, 0, 1, 1], [-1, 0, 0, 2], [0, "
-                                    "-1, 0, 3], [0, 0, 0, 1]], pose: roughly, pose_sd_deg: 5, pose_sd_mm: 50, " +
-                                    kLens + "}\n")
+  const CameraModel roughly = parse(
+                                  "cameras:\n  a: {link: base, X_link_optical: [[0, 0, 1, 1], [-1, 0, 0, 2], [0, "
+                                  "-1, 0, 3], [0, 0, 0, 1]], pose: roughly, pose_sd_deg: 5, pose_sd_mm: 50, " +
+                                  kLens + "}\n")
                                   .cameras[0];
   EXPECT_EQ(roughly.mount.knowledge, PlaceKnowledge::kRoughly);
   EXPECT_TRUE(roughly.mount.X_PC.isApprox(known.mount.X_PC, 1e-12));

@@ -20,9 +20,8 @@ inline const DiagnosedCause* found(const DiagnosisReport& report, const CauseNam
 
 /// Something of this part of the body is named, and nothing else.
 inline bool names_only_part(const DiagnosisReport& report, const std::string& part) {
-  return !report.causes.empty() && std::all_of(report.causes.begin(), report.causes.end(), [&](const DiagnosedCause& c) {
-    return c.cause.source == part;
-  });
+  return !report.causes.empty() && std::all_of(report.causes.begin(), report.causes.end(),
+                                               [&](const DiagnosedCause& c) { return c.cause.source == part; });
 }
 
 inline bool is_named(const DiagnosisReport& report) {
@@ -30,7 +29,8 @@ inline bool is_named(const DiagnosisReport& report) {
 }
 
 /// Named first itself, with this size: right sign, within twice the 95 % interval or a tenth.
-inline void expect_size(const DiagnosisReport& report, const CauseName& cause, const std::string& parameter, double value) {
+inline void expect_size(const DiagnosisReport& report, const CauseName& cause, const std::string& parameter,
+                        double value) {
   const auto* c = found(report, cause);
   ASSERT_NE(c, nullptr) << cause.text() << ": " << report.sentence;
   ASSERT_EQ(c->cause, cause) << report.sentence;

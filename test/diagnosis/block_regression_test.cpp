@@ -79,7 +79,8 @@ TEST(BlockRegression, AgreesWithOrdinaryLeastSquares) {
   const auto scores = base.score(rows.added());
   EXPECT_LT((scores.estimate() - all.tail(2)).norm(), 1e-6);
   EXPECT_LT((scores.u.rowwise().sum() - scores.total).norm(), 1e-6) << "every block has its say";
-  const Eigen::VectorXd own = (rows.Z - rows.X * least_squares(rows.X, rows.Z.col(0)) * Eigen::RowVector2d(1, 0)).col(0);
+  const Eigen::VectorXd own =
+      (rows.Z - rows.X * least_squares(rows.X, rows.Z.col(0)) * Eigen::RowVector2d(1, 0)).col(0);
   EXPECT_NEAR(scores.independent[0], own.squaredNorm() / rows.Z.col(0).squaredNorm(), 1e-6);
 }
 

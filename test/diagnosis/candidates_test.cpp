@@ -112,7 +112,8 @@ TEST_F(Candidates, FreeCurvesAreOfEveryArmJointOverWhatItDoes) {
     }
   }
   EXPECT_EQ(variables.size(), log_.roles().arm.size());
-  EXPECT_THAT(variables.at("r_elbow"), testing::UnorderedElementsAre("time", "velocity", "acceleration", "angle", "torque"));
+  EXPECT_THAT(variables.at("r_elbow"),
+              testing::UnorderedElementsAre("time", "velocity", "acceleration", "angle", "torque"));
 }
 
 TEST_F(Candidates, SlipsAreOffsetsFromATimeOn) {
@@ -148,7 +149,8 @@ class SlippedElbow : public Candidates {
 TEST_F(SlippedElbow, StandsOutMostWhereItHappened) {
   const auto about = search_.about(1.0);
   const auto best = slips(about, search_.regression(about), {}).best;
-  const auto strongest = std::max_element(best.begin(), best.end(), [](const auto& a, const auto& b) { return a.z() < b.z(); });
+  const auto strongest =
+      std::max_element(best.begin(), best.end(), [](const auto& a, const auto& b) { return a.z() < b.z(); });
   ASSERT_NE(strongest, best.end());
   EXPECT_EQ(strongest->cause.joint, "r_elbow");
   EXPECT_NEAR(seconds(strongest->from - log_.pictures().pictures().front().joints.utime), 7.0, 1.0);

@@ -110,7 +110,8 @@ TEST(DiagnosisReport, SaysWhenAnEventWas) {
 TEST(CauseName, IsReadAsPeopleSayIt) {
   EXPECT_EQ((CauseName{"latency", "", ""}.text()), "latency");
   EXPECT_EQ((CauseName{"slip", "r_elbow", ""}.text()), "slip of r_elbow");
-  EXPECT_EQ((CauseName{"joint_coupling", "r_elbow", "r_shoulder_yaw"}.text()), "joint_coupling of r_elbow with r_shoulder_yaw");
+  EXPECT_EQ((CauseName{"joint_coupling", "r_elbow", "r_shoulder_yaw"}.text()),
+            "joint_coupling of r_elbow with r_shoulder_yaw");
   EXPECT_EQ((CauseName{"mesh_scale", "", "r_hand"}.text()), "mesh_scale r_hand");
 }
 
@@ -124,8 +125,9 @@ TEST(DiagnosisReport, IsWrittenBesideItsModel) {
   r.write(folder);
   std::ifstream in(folder / "report.json");
   EXPECT_EQ(Json::parse(in)["verdict"], "class");
-  EXPECT_NEAR(ErrorModel::load(folder / "extended_model.yaml", test::roles()).find("latency", {})->parameters()[0].value,
-              0.058, 1e-9);
+  EXPECT_NEAR(
+      ErrorModel::load(folder / "extended_model.yaml", test::roles()).find("latency", {})->parameters()[0].value, 0.058,
+      1e-9);
   fs::remove_all(folder);
   // A folder that cannot be is said before the long work.
   std::ofstream(folder) << "a file";

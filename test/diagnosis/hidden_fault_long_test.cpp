@@ -30,8 +30,9 @@ TEST(ManyHiddenFaults, HealthyLogsNameNothing) {
 }
 
 TEST(ManyHiddenFaults, AWanderingJointIsNeverNothing) {
-  for (const char* fault : {"random_walk:joint=r_elbow,value=2", "random_walk:joint=r_wrist_pitch,value=3",
-                            "wobble:joint=r_wrist_pitch,value=1.5,period=4", "wobble:joint=r_elbow,value=0.8,period=9"}) {
+  for (const char* fault :
+       {"random_walk:joint=r_elbow,value=2", "random_walk:joint=r_wrist_pitch,value=3",
+        "wobble:joint=r_wrist_pitch,value=1.5,period=4", "wobble:joint=r_elbow,value=0.8,period=9"}) {
     const auto report = answer({fault});
     EXPECT_NE(report.verdict, "none") << fault << ": " << report.sentence;
   }
@@ -72,7 +73,8 @@ TEST(ManyHiddenFaults, ACrowdOfSmallErrorsIsNoLargeCause) {
               "eccentricity:joint=r_wrist_pitch,value=0.15", "axis_tilt:joint=r_wrist_yaw,value=0.1",
               "finger_posture:value=0.5", "mesh_scale:value=0.2"});
   EXPECT_NE(report.verdict, "unexplained") << report.sentence;
-  EXPECT_LE(std::count_if(report.causes.begin(), report.causes.end(), [](const auto& c) { return c.heldout_gain > 0.05; }), 1)
+  EXPECT_LE(
+      std::count_if(report.causes.begin(), report.causes.end(), [](const auto& c) { return c.heldout_gain > 0.05; }), 1)
       << report.sentence;
 }
 

@@ -23,7 +23,8 @@ TEST(LogDiagnosis, RefusesSwappedPictures) {
               ::testing::ThrowsMessage<DataError>(HasSubstr("the left and right pictures are swapped")));
 }
 
-/// No outline that the model predicts has a counterpart on the stick, so that no residual shows it: the answer was none.
+/// No outline that the model predicts has a counterpart on the stick, so that no residual shows it: the answer was
+/// none.
 TEST(LogDiagnosis, AStickInTheHandIsSeen) {
   const test::RenderedLog log(
       [](Settings&, Plan& plan) { plan.faults = {simulator::FaultSpec::parse("held:thing=stick")}; });

@@ -45,7 +45,8 @@ class Motion : public OwnRobot {
   [[nodiscard]] int reversals(const std::function<double(double)>& angle) const {
     return motion(moving(100.0, angle)).reversals[static_cast<std::size_t>(elbow_)];
   }
-  [[nodiscard]] std::vector<NotTestable> refused(const std::vector<JointSample>& encoders, std::size_t cameras = 2) const {
+  [[nodiscard]] std::vector<NotTestable> refused(const std::vector<JointSample>& encoders,
+                                                 std::size_t cameras = 2) const {
     return untestable(roles_, motion(encoders, cameras));
   }
 

@@ -20,8 +20,10 @@ class RenderedLog {
   using Edit = std::function<void(simulator::SimulatedFrame&, double share)>;  ///< of the log that is over
 
   explicit RenderedLog(const Change& change, const Edit& edit = {})
-      : file_(std::filesystem::temp_directory_path() / ("bodyschema_rendered_" + std::to_string(getpid()) + ".lcmlog")) {
-    const auto c = Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml");
+      : file_(std::filesystem::temp_directory_path() /
+              ("bodyschema_rendered_" + std::to_string(getpid()) + ".lcmlog")) {
+    const auto c =
+        Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml");
     const auto setup = RobotSetup::from(c.section("robot"));
     auto settings = simulator::SimulatorSettings::from(c.section("simulator"));
     settings.supersampling = 1;

@@ -30,11 +30,11 @@ struct Simulated {
 class SimulatedLog {
  public:
   explicit SimulatedLog(const Simulated& what)
-      : configuration_(Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml")),
+      : configuration_(
+            Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml")),
         setup_(RobotSetup::from(configuration_.section("robot"))),
         rig_(StereoRig::from(configuration_.section("cameras"))), robot_(load_robot(setup_, rig_)),
-        pictures_(robot_, setup_, rig_), fit_(pictures_, 1),
-        options_(EstimatorOptions::from(configuration_)),
+        pictures_(robot_, setup_, rig_), fit_(pictures_, 1), options_(EstimatorOptions::from(configuration_)),
         beliefs_(Beliefs::from(configuration_, pictures_.roles(), rig_, options_)) {
     auto settings = simulator::SimulatorSettings::from(configuration_.section("simulator"));
     settings.camera_rate_hz = what.rate_hz;

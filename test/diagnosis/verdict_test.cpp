@@ -92,8 +92,9 @@ TEST(Verdict, SaysAClassWhereSeveralFit) {
   cause.same.push_back({"joint_coupling", "elbow", "prosup"});
   const auto report = worded(report_of({cause}));
   EXPECT_EQ(report.verdict, "class");
-  EXPECT_THAT(report.sentence, HasSubstr("(or eccentricity of elbow, joint_coupling of elbow with prosup, which this log cannot "
-                                         "tell from it)"));
+  EXPECT_THAT(report.sentence,
+              HasSubstr("(or eccentricity of elbow, joint_coupling of elbow with prosup, which this log cannot "
+                        "tell from it)"));
 }
 
 /// A kink of 1.5 deg in an elbow was named an eccentricity of 16 deg.
@@ -134,7 +135,8 @@ TEST(Verdict, TrustsNothingWhereThePicturesShowMoreThanTheModel) {
 
 TEST(Verdict, AnOutlineThatLiesOffOnOneSideIsNotExplained) {
   auto report = report_of({});
-  report.side_left_over = "the left outline of hand lies 0.8 px outside of where the model has it in the pictures of left";
+  report.side_left_over =
+      "the left outline of hand lies 0.8 px outside of where the model has it in the pictures of left";
   report = worded(std::move(report));
   EXPECT_EQ(report.verdict, "unexplained");
   EXPECT_THAT(report.sentence, HasSubstr(report.side_left_over));

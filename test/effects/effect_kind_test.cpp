@@ -61,8 +61,8 @@ TEST(EffectKinds, SayWhatTheyFoundInASentenceWithTheSizeAndAWordForTheSign) {
     EXPECT_THAT(sentence, HasSubstr(target.joint)) << kind.name;
     // Of one parameter without bound the sign is a word. Sizes come without it.
     const auto parameters = std::as_const(*effect).parameters();
-    const bool signed_size = amounts.size() == 1 && std::isinf(parameters[0].at_least) && kind.name != "joint_coupling" &&
-                             kind.name != "compliance";
+    const bool signed_size = amounts.size() == 1 && std::isinf(parameters[0].at_least) &&
+                             kind.name != "joint_coupling" && kind.name != "compliance";
     if (!signed_size) continue;
     effect->parameters()[0].value *= -1.0;
     EXPECT_NE(kind.sentence(*effect, r, amounts), sentence) << kind.name;
@@ -137,7 +137,8 @@ TEST(EffectKinds, OneThatIsRegisteredIsOneOfTheCatalogue) {
   Corrections c = r.no_corrections();
   again.corrections(at, c);
   EXPECT_NEAR(c.dq[9], radians(2.0), 1e-12);
-  EXPECT_THAT([&] { effect_kind("own_ripple_of_the_ger"); }, ThrowsMessage<ConfigurationError>(HasSubstr(test::kOwnEffect)));
+  EXPECT_THAT([&] { effect_kind("own_ripple_of_the_ger"); },
+              ThrowsMessage<ConfigurationError>(HasSubstr(test::kOwnEffect)));
 }
 
 TEST(EffectKinds, ASecondOneOfANameIsAnError) {

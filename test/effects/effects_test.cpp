@@ -119,8 +119,8 @@ TEST(Catalogue, EveryParameterHasItsMeaningInTheHandbook) {
       last = &p;
     }
     EXPECT_TRUE(row.starts_with(begin + names + " " + last->unit + " | "))
-        << "docs/diagnose.md: expected a row '" << begin << names << " " << last->unit << " | meaning |', found '" << row
-        << "'";
+        << "docs/diagnose.md: expected a row '" << begin << names << " " << last->unit << " | meaning |', found '"
+        << row << "'";
   }
 }
 
@@ -309,7 +309,8 @@ TEST(Cameras, OneCameraHasNoPair) {
   r.cameras = {"only"};
   for (const char* name : {"camera_pair", "baseline"}) {
     EXPECT_TRUE(effect_targets(name, r).empty()) << name;
-    EXPECT_THAT([&] { make_effect(name, {}, r); }, testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr(name)));
+    EXPECT_THAT([&] { make_effect(name, {}, r); },
+                testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr(name)));
   }
   EXPECT_EQ(effect_targets("principal_point", r).size(), 1u);
   EXPECT_EQ(effect_targets("camera_pose", r).size(), 1u);
@@ -331,8 +332,11 @@ TEST(Shapes, AreThoseOfTheBodyOrOfOneSegment) {
     EXPECT_EQ(size(hand, 0), 0.0) << name;
     EXPECT_NEAR(size(hand, 1), 0.02, 1e-15);
   }
-  EXPECT_THAT([&] { make_effect("mesh_scale", {"", "hnad"}, r); },
-              testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr("expected forearm or hand")));
+  EXPECT_THAT(
+      [&] {
+        make_effect("mesh_scale", {"", "hnad"}, r);
+      },
+      testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr("expected forearm or hand")));
 }
 
 TEST(InTime, DriftGrowsAndSlipJumps) {

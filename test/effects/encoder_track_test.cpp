@@ -36,9 +36,7 @@ class EncoderTrackTest : public testing::Test {
     for (Microseconds t = from; t <= to; t += 10'000) list.push_back(sample(t));
     return list;
   }
-  [[nodiscard]] double speed(Microseconds utime) const {
-    return radians(10.0) * kPi * std::cos(kPi * seconds(utime));
-  }
+  [[nodiscard]] double speed(Microseconds utime) const { return radians(10.0) * kPi * std::cos(kPi * seconds(utime)); }
 
   RobotSetup setup;
   std::shared_ptr<const RobotModel> robot;

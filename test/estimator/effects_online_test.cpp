@@ -20,7 +20,8 @@ class EffectsOnline : public OwnRobot {
     options_.silhouette.engine = "contour";
     options_.filter.particles = 60;
   }
-  [[nodiscard]] Beliefs beliefs(const std::vector<Belief>& more = {}, const std::vector<Belief>& tolerances = {}) const {
+  [[nodiscard]] Beliefs beliefs(const std::vector<Belief>& more = {},
+                                const std::vector<Belief>& tolerances = {}) const {
     Beliefs beliefs;
     for (const auto& target : effect_targets("joint_offset", roles_)) {
       beliefs.state.push_back({"joint_offset", target, {options_.filter.initial_sd_rad}});
@@ -93,8 +94,10 @@ TEST_F(EffectsOnline, ALinkAndWhereTheCamerasSitAreEstimatedWithTheOffsets) {
                                {"camera_pose", {}, {0.02, 0.02, 0.02, 2 * deg, 2 * deg, 2 * deg}}}),
                       options_);
   const Estimate estimate = follow(estimator, reach, 0, 24);
-  for (const auto& [name, truth] : {std::pair{"link_length of r_wrist_pitch", 0.006}, {"camera_pose x", 0.01},
-                                    {"camera_pose y", 0.0}, {"camera_pose turn_y", deg}}) {
+  for (const auto& [name, truth] : {std::pair{"link_length of r_wrist_pitch", 0.006},
+                                    {"camera_pose x", 0.01},
+                                    {"camera_pose y", 0.0},
+                                    {"camera_pose turn_y", deg}}) {
     const auto* found = find(estimate, name);
     ASSERT_NE(found, nullptr) << name;
     EXPECT_LT(std::abs(found->value - truth), 4.0 * found->sd) << name;
@@ -136,7 +139,8 @@ TEST_F(EffectsOnline, TolerancesWidenWhatIsClaimed) {
 /// Somebody knocks the camera: its place is what changed, the arm's offsets stay known.
 TEST_F(EffectsOnline, AKnockedCameraIsNotTakenForTheArm) {
   const double deg = radians(2.0);
-  Estimator estimator(robot_, setup_, rig_, beliefs({{"camera_pose", {}, {0.02, 0.02, 0.02, deg, deg, deg}}}), options_);
+  Estimator estimator(robot_, setup_, rig_, beliefs({{"camera_pose", {}, {0.02, 0.02, 0.02, deg, deg, deg}}}),
+                      options_);
   SyntheticReach reach(robot_, setup_, rig_, paper_offsets_rad());
   const Estimate before = follow(estimator, reach, 0, 24);
   ErrorModel knocked(roles_);

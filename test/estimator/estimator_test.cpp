@@ -109,7 +109,8 @@ TEST_F(EstimatorOnOwnRobot, AnEarlierEstimatePredictsWhatItDidThen) {
   const Observation last = seen(*reach_, 4, 9.0);
   follow(estimator, *reach_, 0, 4, 9.0);
   const Estimate earlier = estimator.step(last);
-  EXPECT_NEAR(estimator.hand_covariance_m2(estimator.exposure(0)).trace(), earlier.hand_sd_m * earlier.hand_sd_m, 1e-15);
+  EXPECT_NEAR(estimator.hand_covariance_m2(estimator.exposure(0)).trace(), earlier.hand_sd_m * earlier.hand_sd_m,
+              1e-15);
   const Exposure exposure = estimator.exposure(1);
   const Pose hand = estimator.hand_pose(exposure, true);
   const BinaryMask silhouette = estimator.predicted_silhouette(last, 1, true);

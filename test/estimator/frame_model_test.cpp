@@ -21,7 +21,8 @@ class FrameModelOfOwnRobot : public OwnRobot {
   }
   [[nodiscard]] static double speed(Microseconds utime) { return radians(10.0) * kPi * std::cos(kPi * seconds(utime)); }
   /// Exposures of both eyes, with the samples of 100 Hz since `from` and some ahead.
-  [[nodiscard]] Observation observe(Microseconds left, Microseconds right, Microseconds from, Microseconds ahead) const {
+  [[nodiscard]] Observation observe(Microseconds left, Microseconds right, Microseconds from,
+                                    Microseconds ahead) const {
     Observation observation;
     observation.utime = left;
     for (const auto utime : {left, right}) {
@@ -30,7 +31,8 @@ class FrameModelOfOwnRobot : public OwnRobot {
       seen.joints = sample(utime);
       observation.cameras.push_back(std::move(seen));
     }
-    for (Microseconds t = from; t <= std::max(left, right) + ahead; t += 10 * kMs) observation.encoders.push_back(sample(t));
+    for (Microseconds t = from; t <= std::max(left, right) + ahead; t += 10 * kMs)
+      observation.encoders.push_back(sample(t));
     return observation;
   }
   /// @param known  what the robot's model has already

@@ -20,7 +20,9 @@ class DrawnLog : public OwnRobot {
     std::mt19937 random(static_cast<unsigned>(100 + i));
     std::uniform_real_distribution<double> uniform(-1.0, 1.0);
     Eigen::VectorXd q = pose(0.5 + uniform(random));
-    const auto turn = [&](const char* joint, double deg) { q(robot_->joint_index(joint)) += radians(deg) * uniform(random); };
+    const auto turn = [&](const char* joint, double deg) {
+      q(robot_->joint_index(joint)) += radians(deg) * uniform(random);
+    };
     turn("r_shoulder_roll", 5.0);
     turn("r_shoulder_yaw", 8.0);
     turn("r_elbow", 8.0);
@@ -49,7 +51,8 @@ class DrawnLog : public OwnRobot {
   /// Beliefs about the offsets, and about more.
   [[nodiscard]] std::vector<Belief> beliefs(const std::vector<Belief>& more = {}) const {
     std::vector<Belief> list;
-    for (const auto& target : effect_targets("joint_offset", roles_)) list.push_back({"joint_offset", target, {radians(5.0)}});
+    for (const auto& target : effect_targets("joint_offset", roles_))
+      list.push_back({"joint_offset", target, {radians(5.0)}});
     list.insert(list.end(), more.begin(), more.end());
     return list;
   }

@@ -24,9 +24,7 @@ class LogFitOfOwnRobot : public DrawnLog {
     state.set(x);
     return state;
   }
-  [[nodiscard]] State state() const {
-    return {roles_, beliefs({{"link_length", {"r_wrist_pitch", ""}, {0.01}}})};
-  }
+  [[nodiscard]] State state() const { return {roles_, beliefs({{"link_length", {"r_wrist_pitch", ""}, {0.01}}})}; }
   static inline std::vector<Observation> seen_;
 };
 

@@ -31,7 +31,8 @@ const Belief* find(const std::vector<Belief>& list, const std::string& effect, c
 }
 
 TEST(Beliefs, OfAnEffectWithoutTargetAreOfEveryTarget) {
-  const auto list = read("    link_length: {sd_mm: 2}\n    head_offset: {sd_deg: 3}\n    mesh_scale: {sd_percent: 1}\n");
+  const auto list =
+      read("    link_length: {sd_mm: 2}\n    head_offset: {sd_deg: 3}\n    mesh_scale: {sd_percent: 1}\n");
   EXPECT_EQ(list.size(), 2u + 4u + 1u) << "two links, four joints of the neck, the whole body";
   ASSERT_NE(find(list, "link_length", {"prosup", ""}), nullptr);
   EXPECT_NEAR(find(list, "link_length", {"prosup", ""})->sd.at(0), 0.002, 1e-15);
@@ -64,8 +65,9 @@ TEST(Beliefs, AreByTheUnitOfTheParameters) {
 }
 
 TEST(Beliefs, ALaterEntryReplacesAnEarlierOneAndZeroLeavesOut) {
-  const auto list = read("    link_length: {sd_mm: 2}\n    link_length of prosup: {sd_mm: 0}\n"
-                         "    latency: {sd_ms: 0}\n    mesh_scale: {sd_percent: 1}\n");
+  const auto list = read(
+      "    link_length: {sd_mm: 2}\n    link_length of prosup: {sd_mm: 0}\n"
+      "    latency: {sd_ms: 0}\n    mesh_scale: {sd_percent: 1}\n");
   EXPECT_NE(find(list, "link_length", {"s_yaw", ""}), nullptr);
   EXPECT_EQ(find(list, "link_length", {"prosup", ""}), nullptr);
   EXPECT_EQ(find(list, "latency"), nullptr);
@@ -86,9 +88,10 @@ TEST(Beliefs, WhatThisRobotHasNotIsLeftOutWhereNoTargetIsNamed) {
   auto bare = roles();
   bare.fingers.clear();
   bare.cameras = {"only"};
-  const auto list = read("    finger_posture: {sd_deg: 1.5}\n    camera_pair: {sd_mm: 1, sd_deg: 1}\n"
-                         "    principal_point difference: {sd_px: 0.4}\n    mesh_scale: {sd_percent: 1}\n",
-                         bare);
+  const auto list = read(
+      "    finger_posture: {sd_deg: 1.5}\n    camera_pair: {sd_mm: 1, sd_deg: 1}\n"
+      "    principal_point difference: {sd_px: 0.4}\n    mesh_scale: {sd_percent: 1}\n",
+      bare);
   ASSERT_EQ(list.size(), 1u);
   EXPECT_EQ(list[0].effect, "mesh_scale");
 }

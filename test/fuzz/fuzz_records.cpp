@@ -1,4 +1,5 @@
-// What a reader of recordings writes: records of a bag or of a LeRobot data set, turned into a log. The input is the stream itself.
+// What a reader of recordings writes: records of a bag or of a LeRobot data set, turned into a log. The input is the
+// stream itself.
 #include <cstring>
 
 #include "bodyschema/imports/lerobot.hpp"

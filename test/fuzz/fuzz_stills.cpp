@@ -1,4 +1,5 @@
-// A folder of stills. The input is cut at NUL bytes into joints.csv, a ROS CameraInfo, a camera_pose.json and a picture.
+// A folder of stills. The input is cut at NUL bytes into joints.csv, a ROS CameraInfo, a camera_pose.json and a
+// picture.
 #include <array>
 
 #include "bodyschema/camera/camera_info.hpp"

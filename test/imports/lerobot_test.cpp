@@ -35,8 +35,8 @@ class Lerobot : public ::testing::Test {
         "robot:\n  urdf: " + std::string(BODYSCHEMA_SOURCE_DIR) +
         "/meshes/arm7/arm7.urdf\n  rendered_links: [link2, hand]\n  hand_link: hand\n  estimated_joints: [joint1]\n"
         "  fixed_joints_deg: {joint3: 0, joint4: 0, joint5: 0, joint6: 0, joint7: 0}\n"
-        "cameras: {" + camera + ": {link: base, pose: unknown, width: 4, height: 2, fx: 4, fy: 4, cx: 1.5, cy: 0.5}}\n" +
-        import));
+        "cameras: {" +
+        camera + ": {link: base, pose: unknown, width: 4, height: 2, fx: 4, fy: 4, cx: 1.5, cy: 0.5}}\n" + import));
   }
   static LerobotSet set() { return {"2.1", 10, {0, 1, 2}, {"joint1", "hand", "joint2"}, {"observation.images.cam"}}; }
   /// Rows of joint1, hand and joint2, 0.1 s apart.
@@ -48,8 +48,9 @@ class Lerobot : public ::testing::Test {
             RecordedBytes::numbers(all));
   }
   static void frame(RecordedBytes& set, std::int64_t time_us, int width = 4) {
-    set.add(fmt::format(R"({{"kind": "frame", "camera": "observation.images.cam", "time_us": {}, "width": {}, "height": 2}})",
-                        time_us, width),
+    set.add(fmt::format(
+                R"({{"kind": "frame", "camera": "observation.images.cam", "time_us": {}, "width": {}, "height": 2}})",
+                time_us, width),
             std::vector<std::uint8_t>(static_cast<std::size_t>(width) * 6, 90));
   }
   static void end_episode(RecordedBytes& set) { set.add(R"({"kind": "episode_end"})"); }
@@ -122,8 +123,8 @@ TEST_F(Lerobot, WhatIsMissingIsCounted) {
   records.add(R"({"kind": "absent", "episode": 0, "message": "no data/e0.parquet"})");
   episode(records, 1, {0.0, 0.1, 0.2, 0.2, 0.3, NAN}, std::vector<double>(18, 0.25));
   frame(records, 0);
-  frame(records, 100'000, 3);      // of another size
-  frame(records, 900'000);         // after the last row
+  frame(records, 100'000, 3);  // of another size
+  frame(records, 900'000);     // after the last row
   records.add(R"({"kind": "broken", "camera": "observation.images.cam", "message": "cut"})");
   end_episode(records);
   records.add(R"({"kind": "absent", "episode": 2, "message": "no data/e2.parquet"})");
@@ -184,7 +185,8 @@ TEST(LerobotEpisodes, AreNamedByNumbersAndRanges) {
   EXPECT_THAT(parse_episodes("all", 3), ElementsAre(0, 1, 2));
   EXPECT_THAT(parse_episodes("5,1-3,2", 6), ElementsAre(1, 2, 3, 5));
   for (const std::string wrong : {"", "6", "3-1", "1,", ",1", "1--2", "-1", "x", "1 2", "1-"}) {
-    EXPECT_THAT(error_of([&] { parse_episodes(wrong, 6); }), AllOf(HasSubstr("--episodes " + wrong), HasSubstr("at most 5")))
+    EXPECT_THAT(error_of([&] { parse_episodes(wrong, 6); }),
+                AllOf(HasSubstr("--episodes " + wrong), HasSubstr("at most 5")))
         << wrong;
   }
 }

@@ -39,7 +39,8 @@ class RosBag : public ::testing::Test {
     return ImportTarget::from(Configuration::parse(
         "robot:\n  urdf: " + std::string(BODYSCHEMA_SOURCE_DIR) +
         "/meshes/arm7/arm7.urdf\n  rendered_links: [link2, hand]\n  hand_link: hand\n  estimated_joints: [joint1]\n"
-        "cameras: {" + cameras + "}\n" + more));
+        "cameras: {" +
+        cameras + "}\n" + more));
   }
   static BagTopic topic(const std::string& name, const std::string& type, const std::string& picture = "") {
     BagTopic t;
@@ -123,7 +124,8 @@ TEST_F(RosBag, WhatIsNamedMustBeThereAndOfItsKind) {
               AllOf(HasSubstr("/joint_stats: no such topic"), HasSubstr("\n  /joint_states")));
   options = {};
   options.pictures = {{"left", "/joint_states"}};
-  EXPECT_THAT(error_of([&] { BagSelection::choose(usual(), target(), options); }), HasSubstr("a topic of sensor_msgs/msg/JointState"));
+  EXPECT_THAT(error_of([&] { BagSelection::choose(usual(), target(), options); }),
+              HasSubstr("a topic of sensor_msgs/msg/JointState"));
   options.pictures = {{"middle", "/zed/left/image"}};
   EXPECT_THAT(error_of([&] { BagSelection::choose(usual(), target(), options); }), HasSubstr("'middle' is no camera"));
   options.pictures = {{"left", "/zed/left/image"}, {"right", "/zed/left/image"}};
@@ -160,7 +162,8 @@ TEST_F(RosBag, EncodingsBecomeGrayOrRgb) {
   for (const std::string encoding : {"bayer_rggb8", "bayer_gbrg8"}) {
     EXPECT_THAT(decode_ros_image(encoding, 8, 8, 8, gray, "").data, testing::Each(128));
   }
-  EXPECT_THAT(decode_ros_image("yuv422", 4, 4, 8, gray, "").data, testing::Each(testing::AllOf(testing::Ge(129), testing::Le(132))));
+  EXPECT_THAT(decode_ros_image("yuv422", 4, 4, 8, gray, "").data,
+              testing::Each(testing::AllOf(testing::Ge(129), testing::Le(132))));
 }
 
 TEST_F(RosBag, ABayerPatternIsNamedByItsFirstTwoRows) {
@@ -191,7 +194,7 @@ TEST_F(RosBag, MessagesBecomeALogAndWhatIsBadIsCounted) {
   RecordedBytes bag;
   joints(bag, 1'000'000);
   picture(bag, "/l", 1'000'000, 990'000);
-  picture(bag, "/r", 1'000'000, 0);                         // no stamp
+  picture(bag, "/r", 1'000'000, 0);                            // no stamp
   picture(bag, "/l", 1'100'000, 1'100'000, "rgb8", 3, 2, 18);  // another size
   picture(bag, "/l", 1'200'000, 1'200'000, "32FC1");
   picture(bag, "/l", 1'300'000, -5);
@@ -225,7 +228,8 @@ TEST_F(RosBag, WhatTheBagSaysOfACameraIsComparedWithTheConfiguration) {
     return import(bag, target(cameras)).notes;
   };
   const std::string same = R"({"width": 4, "height": 2, "k": [4, 0, 1.5, 0, 4, 0.5, 0, 0, 1]})";
-  const std::string pair = "left: {link: base, pose: unknown, " + kLens + "}, right: {beside: left, pose: unknown, " + kLens + "}";
+  const std::string pair =
+      "left: {link: base, pose: unknown, " + kLens + "}, right: {beside: left, pose: unknown, " + kLens + "}";
   EXPECT_THAT(notes(same, "", pair), Not(Contains(HasSubstr("is configured with"))));
   EXPECT_THAT(notes(R"({"width": 4, "height": 2, "k": [8, 0, 1.5, 0, 8, 0.5, 0, 0, 1]})", "", pair),
               Contains(HasSubstr("/i has 8, 8")));
@@ -235,8 +239,8 @@ TEST_F(RosBag, WhatTheBagSaysOfACameraIsComparedWithTheConfiguration) {
   EXPECT_THAT(notes(same, R"("parent": "base", "moves": false)", pair),
               Contains(AllOf(HasSubstr("tf has camera 'left' (optical) on link 'base' at xyz 0.1000 0.2000 0.3000"),
                              HasSubstr("configured as unknown"))));
-  const std::string known = "left: {link: base, X_link_optical: {xyz_m: [0.1, 0.2, 0.31], rpy_rad: [0, 0, 0]}, " + kLens +
-                            "}, right: {beside: left, pose: unknown, " + kLens + "}";
+  const std::string known = "left: {link: base, X_link_optical: {xyz_m: [0.1, 0.2, 0.31], rpy_rad: [0, 0, 0]}, " +
+                            kLens + "}, right: {beside: left, pose: unknown, " + kLens + "}";
   EXPECT_THAT(notes(same, R"("parent": "base", "moves": true)", known),
               Contains(AllOf(HasSubstr("it moves there"), HasSubstr("10 mm and 0.0 deg"))));
   EXPECT_THAT(notes(same, R"("parent": "elsewhere", "moves": false)", known), Not(Contains(HasSubstr("tf has"))));

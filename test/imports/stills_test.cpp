@@ -265,10 +265,12 @@ TEST_F(Stills, BadInputIsOneClearError) {
   EXPECT_THAT(with("0,0,0\n0,0,0\n"), HasSubstr("'0' is no name"));
   EXPECT_THAT(with("posture,joint1,joint1\n0,0,0\n"), HasSubstr("column 'joint1' is there twice"));
   EXPECT_THAT(with("posture\n0\n"), HasSubstr("no column of a joint"));
-  EXPECT_THAT(with("time_s," + names + "2,0,0,0,0,0,0,0,0\n1,1,0,0,0,0,0,0,0\n"), HasSubstr("not after the row before"));
+  EXPECT_THAT(with("time_s," + names + "2,0,0,0,0,0,0,0,0\n1,1,0,0,0,0,0,0,0\n"),
+              HasSubstr("not after the row before"));
   stills_.write("joints.csv", names + "0,0,0,0,0,0,0,0\n");
-  EXPECT_THAT(error_of(target("", "cameras:\n  left: {link: base, pose: unknown, width: 80, height: 6, fx: 8, fy: 8, cx: "
-                                  "3.5, cy: 2.5}\n")),
+  EXPECT_THAT(error_of(target("",
+                              "cameras:\n  left: {link: base, pose: unknown, width: 80, height: 6, fx: 8, fy: 8, cx: "
+                              "3.5, cy: 2.5}\n")),
               HasSubstr("00.png is 8x6 px, the configuration has 80x6 (cameras.left.width, .height)"));
   stills_.write("images/left/00.png", "not a picture");
   stills_.write("images/right/00.png", "nor this");
@@ -308,7 +310,8 @@ TEST(RealStills, OfTwoCamerasWithMasks) {
     const auto to = ImportTarget::from(Configuration::parse(
         "robot:\n  urdf: " + (data / "robots/lbr_med7/lbr_med7.urdf").string() +
         "\n  rendered_links: [lbr_link_0, lbr_link_7]\n  hand_link: lbr_link_7\n  estimated_joints: [lbr_A1]\n"
-        "cameras:\n  left: {link: lbr_link_0, pose: unknown" + lens + "  right: {link: lbr_link_0, pose: unknown" + lens));
+        "cameras:\n  left: {link: lbr_link_0, pose: unknown" +
+        lens + "  right: {link: lbr_link_0, pose: unknown" + lens));
     TemporaryFolder out;
     const auto summary = import_stills(data / set, to, {}, out.path() / "out.lcmlog");
     for (const auto& camera : summary.cameras) {

@@ -28,7 +28,9 @@ class ProbesOfOwnRobot : public OwnRobot {
     }
     return result;
   }
-  [[nodiscard]] Eigen::Index coordinate(Kind kind, Eigen::Index index) const { return coordinates_.find({kind, index}); }
+  [[nodiscard]] Eigen::Index coordinate(Kind kind, Eigen::Index index) const {
+    return coordinates_.find({kind, index});
+  }
 
   JointRoles roles_ = JointRoles::of(robot_, setup_, rig_);
   Coordinates coordinates_{roles_};

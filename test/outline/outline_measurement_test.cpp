@@ -36,11 +36,11 @@ class OutlineOfOwnRobot : public OwnRobot {
     Corrections corrections = roles_.no_corrections();
     for (const auto& coordinate : measurement_.coordinates().all()) {
       const double size = coordinate.kind == Kind::kCx || coordinate.kind == Kind::kCy ? 2.0
-                          : coordinate.kind == Kind::kDilation                        ? 0.7
-                          : coordinate.kind == Kind::kK1                              ? 0.05
-                          : is_angle(coordinate.kind)                                 ? 0.02
-                          : moves_no_link(coordinate.kind)                            ? 0.02
-                                                                                      : 0.003;
+                          : coordinate.kind == Kind::kDilation                         ? 0.7
+                          : coordinate.kind == Kind::kK1                               ? 0.05
+                          : is_angle(coordinate.kind)                                  ? 0.02
+                          : moves_no_link(coordinate.kind)                             ? 0.02
+                                                                                       : 0.003;
       coordinate.in(corrections) = size * uniform(random);
     }
     return corrections;
@@ -349,8 +349,11 @@ TEST(OutlineSearch, GrowsWithThePicture) {
     const auto roles = JointRoles::of(robot, setup, rig);
     SyntheticReach reach(robot, setup, rig, Eigen::VectorXd::Zero(7));
     Eigen::VectorXd q = setup.default_joints(*robot);
-    for (const auto& [joint, deg] : {std::pair{"neck_pitch", -10.0}, {"r_shoulder_pitch", -70.0},
-                                     {"r_shoulder_roll", 22.0}, {"r_shoulder_yaw", 16.0}, {"r_elbow", 75.0}}) {
+    for (const auto& [joint, deg] : {std::pair{"neck_pitch", -10.0},
+                                     {"r_shoulder_pitch", -70.0},
+                                     {"r_shoulder_roll", 22.0},
+                                     {"r_shoulder_yaw", 16.0},
+                                     {"r_elbow", 75.0}}) {
       q(robot->joint_index(joint)) = radians(deg);
     }
     OutlineMeasurement measurement(robot, setup, rig, roles);

@@ -393,7 +393,8 @@ TEST_F(ExportCorrection, TheUrdfHoldsWhereTheCamerasSitWhateverTheOrderOfTheEffe
   const std::vector<std::string> cameras = {"l_eye_optical", "r_eye_optical"};
   for (const bool pose_first : {true, false}) {
     ErrorModel model(roles);
-    for (const char* name : pose_first ? std::vector{"camera_pose", "camera_pair"} : std::vector{"camera_pair", "camera_pose"}) {
+    for (const char* name :
+         pose_first ? std::vector{"camera_pose", "camera_pair"} : std::vector{"camera_pair", "camera_pose"}) {
       double sign = 1.0;
       for (auto& p : model.add(name, {}).parameters()) p.value = 5.0 * (sign = -sign) * p.typical;
     }

@@ -103,7 +103,8 @@ TEST_F(RosFiles, ACameraThatIsALinkIsPlacedByTheUrdf) {
   const auto rig = StereoRig::from(Configuration::parse(
       "left: {link: camera_left_optical, width: 320, height: 240, fx: 420, fy: 420, cx: 159.5, cy: 119.5}\n"));
   (void)write({}, ros_cameras_of(rig));
-  EXPECT_THAT(content("static_transforms.sh"), AllOf(HasSubstr("# left: its link is in corrected.urdf"), Not(HasSubstr("ros2 run"))));
+  EXPECT_THAT(content("static_transforms.sh"),
+              AllOf(HasSubstr("# left: its link is in corrected.urdf"), Not(HasSubstr("ros2 run"))));
 }
 
 // Such a result once stopped the export: "no joint carries camera link".

@@ -51,9 +51,9 @@ TEST_F(StarterConfiguration, FindsTheArmBetweenRootAndHand) {
   Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
   EXPECT_THAT(pipeline.setup().estimated_joints,
               ElementsAre("joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "joint7"));
-  EXPECT_THAT(pipeline.setup().model.rendered_links, ElementsAre("base", "link1", "link2", "link3", "link4", "link5",
-                                                                 "link6", "link7", "hand", "left_finger",
-                                                                 "right_finger"))
+  EXPECT_THAT(pipeline.setup().model.rendered_links,
+              ElementsAre("base", "link1", "link2", "link3", "link4", "link5", "link6", "link7", "hand", "left_finger",
+                          "right_finger"))
       << "the base stands in the view of cameras that stand too";
   EXPECT_TRUE(pipeline.setup().head_joints.empty());
   ASSERT_EQ(pipeline.rig().cameras.size(), 2u);
@@ -317,8 +317,9 @@ TEST_F(StarterConfiguration, TwoCalibrationsAreTwoCameras) {
   o.rectified = true;
   for (const std::string camera : {"a", "b"}) {
     put(folder_ / (camera + ".yaml"),
-        "# /rig/" + camera + "\n{\"width\": 8, \"height\": 6, \"distortion_model\": \"plumb_bob\", \"d\": [0, 0, 0, 0, 0],"
-        " \"k\": [8, 0, 3.6, 0, 8.1, 2.4, 0, 0, 1], \"r\": [1, 0, 0, 0, 1, 0, 0, 0, 1], \"p\": [8, 0, 3.6, " +
+        "# /rig/" + camera +
+            "\n{\"width\": 8, \"height\": 6, \"distortion_model\": \"plumb_bob\", \"d\": [0, 0, 0, 0, 0],"
+            " \"k\": [8, 0, 3.6, 0, 8.1, 2.4, 0, 0, 1], \"r\": [1, 0, 0, 0, 1, 0, 0, 0, 1], \"p\": [8, 0, 3.6, " +
             std::string(camera == "b" ? "-0.96" : "0") + ", 0, 8.1, 2.4, 0, 0, 0, 1, 0]}\n");
     o.camera_infos.push_back(folder_ / (camera + ".yaml"));
   }
@@ -416,9 +417,9 @@ TEST_F(StarterConfiguration, ACameraPoseIsReadWhereItIsNamedAndOnlyThere) {
   const auto pose = [](double x) {
     return "[[0, 0, 1, " + std::to_string(x) + "], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]]";
   };
-  const auto file = stills.write("camera_pose.json", R"({"base_link": "base", "X_base_optical": {"a": {"left": )" +
-                                                         pose(1) + R"(, "right": )" + pose(2) + R"(}, "b": {"left": )" +
-                                                         pose(3) + "}}}");
+  const auto file =
+      stills.write("camera_pose.json", R"({"base_link": "base", "X_base_optical": {"a": {"left": )" + pose(1) +
+                                           R"(, "right": )" + pose(2) + R"(}, "b": {"left": )" + pose(3) + "}}}");
   StarterOptions o;
   o.urdf = kSource / "meshes/arm7/arm7.urdf";
   o.stills = stills.path();

@@ -25,7 +25,8 @@ class FastestEngine : public testing::Test {
   }
   /// contour, raster, compute
   static std::vector<EngineTiming> figures(double contour, double raster, double compute) {
-    return {{"contour", "", contour, "", ""}, {"atlas", "raster", raster, "", ""}, {"atlas", "compute", compute, "", ""}};
+    return {
+        {"contour", "", contour, "", ""}, {"atlas", "raster", raster, "", ""}, {"atlas", "compute", compute, "", ""}};
   }
   static std::string choice(const std::vector<EngineTiming>& timings, const SilhouetteOptions& options = {}) {
     std::string reason;
@@ -76,9 +77,9 @@ TEST_F(FastestEngine, IsMeasuredOnceAndKept) {
   remembered_timings("other key", measure);
   EXPECT_EQ(measured, 2);
   const std::string head = "bodyschema engine timings 1\n";
-  for (const std::string& damaged : {std::string(), std::string("rubbish\n"), head + "contour - 5\n",
-                                     head + "contour - 5\natlas raster 3\natlas compute x\n",
-                                     head + "contour - 5\natlas raster 3\nhand - 1\n"}) {
+  for (const std::string& damaged :
+       {std::string(), std::string("rubbish\n"), head + "contour - 5\n",
+        head + "contour - 5\natlas raster 3\natlas compute x\n", head + "contour - 5\natlas raster 3\nhand - 1\n"}) {
     std::ofstream(cache_ / "bodyschema/engines/key") << damaged;
     const int before = measured;
     remembered_timings("key", measure);

@@ -32,7 +32,8 @@ TEST(SearchLevel, ItsCameraSeesEveryNthPixel) {
   for (const int step : {2, 3, 4, 6}) {
     const PinholeIntrinsics camera = synthetic::camera(322, 243);  // sizes that no step divides
     const auto full = reference::silhouette(hand, camera, std::span(X_CB).first(hand.parts.size()));
-    const auto coarse = reference::silhouette(hand, every_nth_pixel(camera, step), std::span(X_CB).first(hand.parts.size()));
+    const auto coarse =
+        reference::silhouette(hand, every_nth_pixel(camera, step), std::span(X_CB).first(hand.parts.size()));
     const BinaryMask expected = every_nth_pixel(full, step);
     ASSERT_GT(expected.count(), 50u);
     ASSERT_EQ(coarse.width(), expected.width());

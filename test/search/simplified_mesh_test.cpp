@@ -140,7 +140,8 @@ TEST_F(SimplifiedMesh, TheOfficialHandCountsTheSameWithinOnePercent) {
   options.mesh_search_roots = {models};
   options.rendered_links = {"r_hand"};
   for (const char* finger : {"thumb", "index", "middle", "ring", "little"}) {
-    for (int k = 0; k < 4; ++k) options.rendered_links.push_back("r_hand_" + std::string(finger) + "_" + std::to_string(k));
+    for (int k = 0; k < 4; ++k)
+      options.rendered_links.push_back("r_hand_" + std::string(finger) + "_" + std::to_string(k));
   }
   SilhouetteModel hand;
   const auto robot = RobotModel::load(options);
@@ -165,7 +166,8 @@ TEST_F(SimplifiedMesh, TheOfficialHandCountsTheSameWithinOnePercent) {
     for (const auto& X : X_WB) X_CB.push_back((X_CP * X_WB[0].inverse() * X).cast<float>());
     const double full = static_cast<double>(reference::silhouette(hand, cameras[0], X_CB).count());
     const BinaryMask drawn = scorer->render(X_CB, 0);
-    EXPECT_NEAR(static_cast<double>(drawn.count()) * level.step * level.step, full, 0.01 * full) << "turned by " << turn;
+    EXPECT_NEAR(static_cast<double>(drawn.count()) * level.step * level.step, full, 0.01 * full)
+        << "turned by " << turn;
   }
 }
 

@@ -55,9 +55,10 @@ TEST(SelfTest, AGoodInstallationPasses) {
 }
 
 TEST(EngineTable, NamesAllEnginesAndWhatIsInForce) {
-  const std::string table = engine_table(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml");
-  for (const char* word : {"400 silhouettes of ", "contour  - ", "atlas    raster", "atlas    compute",
-                           "silhouette.engine in force: "}) {
+  const std::string table =
+      engine_table(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml");
+  for (const char* word :
+       {"400 silhouettes of ", "contour  - ", "atlas    raster", "atlas    compute", "silhouette.engine in force: "}) {
     EXPECT_THAT(table, HasSubstr(word));
   }
 }

@@ -60,9 +60,9 @@ TEST(GivenMask, WhatIsNotKnownDoesNotCount) {
 
 /// A mask in two pieces, as where something hides the arm, keeps both; specks are neither robot nor background.
 TEST(GivenMask, SpecksBySizeAgainstTheLargestPieceAreNotKnown) {
-  Image picture = with_arm();                           // 1600 px
-  fill(picture, 70, 10, 80, 20, kMaskRobot);            // 100 px: 6 %
-  fill(picture, 70, 40, 78, 48, kMaskRobot);            // 64 px: 4 %
+  Image picture = with_arm();                 // 1600 px
+  fill(picture, 70, 10, 80, 20, kMaskRobot);  // 100 px: 6 %
+  fill(picture, 70, 40, 78, 48, kMaskRobot);  // 64 px: 4 %
   const Seen seen = read(picture);
   EXPECT_TRUE(seen.mask.at(75, 15) && seen.valid.at(75, 15));
   EXPECT_FALSE(seen.mask.at(73, 43));

@@ -99,8 +99,9 @@ struct ImagesView {
 /// message's before it is decompressed.
 [[nodiscard]] DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limits = {});
 
-/// Turns a picture into a mask of exactly the values of geometry/image.hpp, in place: gray, or RGB that is gray; up to 63 is background,
-/// from 192 on robot, unknown between. A mask whose largest value is one of 1 to 63 is none (0 and 1, most likely).
+/// Turns a picture into a mask of exactly the values of geometry/image.hpp, in place: gray, or RGB that is gray; up to
+/// 63 is background, from 192 on robot, unknown between. A mask whose largest value is one of 1 to 63 is none (0 and 1,
+/// most likely).
 [[nodiscard]] DecodeResult to_mask(Image& picture);
 
 /// A raw gray or RGB picture as it goes into a message.

@@ -20,7 +20,8 @@ class ObservationQueue {
     {
       const std::lock_guard lock(mutex_);
       if (waiting_.size() >= capacity_) {
-        keep_encoders(waiting_.front().observation, waiting_.size() > 1 ? waiting_[1].observation : observation.observation);
+        keep_encoders(waiting_.front().observation,
+                      waiting_.size() > 1 ? waiting_[1].observation : observation.observation);
         waiting_.pop_front();
         ++shed_;
       }

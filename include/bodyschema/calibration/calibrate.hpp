@@ -31,36 +31,36 @@ const char* to_string(CalibrationState state);
 
 /// Distances between predicted and observed outlines, median, px of the picture.
 struct OutlineDistances {
-  double before = 0.0;                 ///< encoders and model as they are
+  double before = 0.0;  ///< encoders and model as they are
   double after = 0.0;
-  std::optional<double> heldout;       ///< of postures that the fit had not seen
+  std::optional<double> heldout;  ///< of postures that the fit had not seen
 };
 
 /// A camera as the calibration found it.
 struct CalibratedCamera {
   std::string name;
-  std::string link;                ///< that carries it
+  std::string link;                        ///< that carries it
   Pose X_link_optical = Pose::Identity();  ///< OpenCV axes, m
-  double sd_m = 0.0;               ///< root of the summed variances of its place in the link's frame
-  double sd_rad = 0.0;             ///< ... of its rotation
+  double sd_m = 0.0;                       ///< root of the summed variances of its place in the link's frame
+  double sd_rad = 0.0;                     ///< ... of its rotation
   /// The same if the arm's first joint were known: where the camera does not move with the robot's base, no picture
   /// tells that joint from a turn of the camera about its axis, and both figures above contain the turn.
   double sd_m_beside_first_joint = 0.0, sd_rad_beside_first_joint = 0.0;
-  bool estimated = false;          ///< false: as configured
-  bool searched = false;           ///< nothing was known of it
+  bool estimated = false;  ///< false: as configured
+  bool searched = false;   ///< nothing was known of it
 };
 
 /// One joint's offset: encoder = true + offset.
 struct CalibratedJoint {
   std::string name;
   double offset_rad = 0.0, sd_rad = 0.0;
-  bool told = false;        ///< see Estimate::told
-  std::string untold_why;   ///< "cannot be told from camera_pose turn_y"; empty where it is told
+  bool told = false;       ///< see Estimate::told
+  std::string untold_why;  ///< "cannot be told from camera_pose turn_y"; empty where it is told
 };
 
 /// Another parameter that was estimated beside the joints' offsets.
 struct CalibratedParameter {
-  std::string name, unit;  ///< "silhouette_bias", "px"
+  std::string name, unit;                        ///< "silhouette_bias", "px"
   double value = 0.0, sd = 0.0, prior_sd = 0.0;  ///< in that unit
 };
 
@@ -78,24 +78,25 @@ struct Calibration {
   std::vector<CalibratedJoint> joints;
   std::vector<CalibratedCamera> cameras;
   std::vector<CalibratedParameter> parameters;
-  std::vector<CalibratedEffect> effects;  ///< what else was found; estimated with the rest where they do not depend on time
+  std::vector<CalibratedEffect>
+      effects;  ///< what else was found; estimated with the rest where they do not depend on time
   OutlineDistances outline_px;
   double hand_sd_m = 0.0;  ///< of the hand's place in the first camera's picture, mean over postures
   std::size_t postures = 0, pictures = 0;
-  double dispersion = 1.0;       ///< how postures disagree, by what is claimed; 1: as claimed
-  double posture_sd_rad = 0.0;   ///< what a posture gets wrong, per joint
+  double dispersion = 1.0;      ///< how postures disagree, by what is claimed; 1: as claimed
+  double posture_sd_rad = 0.0;  ///< what a posture gets wrong, per joint
   double outline_sd_px = 0.0, outline_points_alike = 0.0;
-  std::vector<std::string> remarks;  ///< what limits it, what to look at
+  std::vector<std::string> remarks;                ///< what limits it, what to look at
   std::map<std::string, double> next_posture_rad;  ///< what to record next, by joint; empty: nothing better was found
   std::string next_posture_for;                    ///< the joint whose offset it would tell best
 };
 
-/// Calibrates a robot from a log: offsets of its joints, poses and intrinsics of its cameras as far as they are believed
-/// uncertain (`cameras: pose`, `estimator.state`), by the outlines in all pictures at once. A camera of which nothing is
-/// known is searched for.
+/// Calibrates a robot from a log: offsets of its joints, poses and intrinsics of its cameras as far as they are
+/// believed uncertain (`cameras: pose`, `estimator.state`), by the outlines in all pictures at once. A camera of which
+/// nothing is known is searched for.
 ///
-/// Writes calibration.json, report.html, corrected.urdf, offsets.yaml, cameras.yaml, ros/ (write_ros_files) and a configuration to go on with
-/// (calibrated.yaml) into `out`. Throws Error.
+/// Writes calibration.json, report.html, corrected.urdf, offsets.yaml, cameras.yaml, ros/ (write_ros_files) and a
+/// configuration to go on with (calibrated.yaml) into `out`. Throws Error.
 Calibration calibrate(const Configuration& configuration, const CalibrationOptions& options);
 
 /// The result as a table for people.

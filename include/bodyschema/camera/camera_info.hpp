@@ -12,11 +12,11 @@ namespace bodyschema {
 
 /// What a ROS CameraInfo says of one camera.
 struct CameraInfo {
-  PinholeIntrinsics intrinsics;        ///< of the picture as it is taken: K
-  std::array<double, 5> distortion{};  ///< D as k1 k2 p1 p2 k3
+  PinholeIntrinsics intrinsics;                     ///< of the picture as it is taken: K
+  std::array<double, 5> distortion{};               ///< D as k1 k2 p1 p2 k3
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();  ///< turns the camera's axes to those of its rectified picture
-  PinholeIntrinsics rectified;         ///< of the rectified picture: P
-  double baseline_m = 0.0;             ///< by P: the camera lies so far to the right of the one it is rectified with
+  PinholeIntrinsics rectified;                      ///< of the rectified picture: P
+  double baseline_m = 0.0;  ///< by P: the camera lies so far to the right of the one it is rectified with
 
   /// Whether rectifying would change the picture.
   [[nodiscard]] bool is_rectified() const;

@@ -13,17 +13,17 @@ namespace bodyschema {
 struct DiagnosisOptions {
   /// Share of healthy logs in which something may be named, over all candidates together.
   double level = 0.01;
-  /// What matters to a user, m: a cause that moves hand and outlines less than this, the joints' offsets fitted anew, is
-  /// one of several small errors and not named.
+  /// What matters to a user, m: a cause that moves hand and outlines less than this, the joints' offsets fitted anew,
+  /// is one of several small errors and not named.
   double matters_m = 0.0005;
   double block_s = 1.0;            ///< shortest block; longer ones where neighbours err alike
   double same_posture_rad = 0.05;  ///< a block ends only where the arm has moved by this
   double shortest_log_s = 10.0;    ///< of moving pictures; fewer postures than `fewest_postures` and shorter: refused
   std::size_t fewest_postures = 5;
-  double spacing_px = 3.0;         ///< of outline samples, px of a 320x240 picture
-  OutlineNoise::Prior noise;       ///< of outlines, before any was seen
-  std::size_t most_pictures = 400; ///< that a fit looks at; tests look at all
-  std::uint64_t seed = 1;          ///< of the sign flips
+  double spacing_px = 3.0;          ///< of outline samples, px of a 320x240 picture
+  OutlineNoise::Prior noise;        ///< of outlines, before any was seen
+  std::size_t most_pictures = 400;  ///< that a fit looks at; tests look at all
+  std::uint64_t seed = 1;           ///< of the sign flips
   /// Where the fit starts besides the beliefs' centre: values of the state's parameters, SI.
   std::vector<Eigen::VectorXd> starts{};
   std::function<void(double)> progress{};  ///< called with the share done

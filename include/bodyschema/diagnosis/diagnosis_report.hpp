@@ -83,9 +83,9 @@ struct CandidateBar {
 
 /// What a model leaves of one picture, held out.
 struct Remainder {
-  double rms_px = 0.0;               ///< along the outline's normals; 0 where nothing was found
-  double mean_px = 0.0;              ///< mean along the outward normal
-  std::vector<double> apparent_deg;  ///< correction of each arm joint alone that it asks for
+  double rms_px = 0.0;                                 ///< along the outline's normals; 0 where nothing was found
+  double mean_px = 0.0;                                ///< mean along the outward normal
+  std::vector<double> apparent_deg;                    ///< correction of each arm joint alone that it asks for
   Eigen::Vector3d hand_C_m = Eigen::Vector3d::Zero();  ///< where the model has the hand in the camera, m
 };
 
@@ -109,11 +109,11 @@ struct DiagnosisReport {
   std::vector<DiagnosedCause> causes;
   std::vector<NotTestable> not_testable;
   std::vector<ExclusionLimit> exclusion_limits;
-  /// What is left on one side of one part, in block after block: "the left outline of r_hand lies 0.8 px outside of where
-  /// the model has it in the pictures of left". Empty: nothing.
+  /// What is left on one side of one part, in block after block: "the left outline of r_hand lies 0.8 px outside of
+  /// where the model has it in the pictures of left". Empty: nothing.
   std::string side_left_over;
-  /// What the pictures show beside the robot through most of the log, where no outline is looked for: "14 cm2 beside the
-  /// robot, in 96 % of the log". Something is held, or a part has no mesh. Empty: nothing.
+  /// What the pictures show beside the robot through most of the log, where no outline is looked for: "14 cm2 beside
+  /// the robot, in 96 % of the log". Something is held, or a part has no mesh. Empty: nothing.
   std::string not_in_model;
   /// Causes that are there, and in the extended model, and move hand and outlines by less than what matters.
   std::vector<DiagnosedCause> small_causes;

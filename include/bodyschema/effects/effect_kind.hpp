@@ -28,8 +28,8 @@ struct LogMotion {
 /// When an effect acts.
 enum class EffectTiming {
   kAlways,
-  kFromATime,     ///< its second parameter is the time, s since the Unix epoch, at which it begins
-  kOverTheLog,    ///< its second and third are when it begins and for how long it grows
+  kFromATime,   ///< its second parameter is the time, s since the Unix epoch, at which it begins
+  kOverTheLog,  ///< its second and third are when it begins and for how long it grows
 };
 
 /// What can hold a correction of an effect outside this software.

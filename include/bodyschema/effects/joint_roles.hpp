@@ -14,7 +14,7 @@ namespace bodyschema {
 /// Rendered parts that keep their places to each other when the arm's joints move: one body of the arm, with
 /// fingers counted to the hand.
 struct BodySegment {
-  std::string name;                ///< its first rendered link, from the root outwards; of the hand RobotSetup::hand_link
+  std::string name;  ///< its first rendered link, from the root outwards; of the hand RobotSetup::hand_link
   std::vector<std::size_t> parts;  ///< positions in RobotSetup's rendered links
 };
 

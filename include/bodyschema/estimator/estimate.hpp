@@ -35,15 +35,15 @@ struct StageTimes {
 
 /// One parameter of an effect that is estimated beside the joints' offsets.
 struct EstimatedParameter {
-  std::string effect;          ///< "link_length"
-  std::string joint, source;   ///< its target
-  std::string parameter;       ///< "change"
-  std::string name;            ///< of all of these: "link_length of r_elbow", "camera_pose turn_x"
-  std::string unit;            ///< what people read: "mm", "deg", "%"
-  double si_per_unit = 1.0;    ///< value in SI = value in unit * si_per_unit
-  double value = 0.0;          ///< SI
-  double sd = 0.0;             ///< SI
-  double prior_sd = 0.0;       ///< SI, what was believed of it before any picture
+  std::string effect;         ///< "link_length"
+  std::string joint, source;  ///< its target
+  std::string parameter;      ///< "change"
+  std::string name;           ///< of all of these: "link_length of r_elbow", "camera_pose turn_x"
+  std::string unit;           ///< what people read: "mm", "deg", "%"
+  double si_per_unit = 1.0;   ///< value in SI = value in unit * si_per_unit
+  double value = 0.0;         ///< SI
+  double sd = 0.0;            ///< SI
+  double prior_sd = 0.0;      ///< SI, what was believed of it before any picture
 };
 
 /// What the pictures say about the memory of earlier ones.
@@ -71,17 +71,17 @@ struct Estimate {
   double hand_sd_m = 0.0;        ///< hand base in the camera frame: root of the summed variances of x, y, z
   double hand_sd_limit_m = 0.0;  ///< `converged` needs it smaller; 0: not in this mode
   FrameVerdict verdict = FrameVerdict::kNothingKnown;
-  double innovation = 0.0;        ///< normalised innovation squared of this frame against the memory
-  double innovation_dof = 0.0;    ///< and its expectation, were all as believed
-  double innovation_usual = 1.0;  ///< mean of innovation / dof of late
-  std::size_t postures = 0;       ///< distinct ones that the offsets rest on
-  double posture_sd_rad = 0.0;    ///< what a posture gets wrong, as an angle of each joint; learned
-  double outline_sd_px = 0.0;     ///< of one residual of the outlines, measured; px of a 320x240 picture
-  double outline_alike = 0.0;     ///< how many neighbouring outline points err as one; measured
-  std::string changed;            ///< what was taken to have changed in this frame: "r_elbow slipped by 4.9 deg"
-  std::string misfit;             ///< in kModelMisfit: what is wrong by more than believed possible, and what to do
-  std::string stalled_joint;      ///< its encoder stands although the pictures show it move;
-                                  ///< empty: none. The state is never kConverged then
+  double innovation = 0.0;          ///< normalised innovation squared of this frame against the memory
+  double innovation_dof = 0.0;      ///< and its expectation, were all as believed
+  double innovation_usual = 1.0;    ///< mean of innovation / dof of late
+  std::size_t postures = 0;         ///< distinct ones that the offsets rest on
+  double posture_sd_rad = 0.0;      ///< what a posture gets wrong, as an angle of each joint; learned
+  double outline_sd_px = 0.0;       ///< of one residual of the outlines, measured; px of a 320x240 picture
+  double outline_alike = 0.0;       ///< how many neighbouring outline points err as one; measured
+  std::string changed;              ///< what was taken to have changed in this frame: "r_elbow slipped by 4.9 deg"
+  std::string misfit;               ///< in kModelMisfit: what is wrong by more than believed possible, and what to do
+  std::string stalled_joint;        ///< its encoder stands although the pictures show it move;
+                                    ///< empty: none. The state is never kConverged then
   double stalled_motion_rad = 0.0;  ///< how far it has been seen to move
   bool cameras_swapped = false;     ///< the left picture shows what the right eye sees and the other way
                                     ///< round; nothing is learned from them, state kDiverged. Mode best

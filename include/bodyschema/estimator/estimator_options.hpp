@@ -25,11 +25,11 @@ struct EstimatorOptions {
   EstimatorMode mode = EstimatorMode::kBest;
   ParticleFilterOptions filter;
   SilhouetteOptions silhouette;
-  double temperature = 0.02;     ///< best: weight = exp(-(d - d_min) / temperature)
-  bool refine_outline = true;    ///< best: without it the estimate is one of the particles
-  bool remember = true;          ///< best: postures are fused; false: every frame for itself
+  double temperature = 0.02;   ///< best: weight = exp(-(d - d_min) / temperature)
+  bool refine_outline = true;  ///< best: without it the estimate is one of the particles
+  bool remember = true;        ///< best: postures are fused; false: every frame for itself
   double outline_spacing_px = 3.0;
-  OutlineNoise::Prior noise;     ///< best: believed of outlines before any was seen
+  OutlineNoise::Prior noise;  ///< best: believed of outlines before any was seen
   MemoryOptions memory;
   std::size_t least_postures = 3;    ///< distinct ones that must agree before `converged`
   double converged_hand_sd_m = 0.0;  ///< best: `converged` below this; 0: by tolerances and the camera's distance
@@ -40,7 +40,8 @@ struct EstimatorOptions {
   static EstimatorOptions from(const Configuration& configuration);
 };
 
-/// What is believed of the places of cameras that are not known: of the rig, and of its second camera against the first.
+/// What is believed of the places of cameras that are not known: of the rig, and of its second camera against the
+/// first.
 std::vector<Belief> camera_beliefs(const StereoRig& rig);
 
 /// What is believed of a robot before any picture.

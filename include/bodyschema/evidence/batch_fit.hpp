@@ -14,8 +14,8 @@ namespace bodyschema {
 struct BatchSettings {
   OutlineNoise::Prior noise;
   MemoryOptions memory;
-  double spacing_px = 3.0;  ///< of outline samples, px of a 320x240 picture
-  int iterations = 25;      ///< at most, of each of the fits
+  double spacing_px = 3.0;                 ///< of outline samples, px of a 320x240 picture
+  int iterations = 25;                     ///< at most, of each of the fits
   std::function<void(double)> progress{};  ///< called with the share done
 };
 

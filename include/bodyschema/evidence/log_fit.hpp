@@ -15,10 +15,10 @@ namespace bodyschema {
 
 /// A log's pictures linearised about one model.
 struct LinearLog {
-  std::vector<Instant> instants;          ///< one per picture
-  std::vector<Corrections> corrections;   ///< what the model said there
-  std::vector<OutlineEvidence> evidence;  ///< over `coordinates`
-  std::vector<std::uint32_t> coordinates; ///< positions in Coordinates
+  std::vector<Instant> instants;           ///< one per picture
+  std::vector<Corrections> corrections;    ///< what the model said there
+  std::vector<OutlineEvidence> evidence;   ///< over `coordinates`
+  std::vector<std::uint32_t> coordinates;  ///< positions in Coordinates
   [[nodiscard]] double rms_px() const;
   [[nodiscard]] double sampled() const;
   /// Share of the predicted outline that has a counterpart.
@@ -35,12 +35,12 @@ struct StateEvidence {
 
 /// How a fit goes on.
 struct FitSettings {
-  int iterations = 10;         ///< at most, once near
-  double from_px = 0.0;        ///< looks for outlines this far off at first, px of a 320x240 picture; 0: near already
-  double finest_px = 6.0;      ///< and this far in the end
-  double robust_px = 3.0;      ///< robust scale in the end; from afar it is half of how far is looked
-  double spacing_px = 3.0;     ///< between the points of an outline
-  double variance_px2 = 1.0;   ///< of a residual, what neighbours share counted in: weighs pictures against beliefs
+  int iterations = 10;        ///< at most, once near
+  double from_px = 0.0;       ///< looks for outlines this far off at first, px of a 320x240 picture; 0: near already
+  double finest_px = 6.0;     ///< and this far in the end
+  double robust_px = 3.0;     ///< robust scale in the end; from afar it is half of how far is looked
+  double spacing_px = 3.0;    ///< between the points of an outline
+  double variance_px2 = 1.0;  ///< of a residual, what neighbours share counted in: weighs pictures against beliefs
   std::function<void(double)> progress{};
 };
 
@@ -79,8 +79,8 @@ class LogFit {
   double fit(State& state, const FitSettings& settings, std::span<const std::size_t> pictures = {});
 
   /// How outlines err in each camera's pictures, measured on what a model leaves.
-  std::vector<OutlineNoise> noise(const ErrorModel& model, const OutlineSearch& search, const OutlineNoise::Prior& prior,
-                                  std::span<const std::size_t> pictures = {});
+  std::vector<OutlineNoise> noise(const ErrorModel& model, const OutlineSearch& search,
+                                  const OutlineNoise::Prior& prior, std::span<const std::size_t> pictures = {});
 
   /// Coordinates that some of these parameters move in some picture.
   std::vector<std::uint32_t> moved_by(const ErrorModel& model, const std::vector<ParameterRef>& parameters);
@@ -92,10 +92,10 @@ class LogFit {
   }
 
  private:
-  /// Parts that no posture of the log moves in the pictures, a robot's base before a still camera: they show the same in
-  /// all, and count as seen once.
+  /// Parts that no posture of the log moves in the pictures, a robot's base before a still camera: they show the same
+  /// in all, and count as seen once.
   void weigh_parts();
-  [[nodiscard]] double mean_cost(const LinearLog& at, double usual_points, double OutlineEvidence::* cost) const;
+  [[nodiscard]] double mean_cost(const LinearLog& at, double usual_points, double OutlineEvidence::*cost) const;
 
   PictureLog& log_;
   std::vector<std::unique_ptr<OutlineMeasurement>> workers_;

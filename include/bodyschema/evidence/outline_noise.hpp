@@ -17,7 +17,7 @@ namespace bodyschema {
 class OutlineNoise {
  public:
   struct Prior {
-    double sd_px = 0.4;              ///< of a residual
+    double sd_px = 0.4;  ///< of a residual
     /// Nearer than this no picture places the outline of a whole flank, however smooth it is: blur and thresholds shift
     /// it with light and shadow, in all pictures alike, which residuals do not show.
     double floor_px = 0.1;

@@ -61,13 +61,13 @@ struct Innovation {
 /// What postures taught about a state, kept posture by posture: the fused estimate, the same without any of them and
 /// the test of a new one come from the same sums.
 ///
-/// A block is one posture of the arm, or a quarter of a second of motion. Its first pictures speak for it: what the model gets
-/// wrong in a posture it gets wrong in all pictures of it, so that more of them teach nothing new. A posture that comes
-/// again takes the place of what it said before. Every block is linearised about one state, and again when the estimate
-/// has moved on: quadratics from different places claim to know directions that no picture tells (Huang et al., 2010,
-/// on the consistency of filters for simultaneous localisation and mapping). What blocks disagree about beyond their pictures' noise is learned
-/// as an error of every posture, in the joints' angles (a variance component, by MacKay's update of its evidence, 1992).
-/// At most `most_blocks` are kept. Not thread-safe.
+/// A block is one posture of the arm, or a quarter of a second of motion. Its first pictures speak for it: what the
+/// model gets wrong in a posture it gets wrong in all pictures of it, so that more of them teach nothing new. A posture
+/// that comes again takes the place of what it said before. Every block is linearised about one state, and again when
+/// the estimate has moved on: quadratics from different places claim to know directions that no picture tells (Huang et
+/// al., 2010, on the consistency of filters for simultaneous localisation and mapping). What blocks disagree about
+/// beyond their pictures' noise is learned as an error of every posture, in the joints' angles (a variance component,
+/// by MacKay's update of its evidence, 1992). At most `most_blocks` are kept. Not thread-safe.
 class PostureMemory {
  public:
   PostureMemory(MemoryLayout layout, const MemoryOptions& options);

@@ -35,7 +35,7 @@ struct StateParameter {
   std::string name;  ///< "r_elbow" for a joint's offset, otherwise "link_length of r_elbow", "camera_pose turn_x"
   std::string unit;  ///< of the effect's parameter; `si_per_unit` converts
   double si_per_unit = 1.0;
-  double prior_sd = 0.0;  ///< SI
+  double prior_sd = 0.0;    ///< SI
   Eigen::Index joint = -1;  ///< an arm joint's offset: which, RobotModel order
 };
 

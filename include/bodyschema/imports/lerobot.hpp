@@ -14,10 +14,10 @@ namespace bodyschema {
 /// What a LeRobot data set holds (v2.0, v2.1, v3.0).
 struct LerobotSet {
   std::string version;
-  std::int64_t episodes = 0;           ///< how many there should be: 0 to episodes - 1
-  std::vector<std::int64_t> present;   ///< those whose readings are there
-  std::vector<std::string> columns;    ///< names of the readings in observation.state
-  std::vector<std::string> cameras;    ///< keys of the pictures
+  std::int64_t episodes = 0;          ///< how many there should be: 0 to episodes - 1
+  std::vector<std::int64_t> present;  ///< those whose readings are there
+  std::vector<std::string> columns;   ///< names of the readings in observation.state
+  std::vector<std::string> cameras;   ///< keys of the pictures
 
   /// The record of import/read_lerobot.py. Throws as RecordStream.
   static LerobotSet read(ByteSource& records, const std::string& folder);

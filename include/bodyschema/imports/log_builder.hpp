@@ -52,12 +52,12 @@ struct ImportSummary {
     std::uint64_t masks = 0;
   };
   std::uint64_t joint_messages = 0;
-  std::vector<Camera> cameras;             ///< as in the rig
-  std::vector<std::string> joints;         ///< of the URDF, that have readings
-  std::vector<std::string> names_ignored;  ///< of the source: no joints of the robot, or left out as asked
-  double duration_s = 0.0;                 ///< by stamps
+  std::vector<Camera> cameras;              ///< as in the rig
+  std::vector<std::string> joints;          ///< of the URDF, that have readings
+  std::vector<std::string> names_ignored;   ///< of the source: no joints of the robot, or left out as asked
+  double duration_s = 0.0;                  ///< by stamps
   std::map<std::string, LeftOut> left_out;  ///< by what it is: "pictures of camera left", "rows"
-  std::vector<std::string> notes;          ///< to look at before the log is used, one sentence each
+  std::vector<std::string> notes;           ///< to look at before the log is used, one sentence each
 
   /// For people: what is in the log, what is not, what to look at. Lines end in a newline.
   [[nodiscard]] std::string text(const std::filesystem::path& log) const;

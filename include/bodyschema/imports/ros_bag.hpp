@@ -28,7 +28,7 @@ struct BagTopic {
 };
 
 struct RosBagOptions {
-  std::vector<std::string> joints;             ///< topics of JointState; empty: to be found
+  std::vector<std::string> joints;              ///< topics of JointState; empty: to be found
   std::map<std::string, std::string> pictures;  ///< topic by camera; one that is not there: import.cameras, or found
   std::map<std::string, std::string> masks;     ///< topic by camera; one that is not there: import.masks, or none
 };
@@ -72,9 +72,8 @@ ImportSummary import_bag_records(ByteSource& records, const std::string& bag, co
 /// and has the stamp of its header, or where that is 0 of its record. Transforms (tf) between a camera and the robot
 /// are said, not believed. Throws FileError for a bag that cannot be read or was cut short, DeviceError where Python or
 /// its packages cannot be had, and as BagSelection and LogBuilder.
-ImportSummary import_ros_bag(const std::filesystem::path& bag, const ImportTarget& target,
-                             const RosBagOptions& options, const std::filesystem::path& log,
-                             const std::function<void(const std::string&)>& say,
+ImportSummary import_ros_bag(const std::filesystem::path& bag, const ImportTarget& target, const RosBagOptions& options,
+                             const std::filesystem::path& log, const std::function<void(const std::string&)>& say,
                              const std::function<void(std::uint64_t done, std::uint64_t total)>& progress = {});
 
 }  // namespace bodyschema

@@ -26,7 +26,7 @@ struct StillsFolder {
   /// By the folder's name under images/, then by posture.
   std::map<std::string, std::map<std::int64_t, std::filesystem::path>> images, masks;
   std::map<std::string, std::filesystem::path> camera_infos;
-  std::vector<std::string> not_read;   ///< other folders that hold something
+  std::vector<std::string> not_read;    ///< other folders that hold something
   std::vector<std::string> unnumbered;  ///< pictures without a number, or with that of another
 
   /// Lists the folder. Throws FileError when it is none or has no picture under images/.

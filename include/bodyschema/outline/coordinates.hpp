@@ -13,23 +13,23 @@ namespace bodyschema {
 /// One number of Corrections.
 struct Coordinate {
   enum class Kind {
-    kJoint,       ///< dq of joint `index`, rad
-    kAlong,       ///< adjustment of joint `index`, m
-    kTilt1,       ///< ..., rad
-    kTilt2,       ///< ..., rad
-    kShift1,      ///< ..., m
-    kShift2,      ///< ..., m
-    kBase,        ///< axis `index` of the base's shift, m
-    kRigShift,    ///< axis `index` of the rig's shift, m
-    kRigTurn,     ///< ... of its turn, rad
-    kCameraShift, ///< axis `index` of the camera's own shift, m
-    kCameraTurn,  ///< ... of its turn, rad
-    kFocal,       ///< relative
-    kCx,          ///< px
-    kCy,          ///< px
+    kJoint,        ///< dq of joint `index`, rad
+    kAlong,        ///< adjustment of joint `index`, m
+    kTilt1,        ///< ..., rad
+    kTilt2,        ///< ..., rad
+    kShift1,       ///< ..., m
+    kShift2,       ///< ..., m
+    kBase,         ///< axis `index` of the base's shift, m
+    kRigShift,     ///< axis `index` of the rig's shift, m
+    kRigTurn,      ///< ... of its turn, rad
+    kCameraShift,  ///< axis `index` of the camera's own shift, m
+    kCameraTurn,   ///< ... of its turn, rad
+    kFocal,        ///< relative
+    kCx,           ///< px
+    kCy,           ///< px
     kK1,
-    kScale,       ///< of segment `index`, relative
-    kDilation,    ///< of segment `index`, px
+    kScale,     ///< of segment `index`, relative
+    kDilation,  ///< of segment `index`, px
   };
   Kind kind;
   Eigen::Index index = 0;

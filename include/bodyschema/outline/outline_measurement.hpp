@@ -19,8 +19,8 @@ namespace bodyschema {
 struct OutlineSearch {
   double search_px = 8.0;   ///< how far along the normal from the prediction
   double spacing_px = 3.0;  ///< between points, along the outline
-  /// Robust scale c: a residual r costs r^2 c^2 / (r^2 + c^2) and weighs (c^2 / (r^2 + c^2))^2 (Geman and McClure): what
-  /// lies many c away, a tool that no mesh shows or somebody's arm, says nothing.
+  /// Robust scale c: a residual r costs r^2 c^2 / (r^2 + c^2) and weighs (c^2 / (r^2 + c^2))^2 (Geman and McClure):
+  /// what lies many c away, a tool that no mesh shows or somebody's arm, says nothing.
   double robust_px = 3.0;
   /// Factor on every point of a part; empty: 1.
   std::vector<double> part_weight{};
@@ -45,10 +45,10 @@ struct OutlinePoint {
 struct OutlineEvidence {
   Eigen::MatrixXd A;
   Eigen::VectorXd b;
-  double square = 0.0;  ///< r'Wr
-  double weight = 0.0;  ///< trace of W: sqrt(square / weight) is the residual's rms in px
-  double cost = 0.0;    ///< robust cost of the whole predicted outline, px^2; a point without counterpart costs c^2
-  double misfit = 0.0;  ///< the same with one c for all: comparable however far was searched
+  double square = 0.0;   ///< r'Wr
+  double weight = 0.0;   ///< trace of W: sqrt(square / weight) is the residual's rms in px
+  double cost = 0.0;     ///< robust cost of the whole predicted outline, px^2; a point without counterpart costs c^2
+  double misfit = 0.0;   ///< the same with one c for all: comparable however far was searched
   double sampled = 0.0;  ///< points of the predicted outline in the picture
   double matched = 0.0;  ///< ... that found a counterpart within the search
   void clear(Eigen::Index coordinates);
@@ -74,9 +74,9 @@ class OutlineMeasurement {
   /// Compares one picture with its prediction.
   /// @param q  encoders at its exposure
   /// @param active  coordinates wanted, by position; A and b are over these, in this order
-  void linearise(const ObservedEdges& edges, const Eigen::Ref<const Eigen::VectorXd>& q,
-                 const Corrections& corrections, std::size_t camera, std::span<const std::uint32_t> active,
-                 const OutlineSearch& search, OutlineEvidence& out);
+  void linearise(const ObservedEdges& edges, const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
+                 std::size_t camera, std::span<const std::uint32_t> active, const OutlineSearch& search,
+                 OutlineEvidence& out);
   /// What a picture of this view would tell if every point of its outline were found where it is predicted.
   void expect(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera,
               std::span<const std::uint32_t> active, const OutlineSearch& search, OutlineEvidence& out);

@@ -17,9 +17,9 @@ namespace bodyschema {
 /// paper without the drawing.
 ///
 /// Corrections of cameras and sizes are folded into the parts' transforms, which then are affine rather than rigid (a
-/// focal length changed by s scales camera x and y by 1 + s; a principal point moved by d px shears x by d / f), so that
-/// one set of intrinsics serves all predictions. Distortion is no such thing: outlines are bent afterwards.
-/// One per thread; allocates nothing after construction.
+/// focal length changed by s scales camera x and y by 1 + s; a principal point moved by d px shears x by d / f), so
+/// that one set of intrinsics serves all predictions. Distortion is no such thing: outlines are bent afterwards. One
+/// per thread; allocates nothing after construction.
 class RobotProjection {
  public:
   /// Throws ConfigurationError when a link of the set-up or rig does not exist.

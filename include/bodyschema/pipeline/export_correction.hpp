@@ -53,12 +53,12 @@ Correction read_correction(const std::filesystem::path& summary, bool anyway = f
 /// Adds to `correction` what a URDF can hold of some effects, and says of every one where it
 /// went. Joint offsets are left out: those of the replay count.
 std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
-                                              const RobotSetup& setup, const StereoRig& rig, Correction& correction);
+                                       const RobotSetup& setup, const StereoRig& rig, Correction& correction);
 
 /// The rig with intrinsics and places as `model` has them. Cameras that are links of the URDF stay where their link is:
 /// corrected.urdf moves that. What has been estimated is known then (CameraMount::knowledge).
-StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
-                        const StereoRig& rig);
+StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const RobotModel>& robot,
+                        const RobotSetup& setup, const StereoRig& rig);
 
 /// A copy of the URDF that is right when it is fed the encoders as they are: every corrected joint's
 /// origin is turned back by its offset about its axis (moved, for a sliding joint) and its limits
@@ -69,11 +69,11 @@ StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const Rob
 void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& correction,
                           const std::filesystem::path& out);
 
-/// Writes `offsets.yaml` (by joint, deg), `corrected.urdf`, `ros/` (write_ros_files) and `calibration_delta.txt` (what to add
-/// to each joint's calibrationDelta in an iCub's calibrator file, deg) into `out`, head joints that
-/// were estimated included: arm and head offsets hold together. With other effects also `cameras.yaml` (where these
-/// change intrinsics or cameras' places) and `what_was_applied.txt`: which of its effects these files hold, and which only work
-/// where the model itself is loaded. Each file is written whole or, where that fails, stays as it was.
+/// Writes `offsets.yaml` (by joint, deg), `corrected.urdf`, `ros/` (write_ros_files) and `calibration_delta.txt` (what
+/// to add to each joint's calibrationDelta in an iCub's calibrator file, deg) into `out`, head joints that were
+/// estimated included: arm and head offsets hold together. With other effects also `cameras.yaml` (where these change
+/// intrinsics or cameras' places) and `what_was_applied.txt`: which of its effects these files hold, and which only
+/// work where the model itself is loaded. Each file is written whole or, where that fails, stays as it was.
 /// @param anyway  as of read_correction, and also when the summary's `model_hash` is another robot's, with a warning
 /// Throws as read_correction does, as replace_file for a file that cannot be written, and ConfigurationError when the
 /// summary was made with another URDF, other meshes or another extended model than `setup` has. Returns warnings and

@@ -41,7 +41,8 @@ class Pipeline {
   ///   effect with `vision.method: statistics`, which goes by the estimate before.
   Estimate process(Observation& observation, const Observation* next = nullptr);
   /// Straightens the pictures and fills in the masks. A camera that repeats its last picture while
-  /// the arm moves gets none: it is frozen; nor does one whose mask did not come (`vision.method: given`). False while the background is being learned.
+  /// the arm moves gets none: it is frozen; nor does one whose mask did not come (`vision.method: given`). False while
+  /// the background is being learned.
   bool segment(Observation& observation);
   /// One step of the estimator on an observation that has its masks.
   Estimate estimate(const Observation& observation);

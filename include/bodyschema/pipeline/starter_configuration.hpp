@@ -30,11 +30,11 @@ struct StarterReport {
   bool usable = false;  ///< robot and meshes load; otherwise the text says what must be put right
 };
 
-/// Writes robot.yaml, estimator.yaml and, where the cameras' places are known, simulator.yaml for a robot that has none,
-/// from its URDF: the joints between root and hand that do not move the cameras too are the arm, the links they carry
-/// are what the cameras see, and the base where it stands in their view or may do so; joints between root and a camera
-/// are the head. Replaces no file. Throws FileError naming the URDF and what is wrong, ConfigurationError naming a link
-/// that is not there and the nearest one, and as replace_file.
+/// Writes robot.yaml, estimator.yaml and, where the cameras' places are known, simulator.yaml for a robot that has
+/// none, from its URDF: the joints between root and hand that do not move the cameras too are the arm, the links they
+/// carry are what the cameras see, and the base where it stands in their view or may do so; joints between root and a
+/// camera are the head. Replaces no file. Throws FileError naming the URDF and what is wrong, ConfigurationError naming
+/// a link that is not there and the nearest one, and as replace_file.
 StarterReport write_starter_configuration(const StarterOptions& options);
 
 }  // namespace bodyschema

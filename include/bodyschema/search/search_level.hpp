@@ -10,8 +10,8 @@
 namespace bodyschema {
 
 /// What hypotheses are scored with where the best of them is refined on the outline afterwards: a level of the
-/// pictures' pyramid, and meshes as coarse as that level allows. The cost then depends neither on how large pictures are
-/// nor much on how fine meshes are.
+/// pictures' pyramid, and meshes as coarse as that level allows. The cost then depends neither on how large pictures
+/// are nor much on how fine meshes are.
 ///
 /// A level holds every step-th pixel of every step-th row, beginning with pixel step / 2: the same rays, fewer of them,
 /// so that counts are those of the full picture by step^2, but for chance.
@@ -22,14 +22,15 @@ struct SearchLevel {
   std::vector<PinholeIntrinsics> cameras;
 };
 
-/// @param cameras  of the full pictures. All get the same step: the largest that leaves the least of their shorter sides
+/// @param cameras  of the full pictures. All get the same step: the largest that leaves the least of their shorter
+/// sides
 ///   120 rows.
 SearchLevel search_level(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras);
 
 /// How far outlines may be moved, in metres: 0.1 px of the level's pictures at the nearest distance at which the robot
-/// can be seen. That is where its largest part alone, of bounding radius r, fills the shorter side of s px, at the depth
-/// z = f * 2 r / s: any nearer, no picture shows an outline of it all round. 0.1 px are 0.1 z / f there, so that the
-/// bound is 0.2 r / s whatever the focal length.
+/// can be seen. That is where its largest part alone, of bounding radius r, fills the shorter side of s px, at the
+/// depth z = f * 2 r / s: any nearer, no picture shows an outline of it all round. 0.1 px are 0.1 z / f there, so that
+/// the bound is 0.2 r / s whatever the focal length.
 double search_mesh_bound_m(const SilhouetteModel& model, std::span<const PinholeIntrinsics> level_cameras);
 
 /// Every step-th pixel; an empty mask stays empty.

@@ -61,7 +61,8 @@ struct VisionSetup {
   /// statistics: how far from the predicted outline the robot is searched for, px.
   int search_px = 12;
 
-  /// given: pieces of robot with a smaller share of the largest one's pixels are taken for neither robot nor background.
+  /// given: pieces of robot with a smaller share of the largest one's pixels are taken for neither robot nor
+  /// background.
   double min_piece_share = 0.05;
 
   /// Reads and checks the section; throws ConfigurationError.
