@@ -17,6 +17,7 @@
 
 #include "bodyschema/bus/lcm_link.hpp"
 #include "bodyschema/core/error.hpp"
+#include "own_port.hpp"
 
 /// What one source only (bus.one_source) does on a real network of this machine's own.
 namespace bodyschema {
@@ -97,7 +98,7 @@ class OneSource : public testing::Test {
   }
 
   static constexpr std::size_t kLongest = 10'000;
-  const int port_ = 32'100 + getpid() % 400;
+  const int port_ = own_port();
   std::shared_ptr<spdlog::logger> logger_before_ = spdlog::default_logger();
   std::ostringstream log_;
   std::unique_ptr<LcmLink> link_;

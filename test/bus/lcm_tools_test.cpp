@@ -14,6 +14,7 @@
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/bus/observation_stream.hpp"
 #include "bodyschema/core/error.hpp"
+#include "own_port.hpp"
 
 extern char** environ;
 
@@ -113,7 +114,7 @@ class LcmTools : public ::testing::Test {
     }
     directory_ = std::filesystem::temp_directory_path() / ("bodyschema_lcm_tools_" + std::to_string(getpid()));
     std::filesystem::create_directories(directory_);
-    url_ = "udpm://239.255.76.67:" + std::to_string(20'000 + getpid() % 30'000) + "?ttl=0";
+    url_ = own_lcm_url();
     try {
       LcmLink probe(url_);
       probe.subscribe("PROBE", 1, [](const auto&, auto, auto) {});

@@ -11,7 +11,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/effects/encoder_track.hpp"
 #include "bodyschema/effects/error_model.hpp"
-#include "robot/temporary_folder.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "bodyschema/core/error.hpp"
-#include "robot/temporary_folder.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {

@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "temporary_folder.hpp"
+
 namespace bodyschema {
 namespace {
 
@@ -13,12 +15,11 @@ namespace fs = std::filesystem;
 class UserCache : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / "user_cache_test";
-    fs::remove_all(folder_);
     unsetenv("XDG_CACHE_HOME");
     unsetenv("HOME");
   }
-  fs::path folder_;
+  const TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_.path() / "cache";
 };
 
 TEST_F(UserCache, KeepsWhatIsWritten) {

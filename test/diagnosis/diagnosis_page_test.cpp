@@ -13,6 +13,7 @@
 
 #include "bodyschema/geometry/pose.hpp"
 #include "random_seed.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {
@@ -62,7 +63,8 @@ DiagnosisReport report() {
 }
 
 std::string page_of(const DiagnosisReport& r) {
-  const auto file = std::filesystem::path(testing::TempDir()) / "diagnosis_page_test.html";
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "page.html";
   diagnosis_page(r, "babble.log", {}).write(file);
   std::ifstream in(file);
   std::stringstream text;

@@ -10,6 +10,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "effects/roles.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {
@@ -116,8 +117,8 @@ TEST(CauseName, IsReadAsPeopleSayIt) {
 }
 
 TEST(DiagnosisReport, IsWrittenBesideItsModel) {
-  const auto folder = fs::path(testing::TempDir()) / "bodyschema-diagnosis-report";
-  fs::remove_all(folder);
+  const TemporaryFolder temporary;
+  const auto folder = temporary.path() / "report";
   auto r = report();
   ErrorModel model(test::roles());
   model.add("latency", {}).parameters()[0].value = 0.058;
@@ -132,7 +133,6 @@ TEST(DiagnosisReport, IsWrittenBesideItsModel) {
   // A folder that cannot be is said before the long work.
   std::ofstream(folder) << "a file";
   EXPECT_THROW(DiagnosisReport::prepare(folder), Error);
-  fs::remove(folder);
 }
 
 }  // namespace

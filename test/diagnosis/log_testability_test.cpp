@@ -7,6 +7,7 @@
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/bus/messages.hpp"
 #include "bodyschema/core/error.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {
@@ -18,9 +19,14 @@ Configuration robot(const std::vector<std::string>& overrides = {}) {
                              overrides);
 }
 
+const TemporaryFolder& folder() {
+  static const TemporaryFolder folder;
+  return folder;
+}
+
 /// The elbow swings 40 deg to and fro every four seconds, or goes one way; nothing else moves.
 std::filesystem::path log_of(const std::string& name, double duration_s, bool to_and_fro) {
-  const auto file = std::filesystem::path(testing::TempDir()) / ("bodyschema-" + name + ".lcmlog");
+  const auto file = folder().path() / (name + ".lcmlog");
   LogWriter writer(file);
   const std::vector<std::string> joints = {"neck_pitch",       "neck_roll",      "neck_yaw",          "eyes_tilt",
                                            "l_eye_pan",        "r_eye_pan",      "r_shoulder_pitch",  "r_shoulder_roll",
@@ -88,7 +94,7 @@ TEST(LogTestability, AMistypedKeyIsRefusedByName) {
 
 TEST(LogTestability, ShortAndEmptyLogs) {
   EXPECT_THAT(testability_of(robot(), log_of("short", 4.0, true)).text(), HasSubstr("needs at least 10 s"));
-  const auto file = std::filesystem::path(testing::TempDir()) / "bodyschema-nothing.lcmlog";
+  const auto file = folder().path() / "nothing.lcmlog";
   LogWriter(file).publish("OTHERS", 1, std::vector<std::uint8_t>(8, 0));
   EXPECT_THROW(testability_of(robot(), file), DataError);
 }

@@ -42,7 +42,7 @@ def main():
     scratch.mkdir(parents=True)
     # A network of its own, so that tests beside it are not disturbed.
     environment = dict(os.environ, PATH=f"{programs}:{os.environ['PATH']}",
-                       LCM_DEFAULT_URL=f"udpm://239.255.76.67:{20000 + os.getpid() % 20000}?ttl=0")
+                       LCM_DEFAULT_URL=f"udpm://239.255.76.67:{40000 + os.getpid() % 20000}?ttl=0")
     environment.pop("BODYSCHEMA_SHARE", None)
     environment.setdefault("BODYSCHEMA_DATA", str(source.parent / "shared/data"))
     text = page.read_text(encoding="utf-8")

@@ -10,6 +10,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "test_data.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {
@@ -20,7 +21,8 @@ const std::filesystem::path kConfigs = std::filesystem::path(BODYSCHEMA_SOURCE_D
 
 /// The message of the error that evaluating with such arguments ends in; nothing may be written.
 std::string refusal(const std::string& experiment, const std::vector<std::string>& overrides) {
-  const auto out = std::filesystem::temp_directory_path() / "bodyschema-evaluate-refused";
+  const TemporaryFolder folder;
+  const auto out = folder.path() / "refused";
   const std::filesystem::path file = kConfigs / "icub_right/evaluation.yaml";
   EvaluationOptions options;
   options.experiment = experiment;
@@ -83,7 +85,8 @@ TEST(Evaluate, WhatIsSetAboutEstimatingReachesTheRecordingToo) {
   EvaluationOptions options;
   options.experiment = "recording";
   options.data = data_folder();
-  options.out = std::filesystem::path(testing::TempDir()) / "bodyschema-evaluate-recording";
+  const TemporaryFolder folder;
+  options.out = folder.path() / "recording";
   // The simulator's robot is another one; how it is estimated is not.
   options.overrides = {"robot.urdf=/nowhere.urdf", "simulator.seed=1", "filter.particles=minus_one"};
   const WithoutData environment;

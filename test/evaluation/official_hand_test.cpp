@@ -6,6 +6,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {
@@ -33,13 +34,12 @@ constexpr const char* kOther = R"(<robot name="other">
 class OfficialHand : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / "official_hand_test";
-    fs::create_directories(folder_);
     std::ofstream(folder_ / "arm.urdf") << kArm;
     std::ofstream(folder_ / "other.urdf") << kOther;
     graft_ = {folder_ / "arm.urdf", folder_ / "other.urdf", "hand", "hand", "frame", 0.01, "new_"};
   }
-  fs::path folder_;
+  const TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_.path();
   HandGraft graft_;
 };
 

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/core/error.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {
@@ -20,10 +21,7 @@ constexpr Microseconds kWeek = 7ll * 24 * 3600 * 1'000'000;
 
 class FleetReport : public testing::Test {
  protected:
-  void SetUp() override {
-    fs::remove_all(results_);
-    fs::create_directories(results_);
-  }
+  void SetUp() override { fs::create_directories(results_); }
   void write(const std::string& name, const std::string& content) const {
     const auto file = results_ / name;
     fs::create_directories(file.parent_path());
@@ -48,7 +46,8 @@ class FleetReport : public testing::Test {
                         {"offsets_deg", {{"before", {{"r_elbow", 9.0}}}, {"after", {{"r_elbow", elbow}}}}}};
     return j.dump();
   }
-  const fs::path results_ = fs::path(testing::TempDir()) / "bodyschema-fleet";
+  const TemporaryFolder folder_;
+  const fs::path results_ = folder_.path() / "results";
 };
 
 TEST_F(FleetReport, FollowsACauseOverWeeks) {

@@ -8,7 +8,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "records.hpp"
-#include "robot/temporary_folder.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "records.hpp"
-#include "robot/temporary_folder.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "robot/temporary_folder.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 

@@ -96,7 +96,7 @@ def main():
     if python is None:
         return SKIPPED
     environment = dict(os.environ, PYTHONPATH=str(types), PYTHONDONTWRITEBYTECODE="1",
-                       LCM_DEFAULT_URL=f"udpm://239.255.76.67:{random.randint(20000, 40000)}?ttl=0")
+                       LCM_DEFAULT_URL=f"udpm://239.255.76.67:{random.randint(40000, 60000)}?ttl=0")
     sends, hears, expected, between = {
         "publish.py": ([example], ["-c", RECEIVE], SENT, None),
         "listen.py": (["-c", SEND], [example], HEARD, None),

@@ -202,7 +202,7 @@ class World : public testing::Test {
   }
   [[nodiscard]] std::int64_t dropped() const { return counters_with(last_.back(), "dropped."); }
 
-  const std::string url_ = private_lcm_url();
+  const std::string url_ = own_lcm_url();
   Scratch scratch_;
   double worst_sd_ = 0.0;
   std::string stalled_joint_;
@@ -374,8 +374,8 @@ TEST_F(World, PacketsLostAndSwapped) {
   // A picture message is some eight packets: with one in five lost, one message in six comes through.
   // There is nothing to say but what comes of it: estimates go on at a lower rate.
   for (const double lost : {0.05, 0.2}) {
-    const std::string robots_url = private_lcm_url();
-    const std::string url = private_lcm_url();
+    const std::string robots_url = own_lcm_url();
+    const std::string url = own_lcm_url();
     const unsigned seed = std::random_device{}();
     SCOPED_TRACE(seed);
     Relay relay(robots_url, url, seed);

@@ -2,9 +2,7 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
 #include <signal.h>
-#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -157,28 +155,9 @@ Scratch::~Scratch() {
 
 // --- network ---------------------------------------------------------------------------------------
 
-std::string private_lcm_url() {
-  static std::atomic<int> count = 0;
-  const int port = 20'000 + (getpid() * 7 + ++count) % 12'000;
-  return "udpm://239.255.76.67:" + std::to_string(port) + "?ttl=0";
-}
-
-int free_port() {
-  const int descriptor = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  const bool known = bind(descriptor, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
-                     getsockname(descriptor, reinterpret_cast<sockaddr*>(&address), &size) == 0;
-  close(descriptor);
-  if (!known) throw std::runtime_error("this machine has no free TCP port");
-  return ntohs(address.sin_port);
-}
-
 std::string why_no_lcm() {
   try {
-    LcmLink link(private_lcm_url());
+    LcmLink link(own_lcm_url());
     bool heard = false;
     link.subscribe("PROBE", 8, [&](const std::string&, Bytes, std::int64_t) { heard = true; });
     const std::vector<std::uint8_t> message(10, 1);

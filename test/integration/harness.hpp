@@ -18,6 +18,7 @@
 #include "bodyschema/bus/lcm_link.hpp"
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/bus/messages.hpp"
+#include "own_port.hpp"
 
 /// Starts the built programs, talks to them over LCM, and waits for what they say.
 namespace bodyschema::integration {
@@ -84,10 +85,6 @@ class Scratch {
   std::filesystem::path folder_;
 };
 
-/// A network of this test's own: a port nobody else uses, packets that stay on this machine.
-std::string private_lcm_url();
-/// A TCP port of this machine that nobody has taken.
-int free_port();
 /// Why LCM cannot be used here; empty when it can.
 std::string why_no_lcm();
 

@@ -66,8 +66,8 @@ class LivePageInBrowser : public testing::Test {
     return std::regex_search(dom, match, std::regex(before + "(-?[0-9]+)")) ? std::stoi(match[1]) : -1;
   }
 
-  const std::string url_ = private_lcm_url();
-  const int port_ = free_port();
+  const std::string url_ = own_lcm_url();
+  const int port_ = own_port();
   Scratch scratch_;
 };
 
@@ -203,8 +203,8 @@ double quantile(std::vector<double> values, double share) {
 /// tests on the same cores it says nothing. Otherwise the service has to go on estimating, no more.
 TEST(LivePageViewers, DoNotSlowTheEstimator) {
   if (const std::string reason = why_no_lcm(); !reason.empty()) GTEST_SKIP() << reason;
-  const std::string url = private_lcm_url();
-  const int port = free_port();
+  const std::string url = own_lcm_url();
+  const int port = own_port();
   Scratch scratch;
   Process service({"bodyschemad", "--config", reach_configuration(), "-l", url, "--page", std::to_string(port)},
                   scratch.folder());

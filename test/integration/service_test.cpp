@@ -35,7 +35,7 @@ class Service : public testing::Test {
     return command;
   }
 
-  const std::string url_ = private_lcm_url();
+  const std::string url_ = own_lcm_url();
   Scratch scratch_;
 };
 
@@ -119,7 +119,7 @@ TEST_F(Service, AgreesWithReplayOverLcmLogplayer) {
   std::vector<std::string> speeds{"1", "0.25", "0.08"};
   if (patience() > 1.0) speeds = {"0.02"};
   for (const std::string& speed : speeds) {
-    const std::string url = private_lcm_url();
+    const std::string url = own_lcm_url();
     Listener listener(url);
     const auto file = scratch_ / ("estimates-" + speed + ".jsonl");
     Process service({"bodyschemad", "--config", reach_configuration(), "-l", url, "--estimates", file.string(),
@@ -174,7 +174,7 @@ TEST_F(Service, MalformedMessagesAreCountedAndChangeNothing) {
 TEST_F(Service, StopsWithinASecondIdleAndBusy) {
   for (const int number : {SIGTERM, SIGINT}) {
     for (const bool busy : {false, true}) {
-      const std::string url = private_lcm_url();
+      const std::string url = own_lcm_url();
       Listener listener(url);
       Process service({"bodyschemad", "--config", reach_configuration(), "-l", url}, scratch_.folder());
       ASSERT_TRUE(service.said("waiting for", kStart));

@@ -115,7 +115,7 @@ TEST(Soak, DaemonLivesThroughFaultsAtRandom) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
 
-  const std::string url = private_lcm_url();
+  const std::string url = own_lcm_url();
   Scratch scratch;
   Process service({"bodyschemad", "--config", reach_configuration(), "-l", url}, scratch.folder());
   ASSERT_TRUE(service.said("waiting for", Seconds(120))) << service.err();

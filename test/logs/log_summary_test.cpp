@@ -47,7 +47,7 @@ TEST(LogSummary, CountsChannelsRatesAndGaps) {
 }
 
 TEST(LogSummary, SpansTimesThatCannotBe) {
-  const auto file = std::filesystem::temp_directory_path() / "bodyschema_impossible_times.lcmlog";
+  const auto file = testing_logs::scratch_file("impossible_times.lcmlog");
   {
     LogWriter writer(file);
     const std::uint8_t byte = 0;
@@ -75,7 +75,7 @@ TEST(LogSummary, TellsHowJointsMoved) {
 }
 
 TEST(LogSummary, CountsPosturesThatDifferInAJointThatTurns) {
-  const auto file = std::filesystem::temp_directory_path() / "bodyschema_postures.lcmlog";
+  const auto file = testing_logs::scratch_file("postures.lcmlog");
   {
     LogWriter writer(file);
     Microseconds t = kBegin;

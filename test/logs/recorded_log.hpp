@@ -6,15 +6,15 @@
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/bus/messages.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema::testing_logs {
 
 inline constexpr Microseconds kBegin = 1'700'000'000'000'000;
 
 inline std::filesystem::path scratch_file(const std::string& name) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "bodyschema-logs";
-  std::filesystem::create_directories(folder);
-  return folder / name;
+  static const TemporaryFolder folder;
+  return folder.path() / name;
 }
 
 inline bot_core::joint_state_t joints(Microseconds utime, float elbow_rad, float neck_rad) {

@@ -10,7 +10,7 @@
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/effects/corrected_kinematics.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
-#include "robot/temporary_folder.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {

@@ -7,7 +7,7 @@
 #include "bodyschema/robot/forward_kinematics.hpp"
 #include "bodyschema/robot/robot_model.hpp"
 #include "robot/robot_test_data.hpp"
-#include "robot/temporary_folder.hpp"
+#include "temporary_folder.hpp"
 #include "robot/tiny_meshes.hpp"
 
 namespace bodyschema {

@@ -10,7 +10,7 @@
 #include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/core/error.hpp"
 #include "robot/robot_test_data.hpp"
-#include "robot/temporary_folder.hpp"
+#include "temporary_folder.hpp"
 #include "robot/urdf_walk.hpp"
 
 namespace bodyschema {

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "robot/robot_test_data.hpp"
-#include "robot/temporary_folder.hpp"
+#include "temporary_folder.hpp"
 #include "robot/urdf_walk.hpp"
 
 namespace bodyschema {

@@ -9,6 +9,7 @@
 
 #include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema::test {
 
@@ -31,13 +32,10 @@ inline std::pair<RobotSetup, StereoRig> tilting_eyes() {
           joint("l_tilt", "l_outer", "l_inner", "0 1 0") + joint("r_tilt", "head", "r_outer", "0 1 0") +
           joint("r_pan", "r_outer", "r_inner", "0 0.1 -1") + joint("arm", "root", "hand", "0 1 0") +
           camera("left", "l_inner") + camera("right", "r_inner") + "</robot>";
-  const auto* running = testing::UnitTest::GetInstance()->current_test_info();
   std::pair<RobotSetup, StereoRig> robot;
   auto& [setup, rig] = robot;
-  // Tests run side by side: a file for each.
-  setup.model.urdf = std::filesystem::path(testing::TempDir()) /
-                     (std::string(running->test_suite_name()) + "." + running->name() + ".urdf");
-  std::ofstream(setup.model.urdf) << urdf;
+  static const TemporaryFolder folder;
+  setup.model.urdf = folder.write("eyes.urdf", urdf);
   setup.hand_link = "hand";
   setup.estimated_joints = {"arm"};
   rig.cameras.resize(2);

@@ -9,6 +9,7 @@
 
 #include "bodyschema/gl/context.hpp"
 #include "silhouette/synthetic_hand.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {
@@ -18,11 +19,7 @@ using testing::HasSubstr;
 
 class FastestEngine : public testing::Test {
  protected:
-  void SetUp() override {
-    cache_ = fs::path(testing::TempDir()) / "fastest_engine_test";
-    fs::remove_all(cache_);
-    setenv("XDG_CACHE_HOME", cache_.c_str(), 1);
-  }
+  void SetUp() override { setenv("XDG_CACHE_HOME", cache_.c_str(), 1); }
   /// contour, raster, compute
   static std::vector<EngineTiming> figures(double contour, double raster, double compute) {
     return {
@@ -33,7 +30,8 @@ class FastestEngine : public testing::Test {
     const auto chosen = fastest_of(timings, options, reason);
     return chosen.engine + "/" + chosen.gl_pass;
   }
-  fs::path cache_;
+  const TemporaryFolder folder_;
+  const fs::path cache_ = folder_.path() / "cache";
 };
 
 TEST_F(FastestEngine, IsTheOneThatTookLeast) {

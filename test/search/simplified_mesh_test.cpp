@@ -13,6 +13,7 @@
 #include "bodyschema/search/search_level.hpp"
 #include "silhouette/reference.hpp"
 #include "test_data.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {
@@ -49,8 +50,6 @@ TriangleMesh ball(int rings, float radius_m) {
 class SimplifiedMesh : public testing::Test {
  protected:
   void SetUp() override {
-    cache_ = fs::path(testing::TempDir()) / "simplified_mesh_test";
-    fs::remove_all(cache_);
     setenv("XDG_CACHE_HOME", cache_.c_str(), 1);
     if (simplified_mesh(ball(60, 0.05f), 1e-3).triangles.size() == ball(60, 0.05f).triangles.size()) {
       GTEST_SKIP() << "built without meshoptimizer (libmeshoptimizer-dev)";
@@ -64,7 +63,8 @@ class SimplifiedMesh : public testing::Test {
     }
     return list;
   }
-  fs::path cache_;
+  const TemporaryFolder folder_;
+  const fs::path cache_ = folder_.path() / "cache";
 };
 
 TEST_F(SimplifiedMesh, HasFewTrianglesAndStaysClosed) {

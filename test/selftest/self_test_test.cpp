@@ -11,6 +11,8 @@
 #include <unistd.h>
 #include <vector>
 
+#include "own_port.hpp"
+
 namespace bodyschema {
 namespace {
 
@@ -35,7 +37,7 @@ std::map<std::string, CheckResult> check(const SelfTestOptions& options, CheckLe
 SelfTestOptions usual() {
   SelfTestOptions options;
   options.version = "1.2.3";
-  options.lcm_url = "udpm://239.255.76.67:7667?ttl=0";
+  options.lcm_url = own_lcm_url();
   return options;
 }
 

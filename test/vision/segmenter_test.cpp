@@ -9,6 +9,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/vision/mask_picture.hpp"
 #include "vision/scene.hpp"
+#include "temporary_folder.hpp"
 
 namespace bodyschema {
 namespace {
@@ -380,7 +381,8 @@ TEST(Segmenter, TinyPicturesDoNotBreakAnything) {
 }
 
 TEST(Segmenter, BackgroundPictureMustBeThereAndFit) {
-  const auto file = std::filesystem::temp_directory_path() / "bodyschema_segmenter_background.png";
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "background.png";
   write_mask_png(file, BinaryMask(10, 10));
   auto setup = setup_for(SegmentationMethod::kBackgroundPicture);
   setup.background_pictures["left"] = file;
@@ -415,7 +417,8 @@ TEST(Segmenter, GivenCleanPictureAndNoisyFrames) {
   auto clean = scene.without_robot();
   clean.noise_levels = 0;
   const Image background = clean.picture(random);
-  const auto file = std::filesystem::temp_directory_path() / "bodyschema_segmenter_clean.ppm";
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "clean.ppm";
   write_ppm(file, background);
   auto setup = setup_for(SegmentationMethod::kBackgroundPicture);
   setup.background_pictures["left"] = file;
@@ -440,7 +443,8 @@ TEST(Segmenter, AGivenPictureIsStraightenedAndBesideUnknownPixelsNothingIsKnown)
   // Where the arm never left, the picture is black.
   Image picture = behind;
   for (int v = 20; v < 100; ++v) std::fill(picture.pixel(20, v), picture.pixel(60, v), std::uint8_t{0});
-  const auto file = std::filesystem::temp_directory_path() / "bodyschema_segmenter_lens.ppm";
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "lens.ppm";
   write_ppm(file, picture);
   auto setup = setup_for(SegmentationMethod::kBackgroundPicture);
   setup.background_pictures["left"] = file;

@@ -1,22 +1,21 @@
 #pragma once
 
-#include <unistd.h>
-
-#include <atomic>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 #include <string>
 
 namespace bodyschema {
 
-/// A folder of its own for one test, removed at the end.
+/// A folder of its own for one test, removed at the end. ctest runs the tests of one program as processes side by
+/// side, so a folder of a fixed name is written by one of them and removed by the other.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    static std::atomic<int> count{0};
-    path_ = std::filesystem::temp_directory_path() /
-            ("bodyschema_robot_" + std::to_string(getpid()) + "_" + std::to_string(count++));
-    std::filesystem::create_directories(path_);
+    std::string pattern = (std::filesystem::temp_directory_path() / "bodyschema-test-XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder can be made");
+    path_ = pattern;
   }
   ~TemporaryFolder() {
     std::error_code ignored;
