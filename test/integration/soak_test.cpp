@@ -259,7 +259,7 @@ TEST(Soak, DaemonLivesThroughFaultsAtRandom) {
   EXPECT_GE(static_cast<double>(honesty.published_), 0.95 * static_cast<double>(last.frames_estimated));
   EXPECT_GT(static_cast<double>(honesty.converged_), 0.3 * static_cast<double>(honesty.published_));
   EXPECT_LE(arrived, sent);
-  // 1.2 % in the hour of docs/reliability.md: held up for 3 s, or waiting for a processor, the service leaves
+  // 1.2 % in the hour of docs/reliability_evidence.md: held up for 3 s, or waiting for a processor, the service leaves
   // its socket full.
   EXPECT_GE(static_cast<double>(arrived), 0.95 * static_cast<double>(sent));
   EXPECT_EQ(dishonest, 0);
