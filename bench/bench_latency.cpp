@@ -141,7 +141,7 @@ std::filesystem::path log_of(Size size, const std::filesystem::path& folder) {
 
 void latency(benchmark::State& state, int seconds, Size size, bool jpeg) {
   const Scratch scratch;
-  const std::string url = private_lcm_url();
+  const std::string url = own_lcm_url();
   const auto log = jpeg ? log_of(size, scratch.folder()) : reach_log();
   std::vector<std::string> command{"bodyschemad", "--config", reach_configuration(), "--lcm-url", url};
   for (const auto& argument : size.arguments()) command.push_back(argument);
