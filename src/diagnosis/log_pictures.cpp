@@ -72,6 +72,7 @@ std::vector<std::pair<Image, std::string>> draw_pictures(LogFit& fit, const std:
       const auto& q = log.pictures()[*p].joints.q;
       OverlayView view{
           &seen->image, preview.draw(q, before.corrections[*p], c), preview.draw(q, after.corrections[*p], c), {}};
+      view.px_per_m = preview.hand_px_per_m();
       const auto& k = log.rig().cameras[c].intrinsics;
       const int size = std::min({2 * kHalfPart_px, k.width, k.height});
       if (const Eigen::Vector2d hand = preview.hand(); hand.allFinite()) {

@@ -143,7 +143,9 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
   if (seen.empty()) throw DataError(log.string() + ": no synchronised pictures in the recording");
 
   RecordingResult result;
-  result.overlay = draw_overlay(overlay_views(pipeline, *last_view, last), label);
+  auto views = overlay_views(pipeline, *last_view, last);
+  crop_to_arm(views);
+  result.overlay = draw_overlay(views, label);
   result.offsets = std::move(offsets);
   result.joint_names = last.joint_names;
   std::vector<double> before_px, before_mm, before_deg, after_px, after_mm, after_deg, online_px;

@@ -50,4 +50,9 @@ Eigen::Vector2d SilhouettePreview::hand() const {
   return {k.fx * p.x() / p.z() + k.cx, k.fy * p.y() / p.z() + k.cy};
 }
 
+double SilhouettePreview::hand_px_per_m() const {
+  const double depth_m = projection_.hand().translation().z();
+  return depth_m > 0.0 ? projection_.intrinsics(camera_).fx / depth_m : 0.0;
+}
+
 }  // namespace bodyschema

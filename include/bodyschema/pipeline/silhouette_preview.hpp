@@ -17,6 +17,8 @@ class SilhouettePreview {
   BinaryMask draw(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera);
   /// The hand's pixel in the last drawn picture; behind the camera: not finite.
   [[nodiscard]] Eigen::Vector2d hand() const;
+  /// Length in px of a metre across the line of sight at the hand's distance; behind the camera: 0.
+  [[nodiscard]] double hand_px_per_m() const;
 
  private:
   RobotProjection projection_;
