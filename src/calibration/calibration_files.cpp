@@ -115,13 +115,18 @@ std::string offsets_yaml(const Calibration& c, bool all) {
 }
 
 std::string cameras_yaml(const Calibration& c, const StereoRig& rig) {
-  std::string text = "# Cameras as found: put in place of the section of the same name.\ncameras:\n";
+  std::string text =
+      "# Cameras as found: to be included behind robot.yaml, or put in place of its section of the same "
+      "name.\ncameras:\n";
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     const auto& camera = c.cameras[i];
     const auto& k = rig.cameras[i].intrinsics;
     const auto& d = rig.cameras[i].distortion;
     const Eigen::Matrix4d X = camera.X_link_optical.matrix();
-    text += fmt::format("  {}:\n    link: {}\n    X_link_optical:\n", camera.name, camera.link);
+    text += fmt::format(
+        "  {}:\n    link: {}\n    beside: ~  # instead of a place beside the first camera\n    X_beside_optical: ~\n   "
+        " X_link_optical:\n",
+        camera.name, camera.link);
     for (int r = 0; r < 4; ++r) {
       text += fmt::format("      - [{:.9f}, {:.9f}, {:.9f}, {:.9f}]\n", X(r, 0), X(r, 1), X(r, 2), X(r, 3));
     }
@@ -225,9 +230,11 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
       const auto& found = batch.at().corrections[static_cast<std::size_t>(picture - log.pictures().begin())];
       views.push_back(
           {&seen->image, preview.draw(picture->joints.q, nothing, k), preview.draw(picture->joints.q, found, k), {}});
+      views.back().px_per_m = preview.hand_px_per_m();
     }
     if (views.empty()) continue;
-    page.picture(draw_overlay(views, fmt::format("{:.1f} s", seconds(observation.utime - kept.front().utime)), 1,
+    crop_to_arm(views);
+    page.picture(draw_overlay(views, fmt::format("{:.1f} s", seconds(observation.utime - kept.front().utime)), 0,
                               {"encoders as they are", "calibrated"}),
                  fmt::format("{:.1f} s", seconds(observation.utime - kept.front().utime)));
   }

@@ -176,8 +176,8 @@ std::string mount_yaml(const CameraModel& camera, const CameraModel& first) {
 
 std::string cameras_yaml(const StereoRig& rig) {
   std::string text =
-      "# Cameras as found: px; distortion k1 k2 p1 p2 k3 as OpenCV; m. Put in place of the section of the same name,\n"
-      "# and do not load an extended model as well.\ncameras:\n";
+      "# Cameras as found: px; distortion k1 k2 p1 p2 k3 as OpenCV; m. To be included behind robot.yaml, or put in\n"
+      "# place of its section of the same name; do not load an extended model as well.\ncameras:\n";
   for (const auto& camera : rig.cameras) {
     const auto& k = camera.intrinsics;
     const auto& d = camera.distortion;

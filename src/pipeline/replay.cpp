@@ -9,6 +9,7 @@
 #include <set>
 
 #include "bodyschema/bus/log.hpp"
+#include "bodyschema/camera/require_places.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/core/write_file.hpp"
@@ -72,7 +73,8 @@ struct SeenFrame {
 
 void write_overlay(Pipeline& pipeline, const Observation& observation, const Estimate& estimate,
                    const std::filesystem::path& file, const std::string& caption) {
-  const auto views = overlay_views(pipeline, observation, estimate);
+  auto views = overlay_views(pipeline, observation, estimate);
+  crop_to_arm(views);
   if (!views.empty()) write_png(file, draw_overlay(views, caption));
 }
 
@@ -81,6 +83,7 @@ class Replay {
   Replay(const Configuration& configuration, const ReplayOptions& options)
       : options_(options), pipeline_(configuration) {
     configuration.reject_unknown_keys();
+    require_places(pipeline_.rig(), "a replay");
     make_folder(options.out);
     estimates_ = open_to_write(options.out / "estimates.jsonl");
     if (!options.truth) return;
@@ -335,10 +338,30 @@ class Replay {
         return last_view_ ? "the arm had left the pictures; the offsets are of before" : "the arm is in no picture";
       case EstimatorState::kModelMisfit: return last_.misfit;
       case EstimatorState::kLearningBackground: return "it holds too few pictures to learn the background from";
-      default:
-        return fmt::format("the offsets have not settled, the hand is known to {:.1f} mm; do not use them yet",
-                           1e3 * last_.hand_sd_m);
+      default: return "the offsets have not settled: " + missed_limits() + "; do not use them yet";
     }
+  }
+
+  /// What `converged` needs and the last estimate lacks, with figures.
+  [[nodiscard]] std::string missed_limits() const {
+    if (last_.hand_sd_limit_m <= 0.0) return fmt::format("the hand is known to {:.1f} mm", 1e3 * last_.hand_sd_m);
+    std::vector<std::string> missed;
+    const std::size_t least = pipeline_.options().least_postures;
+    if (last_.postures < least) {
+      missed.push_back(fmt::format("they rest on {} distinct postures, {} are needed", last_.postures, least));
+    }
+    if (last_.hand_sd_m >= last_.hand_sd_limit_m) {
+      missed.push_back(fmt::format("the hand is known to {:.1f} mm, {:.1f} mm are needed", 1e3 * last_.hand_sd_m,
+                                   1e3 * last_.hand_sd_limit_m));
+    }
+    if (last_.verdict != FrameVerdict::kAgrees) {
+      missed.push_back(fmt::format("the last pictures {} ({:.1f} times the usual misfit)",
+                                   last_.verdict == FrameVerdict::kNothingKnown ? "were the first of their kind"
+                                                                                : "do not agree with those before",
+                                   last_.innovation_dof > 0.0 ? last_.innovation / last_.innovation_dof : 0.0));
+    }
+    return missed.empty() ? "a reading stood still while the pictures moved"
+                          : fmt::format("{}", fmt::join(missed, "; "));
   }
 
   std::string truth_table(Json& summary) {

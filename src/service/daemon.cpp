@@ -21,6 +21,7 @@
 #include <thread>
 #include <utility>
 
+#include "bodyschema/camera/require_places.hpp"
 #include "bodyschema/core/clock.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/write_file.hpp"
@@ -194,6 +195,7 @@ class Daemon {
     const Configuration configuration = load_configuration();
     auto pipeline = std::make_unique<Pipeline>(configuration);
     configuration.reject_unknown_keys();
+    require_places(pipeline->rig(), "the service");
     return pipeline;
   }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "bodyschema/camera/require_places.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
 
@@ -35,6 +36,14 @@ TEST(StereoRig, ReadsOneCamera) {
   EXPECT_EQ(camera.link, "l_eye");
   EXPECT_EQ(camera.intrinsics, (PinholeIntrinsics{320, 240, 257, 258, 159.5, 119.5}));
   EXPECT_FALSE(camera.has_distortion());
+}
+
+TEST(StereoRig, ACameraThatCouldBeAnywhereIsNoCameraToWorkWith) {
+  EXPECT_NO_THROW(require_places(parse(kLeft + "}\n"), "a replay"));
+  EXPECT_NO_THROW(require_places(parse(kLeft + ", pose: roughly, pose_sd_deg: 1, pose_sd_mm: 10}\n"), "a replay"));
+  EXPECT_THAT([] { require_places(parse(kLeft + ", pose: unknown}\n"), "a replay"); },
+              ::testing::ThrowsMessage<ConfigurationError>(::testing::AllOf(
+                  HasSubstr("cameras.left.link"), HasSubstr("a replay needs it"), HasSubstr("calibrate"))));
 }
 
 TEST(StereoRig, LeftComesFirst) {

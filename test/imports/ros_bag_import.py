@@ -151,7 +151,8 @@ def check_real(here):
         print(f"{data}/lbr_zed5 is absent, skipped")
         return SKIPPED
     robot = here.scratch / "lbr"
-    here.run("new-robot", data / "robots/lbr_med7/lbr_med7.urdf", "--stills", data / "lbr_zed5", "--out", robot)
+    here.run("new-robot", data / "robots/lbr_med7/lbr_med7.urdf", "--stills", data / "lbr_zed5", "--camera-pose",
+             f"{data}/lbr_zed5/camera_pose.json:left_dr", "--out", robot)
     logs = {"folder": here.scratch / "folder.lcmlog", "bag": here.scratch / "bag.lcmlog"}
     here.run("import", "stills", data / "lbr_zed5", "--config", robot / "estimator.yaml", "--out", logs["folder"])
     bag = here.bag("real", data / "lbr_zed5", "mcap", "masks=1", "encoding=bgr8")
