@@ -11,6 +11,10 @@ namespace bodyschema {
 /// Decompresses a whole JPEG file of exactly this size to gray or RGB. The file's own size is read
 /// and compared before any memory for pixels is taken; whatever libjpeg doubts (an early end, bad
 /// codes) is an error, because a half-decoded picture would look like a good one.
+///
+/// libjpeg-turbo through libjpeg's interface, not TurboJPEG's: that one cannot tell bytes between segments, which some
+/// cameras send, from damage. At full size: outlines are measured on its pixels, and the search, which needs fewer,
+/// takes every n-th of them.
 DecodeResult decompress_jpeg(Bytes file, int width, int height, Image& out);
 
 /// Compresses a gray or RGB picture. @param quality  1 to 100. Throws DataError when it is neither.

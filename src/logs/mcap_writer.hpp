@@ -15,6 +15,9 @@ namespace bodyschema {
 /// Writes an MCAP file (https://mcap.dev/spec): messages in uncompressed chunks of about 4 MB, each
 /// with an index, and a summary at the end, so that readers can seek. Checksums are left at zero,
 /// which the format defines as "not available". One thread.
+///
+/// Written here because Debian has no package of the official library, and Python's would need PyPI for every export. The
+/// official reader reads it back in a test (test/install/mcap_reads_back.py).
 class McapWriter {
  public:
   using SchemaId = std::uint16_t;

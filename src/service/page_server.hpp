@@ -27,6 +27,9 @@ struct PageAnswer {
 ///
 /// One thread, the least important of the machine, does everything and waits for no client; it calls
 /// the handler. Handlers that throw are answered with 500.
+///
+/// Not cpp-httplib: there every connection holds a thread until its client is done, and time is limited for each read,
+/// not for a request, so that a few clients that dawdle shut out all others and cost the estimator threads.
 class PageServer {
  public:
   using Handler = std::function<PageAnswer(const PageRequest&)>;
