@@ -5,6 +5,7 @@
 #include <ctime>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <spdlog/fmt/fmt.h>
 #include <sstream>
 
@@ -12,6 +13,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/write_file.hpp"
+#include "bodyschema/evidence/distributions.hpp"
 #include "bodyschema/report/report.hpp"
 
 namespace bodyschema {
@@ -22,6 +24,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kWeek_s = 7.0 * 24.0 * 3600.0;
 constexpr const char* kNotDiagnosed = "not diagnosed";
+/// Chance that logs of a robot which has not changed are said to disagree.
+constexpr double kFalseAlarm = 0.05;
 constexpr double kMoved_deg = 0.3;  ///< an offset that moved by more is worth a word
 constexpr std::size_t kMostFileBytes = 64u << 20;
 
@@ -80,6 +84,11 @@ void read_report(const fs::path& file, FleetLog& log) {
   if (json.contains("offsets_deg") && json["offsets_deg"].contains("after")) {
     for (const auto& [joint, value] : json["offsets_deg"]["after"].items()) log.offsets_deg[joint] = number(value);
   }
+  if (json.contains("offsets_ci95_deg")) {
+    for (const auto& [joint, ci] : json["offsets_ci95_deg"].items()) {
+      if (ci.is_array() && ci.size() == 2) log.offsets_ci95_deg[joint] = {number(ci[0]), number(ci[1])};
+    }
+  }
 }
 
 FleetLog read_log(const fs::path& folder) {
@@ -121,23 +130,24 @@ double slope(const std::vector<double>& x, const std::vector<double>& y) {
 void find_trends(FleetRobot& robot) {
   if (robot.logs.empty()) return;
   std::map<std::string, FleetTrend> causes, offsets;
-  const auto add = [](FleetTrend& trend, const std::string& name, const std::string& unit, double week, double value) {
-    if (!std::isfinite(value)) return;
-    trend.name = name;
-    trend.unit = unit;
-    trend.week.push_back(week);
-    trend.value.push_back(value);
-  };
   const Microseconds first = robot.logs.front().begin;
-  for (const auto& log : robot.logs) {
-    const double week = seconds(log.begin - first) / kWeek_s;
+  for (std::size_t i = 0; i < robot.logs.size(); ++i) {
+    const FleetLog& log = robot.logs[i];
+    const auto add = [&](FleetTrend& trend, const std::string& name, const std::string& unit, double value) {
+      if (!std::isfinite(value)) return;
+      trend.name = name;
+      trend.unit = unit;
+      trend.log.push_back(i);
+      trend.week.push_back(seconds(log.begin - first) / kWeek_s);
+      trend.value.push_back(value);
+    };
     for (const auto& cause : log.causes) {
       const std::string name = cause.parameter.empty() || cause.name.starts_with(cause.parameter)
                                    ? cause.name
                                    : cause.name + " (" + cause.parameter + ")";
-      add(causes[name + cause.unit], name, cause.unit, week, cause.estimate);
+      add(causes[name + cause.unit], name, cause.unit, cause.estimate);
     }
-    for (const auto& [joint, value] : log.offsets_deg) add(offsets[joint], joint, "deg", week, value);
+    for (const auto& [joint, value] : log.offsets_deg) add(offsets[joint], joint, "deg", value);
   }
   const auto gather = [](std::map<std::string, FleetTrend>& from, std::vector<FleetTrend>& to) {
     for (auto& [key, trend] : from) {
@@ -152,11 +162,72 @@ void find_trends(FleetRobot& robot) {
                    [](const auto& a, const auto& b) { return a.value.size() > b.value.size(); });
 }
 
+/// One log's offset of a joint.
+struct Told {
+  const FleetLog* log;
+  double value_deg, sd_deg;
+};
+
+/// Logs that give this joint an offset and an interval.
+std::vector<Told> told_of(const FleetRobot& robot, const std::string& joint) {
+  constexpr double kHalfInterval_sd = 1.959964;
+  std::vector<Told> told;
+  for (const auto& log : robot.logs) {
+    const auto value = log.offsets_deg.find(joint);
+    const auto ci = log.offsets_ci95_deg.find(joint);
+    if (value == log.offsets_deg.end() || ci == log.offsets_ci95_deg.end()) continue;
+    const double sd = 0.5 * (ci->second[1] - ci->second[0]) / kHalfInterval_sd;
+    if (std::isfinite(value->second) && sd > 0.0 && std::isfinite(sd)) told.push_back({&log, value->second, sd});
+  }
+  return told;
+}
+
+double median_without(const std::vector<Told>& told, std::size_t left_out) {
+  std::vector<double> values;
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    if (i != left_out) values.push_back(told[i].value_deg);
+  }
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
+}
+
+/// Pairs of logs are compared, not a log with the mean of all: one log that is wrong and sure of it would draw the mean
+/// to itself and make every other look wrong.
+void find_disagreements(FleetRobot& robot) {
+  std::map<std::string, std::vector<Told>> joints;
+  double pairs = 0.0;
+  for (const auto& trend : robot.offsets) {
+    auto told = told_of(robot, trend.name);
+    if (told.size() < 2) continue;
+    pairs += 0.5 * static_cast<double>(told.size() * (told.size() - 1));
+    joints[trend.name] = std::move(told);
+  }
+  if (joints.empty()) return;
+  const double most_z = normal_quantile(kFalseAlarm / pairs);  // over all pairs together
+  for (const auto& [joint, told] : joints) {
+    for (std::size_t i = 0; i < told.size(); ++i) {
+      const auto differs = [&](const Told& other) {
+        return std::abs(told[i].value_deg - other.value_deg) > most_z * std::hypot(told[i].sd_deg, other.sd_deg);
+      };
+      const auto with = static_cast<int>(std::count_if(told.begin(), told.end(), differs));
+      if (with == 0) continue;
+      robot.disagreements.push_back({told[i].log->name, joint, told[i].value_deg,
+                                     told[i].log->offsets_ci95_deg.at(joint), median_without(told, i), with,
+                                     static_cast<int>(told.size()) - 1});
+    }
+  }
+  std::stable_sort(robot.disagreements.begin(), robot.disagreements.end(),
+                   [](const auto& a, const auto& b) { return a.with * b.of > b.with * a.of; });
+}
+
 std::string date_text(Microseconds utime) {
   const auto time = static_cast<std::time_t>(utime / 1'000'000);
   std::tm utc{};
   char buffer[32];
-  if (utime <= 0 || gmtime_r(&time, &utc) == nullptr) return "unknown";
+  // Imported recordings without a date have stamps from zero on.
+  constexpr Microseconds kYear2000 = 946'684'800'000'000;
+  if (utime < kYear2000 || gmtime_r(&time, &utc) == nullptr) return "unknown";
   std::strftime(buffer, sizeof buffer, "%Y-%m-%d %H:%M", &utc);
   return buffer;
 }
@@ -172,10 +243,46 @@ std::string causes_text(const FleetLog& log) {
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 
-Chart chart_of(const std::string& title, const std::string& y_label, const std::vector<const FleetTrend*>& trends) {
-  Chart chart{title, "weeks since the first log", y_label, Chart::Kind::kLine, {}, {}, false};
-  for (const auto* trend : trends) chart.series.push_back({trend->name, trend->week, trend->value});
+/// What the time axis of a robot's charts counts: months where its logs span some.
+struct TimeAxis {
+  const char* label;
+  double per_week;  ///< 0: logs are counted
+};
+
+TimeAxis time_axis_of(const FleetRobot& robot) {
+  const double weeks = seconds(robot.logs.back().begin - robot.logs.front().begin) / kWeek_s;
+  // Recordings without dates of their own, as episodes of a data set are.
+  if (weeks <= 0.0) return {"number of the log, by name", 0.0};
+  if (weeks >= 9.0) return {"months since the first log", 12.0 / 52.1775};
+  if (weeks >= 2.0) return {"weeks since the first log", 1.0};
+  return {"days since the first log", 7.0};
+}
+
+Chart chart_of(const std::string& title, const std::string& y_label, const TimeAxis& axis,
+               const std::vector<const FleetTrend*>& trends) {
+  Chart chart{title, axis.label, y_label, Chart::Kind::kLine, {}, {}, false};
+  for (const auto* trend : trends) {
+    std::vector<double> x;
+    for (std::size_t i = 0; i < trend->week.size(); ++i) {
+      x.push_back(axis.per_week > 0.0 ? trend->week[i] * axis.per_week : static_cast<double>(trend->log[i] + 1));
+    }
+    chart.series.push_back({trend->name, std::move(x), trend->value});
+  }
   return chart;
+}
+
+void add_disagreements(Report& report, const FleetRobot& robot) {
+  if (robot.disagreements.empty()) return;
+  report.paragraph(
+      "Logs that disagree: offsets that differ by more than their intervals allow. One that disagrees with most others "
+      "stands alone; where about half do, the robot changed in between, or its logs are less sure than they say.");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& d : robot.disagreements) {
+    rows.push_back({d.log, d.joint,
+                    fmt::format("{:.2f} ({:.2f} to {:.2f})", d.offset_deg, d.ci95_deg[0], d.ci95_deg[1]),
+                    fmt::format("{:.2f}", d.others_deg), fmt::format("{} of {}", d.with, d.of)});
+  }
+  report.table({"log", "joint", "offset deg, 95 %", "median of the others", "disagrees with"}, rows);
 }
 
 void add_robot(Report& report, const FleetRobot& robot) {
@@ -187,6 +294,8 @@ void add_robot(Report& report, const FleetRobot& robot) {
                     log.causes.empty() ? log.sentence : causes_text(log)});
   }
   report.table({"begin (UTC)", "log", "s", "verdict", "causes, with 95 % intervals"}, rows);
+  add_disagreements(report, robot);
+  const TimeAxis axis = time_axis_of(robot);
   // One chart for each unit: causes in degrees and in milliseconds share no axis.
   std::map<std::string, std::vector<const FleetTrend*>> by_unit;
   for (const auto& trend : robot.causes) {
@@ -194,13 +303,13 @@ void add_robot(Report& report, const FleetRobot& robot) {
   }
   for (const auto& [unit, trends] : by_unit) {
     const std::string what = trends.size() == 1 ? trends.front()->name : "causes";
-    report.chart(chart_of(robot.name + ": " + what + " over time", unit, trends));
+    report.chart(chart_of(robot.name + ": " + what + " over time", unit, axis, trends));
   }
   std::vector<const FleetTrend*> offsets;
   for (const auto& trend : robot.offsets) {
     if (trend.value.size() > 1) offsets.push_back(&trend);
   }
-  if (!offsets.empty()) report.chart(chart_of(robot.name + ": joint offsets over time", "deg", offsets));
+  if (!offsets.empty()) report.chart(chart_of(robot.name + ": joint offsets over time", "deg", axis, offsets));
 }
 
 Json json_of(const FleetTrend& t) {
@@ -208,11 +317,8 @@ Json json_of(const FleetTrend& t) {
 }
 
 Json json_of(const FleetRobot& robot) {
-  Json j = {{"robot", robot.name},
-            {"sentence", robot.sentence()},
-            {"logs", Json::array()},
-            {"causes", Json::array()},
-            {"offsets", Json::array()}};
+  Json j = {{"robot", robot.name},     {"sentence", robot.sentence()}, {"logs", Json::array()},
+            {"causes", Json::array()}, {"offsets", Json::array()},     {"disagreements", Json::array()}};
   for (const auto& log : robot.logs) {
     Json causes = Json::array();
     for (const auto& c : log.causes) {
@@ -232,6 +338,15 @@ Json json_of(const FleetRobot& robot) {
   }
   for (const auto& trend : robot.causes) j["causes"].push_back(json_of(trend));
   for (const auto& trend : robot.offsets) j["offsets"].push_back(json_of(trend));
+  for (const auto& d : robot.disagreements) {
+    j["disagreements"].push_back({{"log", d.log},
+                                  {"joint", d.joint},
+                                  {"offset_deg", d.offset_deg},
+                                  {"ci95_deg", d.ci95_deg},
+                                  {"median_of_others_deg", d.others_deg},
+                                  {"with", d.with},
+                                  {"of", d.of}});
+  }
   return j;
 }
 
@@ -272,6 +387,13 @@ std::string FleetRobot::sentence() const {
     out += fmt::format("; the offset of {} moved most, {:.2f} to {:.2f} deg", most->name, most->value.front(),
                        most->value.back());
   }
+  if (!disagreements.empty()) {
+    const auto& first = disagreements.front();
+    std::set<std::string> disagreeing;
+    for (const auto& d : disagreements) disagreeing.insert(d.log);
+    out += fmt::format("; {} logs disagree, most of all {} on {} ({:.2f} deg, others {:.2f})", disagreeing.size(),
+                       first.log, first.joint, first.offset_deg, first.others_deg);
+  }
   const bool unexplained =
       std::any_of(logs.begin(), logs.end(), [](const auto& log) { return log.verdict == "unexplained"; });
   if (unexplained) out += "; some logs hold structure that no known cause explains";
@@ -288,6 +410,7 @@ std::vector<FleetRobot> gather_fleet(const fs::path& results) {
     std::stable_sort(robot.logs.begin(), robot.logs.end(),
                      [](const auto& a, const auto& b) { return a.begin < b.begin; });
     find_trends(robot);
+    find_disagreements(robot);
     robots.push_back(std::move(robot));
   }
   if (robots.empty()) {

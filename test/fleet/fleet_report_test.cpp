@@ -102,6 +102,49 @@ TEST_F(FleetReport, WritesOnePageForPeopleAndOneFileForPrograms) {
   EXPECT_NEAR(json["robots"][0]["causes"][0]["per_week"].get<double>(), 0.2, 1e-9);
 }
 
+std::string elbow_of(double offset, double half_interval) {
+  return nlohmann::json{{"verdict", "none"},
+                        {"sentence", "fine"},
+                        {"causes", nlohmann::json::array()},
+                        {"offsets_deg", {{"after", {{"r_elbow", offset}, {"r_wrist", 1.0}}}}},
+                        {"offsets_ci95_deg", {{"r_elbow", {offset - half_interval, offset + half_interval}}}}}
+      .dump();
+}
+
+TEST_F(FleetReport, NamesTheLogThatDisagreesWithTheOthers) {
+  // The one that stands alone is sure of itself: a mean of all would follow it.
+  add_log("alpha/a", kBegin, "diagnosed", elbow_of(1.0, 0.4));
+  add_log("alpha/b", kBegin + 8 * kWeek, "diagnosed", elbow_of(3.0, 0.02));
+  add_log("alpha/c", kBegin + 16 * kWeek, "diagnosed", elbow_of(1.3, 0.4));
+  add_log("alpha/d", kBegin + 24 * kWeek, "diagnosed", elbow_of(1.1, 0.4));
+  add_log("undated/1", 10'000'000, "diagnosed", elbow_of(1.0, 0.4));  // as imports without --recorded-at
+  add_log("undated/2", 10'000'000, "diagnosed", elbow_of(1.0, 0.4));
+  add_log("beta/a", kBegin, "diagnosed", elbow_of(1.0, 0.4));
+  add_log("beta/b", kBegin + kWeek, "diagnosed", elbow_of(1.5, 0.4));  // 0.5 +- 0.57
+  const auto robots = gather_fleet(results_);
+  const auto& found = robots.at(0).disagreements;
+  ASSERT_EQ(found.size(), 4u);  // each of the others disagrees with that one
+  EXPECT_EQ(found[0].log, "b");
+  EXPECT_EQ(found[0].joint, "r_elbow");
+  EXPECT_EQ(found[0].with, 3);
+  EXPECT_EQ(found[0].of, 3);
+  EXPECT_NEAR(found[0].others_deg, 1.1, 1e-9);
+  EXPECT_EQ(found[1].with, 1);
+  EXPECT_THAT(robots[0].sentence(), HasSubstr("; 4 logs disagree, most of all b on r_elbow (3.00 deg, others 1.10)"));
+  EXPECT_TRUE(robots.at(1).disagreements.empty());
+  const auto out = folder_.path() / "report";
+  write_fleet_report(robots, out);
+  std::stringstream page;
+  page << std::ifstream(out / "report.html").rdbuf();
+  EXPECT_THAT(page.str(), HasSubstr("3.00 (2.98 to 3.02)"));
+  EXPECT_THAT(page.str(), HasSubstr("months since the first log"));
+  EXPECT_THAT(page.str(), HasSubstr("days since the first log"));
+  EXPECT_THAT(page.str(), HasSubstr("number of the log, by name"));
+  EXPECT_THAT(page.str(), testing::Not(HasSubstr("1970")));
+  std::ifstream file(out / "fleet.json");
+  EXPECT_EQ(nlohmann::json::parse(file)["robots"][0]["disagreements"][0]["with"], 3);
+}
+
 TEST_F(FleetReport, RefusesAFolderWithoutResults) {
   EXPECT_THROW((void)gather_fleet(results_), FileError);
   EXPECT_THROW((void)gather_fleet("/nonexistent"), FileError);

@@ -28,15 +28,28 @@ struct FleetLog {
   std::string sentence;  ///< of the diagnosis, or why there is none
   std::vector<FleetCause> causes;
   std::map<std::string, double> offsets_deg;
+  std::map<std::string, std::array<double, 2>> offsets_ci95_deg;  ///< of those the diagnosis gives an interval for
 };
 
 /// How one quantity of a robot moved from log to log.
 struct FleetTrend {
   std::string name;
   std::string unit;
-  std::vector<double> week;  ///< since the robot's first log
+  std::vector<std::size_t> log;  ///< which of the robot's logs
+  std::vector<double> week;      ///< since the robot's first log
   std::vector<double> value;
   double per_week = 0.0;  ///< slope of the straight line through them; 0 for fewer than two
+};
+
+/// Offsets of one joint in one log that no common value explains together with those of other logs: their difference is
+/// larger than their intervals allow. Either one of the logs misleads its diagnosis, or the robot changed in between.
+struct FleetDisagreement {
+  std::string log;
+  std::string joint;
+  double offset_deg = 0.0;
+  std::array<double, 2> ci95_deg{};
+  double others_deg = 0.0;  ///< median of the other logs
+  int with = 0, of = 0;     ///< it disagrees with so many, of so many that give this joint an interval
 };
 
 struct FleetRobot {
@@ -44,6 +57,8 @@ struct FleetRobot {
   std::vector<FleetLog> logs;       ///< by date
   std::vector<FleetTrend> causes;   ///< most frequent first
   std::vector<FleetTrend> offsets;  ///< by joint
+  /// Of each log and joint that disagrees with another log; those that disagree with the largest share come first.
+  std::vector<FleetDisagreement> disagreements;
   [[nodiscard]] std::string sentence() const;
 };
 
