@@ -59,7 +59,7 @@ struct Arguments {
   bool hidden_outside = false;
   std::string truth;
   std::string log;
-  std::string pictures = "rgb";
+  std::string pictures;  // empty: see picture_format()
   std::optional<std::string> lcm_url;
   double rate = 1.0;
 };
@@ -138,6 +138,20 @@ class RealTime {
   Clock::duration worst_{0};
 };
 
+/// What is asked for; by itself raw, and JPEG where a log would grow by more than 55 MB a second of a pair at 30 Hz.
+sim::PictureFormat picture_format(const Arguments& a, const StereoRig& rig) {
+  constexpr int kLargestRaw_px = 640 * 480;
+  if (a.pictures == "gray") return sim::PictureFormat::kGray;
+  if (a.pictures == "jpeg") return sim::PictureFormat::kJpeg;
+  if (a.pictures == "masks") return sim::PictureFormat::kMasks;
+  const bool large = std::any_of(rig.cameras.begin(), rig.cameras.end(), [](const CameraModel& camera) {
+    return camera.intrinsics.width * camera.intrinsics.height > kLargestRaw_px;
+  });
+  if (!a.pictures.empty() || a.log.empty() || !large) return sim::PictureFormat::kRgb;
+  std::fputs("bodyschema-sim: large pictures are written as JPEG (--pictures rgb writes them as they are)\n", stderr);
+  return sim::PictureFormat::kJpeg;
+}
+
 void run(const Arguments& a) {
   set_up_logging(a.log_level);
   if (!a.contact_sheet.empty() && !a.contact_sheet.ends_with(".png")) {
@@ -202,12 +216,8 @@ void run(const Arguments& a) {
 
   sim::FramePublisher::Options publishing;
   publishing.channels = bus.channels();
-  if (a.pictures == "gray") publishing.format = sim::PictureFormat::kGray;
-  if (a.pictures == "jpeg") publishing.format = sim::PictureFormat::kJpeg;
-  if (a.pictures == "masks") {
-    publishing.format = sim::PictureFormat::kMasks;
-    plan.output = sim::Output::kSilhouettes;
-  }
+  publishing.format = picture_format(a, rig);
+  if (publishing.format == sim::PictureFormat::kMasks) plan.output = sim::Output::kSilhouettes;
 
   sim::Simulator simulator(model, setup, rig, settings, plan);
   std::unique_ptr<MessageSink> sink;
@@ -335,7 +345,8 @@ int main(int argc, char** argv) {
       ->group("Output")
       ->excludes(log);
   app.add_option("--pictures", a.pictures,
-                 "rgb (default), gray, jpeg, or masks: white where the robot is, without room and light")
+                 "rgb, gray, jpeg, or masks: white where the robot is, without room and light. Default: rgb; jpeg in a "
+                 "log of pictures larger than 640x480, which would be gigabytes a minute")
       ->check(CLI::IsMember({"rgb", "gray", "jpeg", "masks"}))
       ->group("Output");
   app.add_option("--contact-sheet", a.contact_sheet, "Write pictures of the motion side by side to this PNG")

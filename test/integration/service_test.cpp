@@ -11,6 +11,7 @@
 #include <cstring>
 #include <fstream>
 #include <random>
+#include <set>
 
 #include "bodyschema/service/health.hpp"
 #include "harness.hpp"
@@ -614,6 +615,35 @@ TEST_F(Service, WrongInputEndsWithOneClearErrorAndStatusTwo) {
   Process service({"bodyschemad", "--config", good, "-l", "nonsense://"}, scratch_.folder());
   EXPECT_EQ(service.wait(kStart), 1);
   EXPECT_THAT(service.err(), HasSubstr("LCM cannot use 'nonsense://'"));
+}
+
+TEST(SimulatedLog, HoldsLargePicturesAsJpeg) {
+  const std::string simulator = std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/simulator.yaml";
+  const Scratch scratch;
+  const auto formats = [&](const std::vector<std::string>& more) {
+    const auto log = scratch / "hd.lcmlog";
+    std::filesystem::remove(log);
+    std::vector<std::string> command = {"bodyschema-sim",      "--config", simulator, "--frames",  "2",
+                                        "--background-frames", "0",        "--log",   log.string()};
+    for (const char* size : {"left.width=960", "left.height=540", "right.width=960", "right.height=540"}) {
+      command.insert(command.end(), {"--set", std::string("cameras.") + size});
+    }
+    command.insert(command.end(), more.begin(), more.end());
+    Process sim(command, scratch.folder());
+    EXPECT_EQ(sim.wait(kStart), 0) << sim.err();
+    std::set<int> found;
+    LogReader reader(log);
+    LogEvent event;
+    while (reader.next(event)) {
+      bot_core::images_t pictures;
+      if (event.channel != "ICUB_CAMERAS") continue;
+      EXPECT_GT(pictures.decode(event.data.data(), 0, static_cast<int>(event.data.size())), 0);
+      for (const auto& picture : pictures.images) found.insert(picture.pixelformat);
+    }
+    return found;
+  };
+  EXPECT_EQ(formats({}), std::set<int>{bot_core::image_t::PIXEL_FORMAT_MJPEG});
+  EXPECT_EQ(formats({"--pictures", "rgb"}), std::set<int>{bot_core::image_t::PIXEL_FORMAT_RGB});
 }
 
 /// Of all programs.
