@@ -1,10 +1,11 @@
-// Cost of one whole frame: masks, particles, likelihoods, refinement. Our own robot (8k triangles)
-// in its simulated room. Names read `engine/mode/triangles/size/particles`; `+ahead`: the next frame's
-// masks are found meanwhile. See README.md.
+// Cost of one whole frame: masks, particles, likelihoods, refinement. Our own robot (8k triangles), or both arms of a
+// G1 (200k; where BODYSCHEMA_DATA has it), in a simulated room. Names read `engine/mode/triangles/size/particles`;
+// `+ahead`: the next frame's masks are found meanwhile. See README.md.
 
 #include <benchmark/benchmark.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <map>
 #include <memory>
 #include <string>
@@ -23,11 +24,28 @@ struct Size {
   [[nodiscard]] std::string text() const { return std::to_string(width) + "x" + std::to_string(height); }
 };
 
-Configuration configuration(const std::string& engine, const std::string& mode, Size size, int particles) {
-  const std::filesystem::path file = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml";
+/// Whose frames are measured.
+struct Robot {
+  std::string triangles;
+  std::filesystem::path configuration;  ///< of the source tree
+  double focal_px;                      ///< of a picture 320 px wide
+  std::map<std::string, double> offsets_deg;
+};
+
+const Robot kOurs{"8k",
+                  "config/icub_right/evaluation.yaml",
+                  257.34,
+                  {{"r_shoulder_pitch", 5}, {"r_elbow", -2}, {"r_wrist_pitch", -7}}};
+const Robot kG1{"200k",
+                "bench/g1/evaluation.yaml",
+                302.5,
+                {{"right_shoulder_pitch_joint", 3}, {"right_elbow_joint", -2}, {"right_wrist_pitch_joint", -4}}};
+
+Configuration configuration(const Robot& robot, const std::string& engine, const std::string& mode, Size size,
+                            int particles) {
   std::vector<std::string> overrides{"silhouette.engine=" + engine, "estimator.mode=" + mode,
                                      "filter.particles=" + std::to_string(particles)};
-  const double focal_px = 257.34 * size.width / 320.0;
+  const double focal_px = robot.focal_px * size.width / 320.0;
   for (const std::string camera : {"cameras.left.", "cameras.right."}) {
     overrides.push_back(camera + "width=" + std::to_string(size.width));
     overrides.push_back(camera + "height=" + std::to_string(size.height));
@@ -36,7 +54,7 @@ Configuration configuration(const std::string& engine, const std::string& mode, 
     overrides.push_back(camera + "cx=" + std::to_string(0.5 * (size.width - 1)));
     overrides.push_back(camera + "cy=" + std::to_string(0.5 * (size.height - 1)));
   }
-  return Configuration::load(file, overrides);
+  return Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / robot.configuration, overrides);
 }
 
 /// A reach and the empty frames before it, drawn once. Masks are filled in by whoever uses it.
@@ -45,11 +63,12 @@ struct Reach {
   std::vector<Observation> motion;
 };
 
-const Reach& reach(Size size) {
+const Reach& reach(const Robot& robot, Size size) {
   static std::map<std::string, Reach> all;
-  if (const auto found = all.find(size.text()); found != all.end()) return found->second;
+  const std::string key = robot.triangles + size.text();
+  if (const auto found = all.find(key); found != all.end()) return found->second;
   const auto made = [&] {
-    const Configuration c = configuration("contour", "best", size, 200);
+    const Configuration c = configuration(robot, "contour", "best", size, 200);
     const RobotSetup setup = RobotSetup::from(c.section("robot"));
     auto settings = simulator::SimulatorSettings::from(c.section("simulator"));
     settings.background_frames = 25;
@@ -57,8 +76,9 @@ const Reach& reach(Size size) {
     simulator::SimulationPlan plan;
     plan.frames = 60;
     plan.threads = 2;
-    plan.offsets_deg = {{"r_shoulder_pitch", 5}, {"r_elbow", -2}, {"r_wrist_pitch", -7}};
-    simulator::Simulator simulator(setup.load(), setup, StereoRig::from(c.section("cameras")), settings, plan);
+    plan.offsets_deg = robot.offsets_deg;
+    const StereoRig rig = StereoRig::from(c.section("cameras"));
+    simulator::Simulator simulator(load_robot(setup, rig), setup, rig, settings, plan);
     Reach result;
     std::vector<JointSample> history;
     while (auto frame = simulator.next()) {
@@ -68,17 +88,17 @@ const Reach& reach(Size size) {
     }
     return result;
   };
-  return all.emplace(size.text(), made()).first->second;
+  return all.emplace(key, made()).first->second;
 }
 
 /// Frames of the reach in turn, as the service gets them.
-void whole_frame(benchmark::State& state, const std::string& engine, const std::string& mode, Size size, int particles,
-                 bool ahead) {
-  Pipeline pipeline(configuration(engine, mode, size, particles));
-  for (Observation observation : reach(size).background) pipeline.process(observation);
+void whole_frame(benchmark::State& state, const Robot& robot, const std::string& engine, const std::string& mode,
+                 Size size, int particles, bool ahead) {
+  Pipeline pipeline(configuration(robot, engine, mode, size, particles));
+  for (Observation observation : reach(robot, size).background) pipeline.process(observation);
   // The first frames search; what counts is the frame of a running service.
   constexpr std::size_t kWarmUp = 30;
-  const auto& motion = reach(size).motion;
+  const auto& motion = reach(robot, size).motion;
   for (std::size_t i = 0; i < kWarmUp; ++i) {
     Observation observation = motion[i];
     pipeline.process(observation);
@@ -120,7 +140,7 @@ void whole_frame(benchmark::State& state, const std::string& engine, const std::
 
 /// Both pictures of a frame out of their messages.
 void jpeg(benchmark::State& state, Size size) {
-  const auto& cameras = reach(size).motion.front().cameras;
+  const auto& cameras = reach(kOurs, size).motion.front().cameras;
   std::vector<bot_core::image_t> messages;
   for (const auto& camera : cameras) messages.push_back(to_jpeg_message(camera->image, 0, 90));
   Image out;
@@ -138,25 +158,33 @@ void register_all() {
       jpeg(state, size);
     })->Unit(benchmark::kMillisecond);
   }
+  const auto add = [](const Robot& robot, const std::string& engine, const std::string& mode, Size size,
+                      int particles) {
+    for (const bool ahead : {false, true}) {
+      benchmark::RegisterBenchmark(
+          (engine + (ahead ? "+ahead/" : "/") + mode + "/" + robot.triangles + "/" + size.text() + "/" +
+           std::to_string(particles))
+              .c_str(),
+          [=, &robot](benchmark::State& state) { whole_frame(state, robot, engine, mode, size, particles, ahead); })
+          ->MeasureProcessCPUTime()
+          ->UseRealTime()
+          ->Unit(benchmark::kMillisecond);
+    }
+  };
   for (const std::string engine : {"contour", "atlas"}) {
     for (const std::string mode : {"best", "paper"}) {
       for (const Size size : {Size{320, 240}, Size{640, 480}, Size{1280, 720}}) {
         for (const int particles : {50, 200, 1000, 10000}) {
           if (engine == "atlas" && particles > 1000) continue;  // seconds a frame in software
           if (size.width > 320 && particles != 200) continue;
-          for (const bool ahead : {false, true}) {
-            benchmark::RegisterBenchmark(
-                (engine + (ahead ? "+ahead/" : "/") + mode + "/8k/" + size.text() + "/" + std::to_string(particles))
-                    .c_str(),
-                [=](benchmark::State& state) { whole_frame(state, engine, mode, size, particles, ahead); })
-                ->MeasureProcessCPUTime()
-                ->UseRealTime()
-                ->Unit(benchmark::kMillisecond);
-          }
+          add(kOurs, engine, mode, size, particles);
         }
       }
     }
   }
+  const char* data = std::getenv("BODYSCHEMA_DATA");
+  if (data == nullptr || !std::filesystem::exists(std::filesystem::path(data) / "real/robots/g1")) return;
+  for (const Size size : {Size{320, 240}, Size{640, 480}, Size{1280, 720}}) add(kG1, "contour", "best", size, 200);
 }
 
 }  // namespace

@@ -100,13 +100,26 @@ double quantile(std::vector<double> sorted, double share) {
   return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
+/// Who is played.
+struct Played {
+  std::string triangles;
+  std::filesystem::path folder;  ///< of its configuration, in the source tree
+  double focal_px;               ///< of a picture 320 px wide
+  [[nodiscard]] std::string file(const char* name) const {
+    return (std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / folder / name).string();
+  }
+};
+
+const Played kOurs{"8k", "config/icub_right", 257.34};
+const Played kG1{"200k", "bench/g1", 302.5};
+
 struct Size {
   int width, height;
   [[nodiscard]] std::string text() const { return std::to_string(width) + "x" + std::to_string(height); }
   /// The robot's cameras with pictures of this size, as arguments.
-  [[nodiscard]] std::vector<std::string> arguments() const {
+  [[nodiscard]] std::vector<std::string> arguments(const Played& robot) const {
     std::vector<std::string> list;
-    const double focal_px = 257.34 * width / 320.0;
+    const double focal_px = robot.focal_px * width / 320.0;
     for (const std::string camera : {"cameras.left.", "cameras.right."}) {
       for (const std::string& set :
            {"width=" + std::to_string(width), "height=" + std::to_string(height), "fx=" + std::to_string(focal_px),
@@ -120,11 +133,11 @@ struct Size {
 };
 
 /// The tests' reach in other pictures: compressed, by the sender beforehand.
-std::filesystem::path log_of(Size size, const std::filesystem::path& folder) {
+std::filesystem::path log_of(const Played& robot, Size size, const std::filesystem::path& folder) {
   const auto file = folder / "reach.lcmlog";
   std::vector<std::string> command{"bodyschema-sim",
                                    "--config",
-                                   std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/simulator.yaml",
+                                   robot.file("simulator.yaml"),
                                    "--frames",
                                    "60",
                                    "--seed",
@@ -133,18 +146,18 @@ std::filesystem::path log_of(Size size, const std::filesystem::path& folder) {
                                    "jpeg",
                                    "--log",
                                    file.string()};
-  for (const auto& argument : size.arguments()) command.push_back(argument);
+  for (const auto& argument : size.arguments(robot)) command.push_back(argument);
   Process simulator(command, folder);
   if (simulator.wait(Seconds(300)) != 0) throw std::runtime_error("bodyschema-sim failed: " + simulator.err());
   return file;
 }
 
-void latency(benchmark::State& state, int seconds, Size size, bool jpeg) {
+void latency(benchmark::State& state, const Played& robot, int seconds, Size size, bool jpeg) {
   const Scratch scratch;
   const std::string url = own_lcm_url();
-  const auto log = jpeg ? log_of(size, scratch.folder()) : reach_log();
-  std::vector<std::string> command{"bodyschemad", "--config", reach_configuration(), "--lcm-url", url};
-  for (const auto& argument : size.arguments()) command.push_back(argument);
+  const auto log = jpeg ? log_of(robot, size, scratch.folder()) : reach_log();
+  std::vector<std::string> command{"bodyschemad", "--config", robot.file("estimator.yaml"), "--lcm-url", url};
+  for (const auto& argument : size.arguments(robot)) command.push_back(argument);
   Process daemon(command, scratch.folder());
   if (!daemon.said("waiting for", Seconds(60))) {
     state.SkipWithError("bodyschemad did not start");
@@ -157,7 +170,7 @@ void latency(benchmark::State& state, int seconds, Size size, bool jpeg) {
   double cores = 0.0;
   double memory_before = 0.0;
   {
-    Robot robot(url, log);
+    Robot player(url, log);
     Robot::Faults watch;
     watch.pictures = [&](bot_core::images_t& pictures, LcmLink&) {
       arrivals.published(pictures.images.front().utime);
@@ -167,10 +180,10 @@ void latency(benchmark::State& state, int seconds, Size size, bool jpeg) {
     memory_before = static_cast<double>(arrivals.status().resident_bytes);
     const auto start = Clock::now();
     const double used_s = processor_s(daemon.pid());
-    robot.set_faults(watch);
+    player.set_faults(watch);
     std::this_thread::sleep_for(std::chrono::seconds(seconds));
     cores = (processor_s(daemon.pid()) - used_s) / std::chrono::duration<double>(Clock::now() - start).count();
-    robot.set_faults({});
+    player.set_faults({});
     std::this_thread::sleep_for(std::chrono::milliseconds(1500));
     all = arrivals.latencies_ms();
     published = arrivals.frames_published();
@@ -207,16 +220,21 @@ int main(int argc, char** argv) {
     if (const std::string why = why_no_lcm(); !why.empty()) throw std::runtime_error(why);
     const char* wish = std::getenv("BODYSCHEMA_BENCH_SECONDS");
     const int seconds = wish != nullptr ? std::max(2, std::atoi(wish)) : 60;
+    const auto add = [&](const Played& robot, Size size, bool jpeg) {
+      benchmark::RegisterBenchmark(
+          ("daemon" + std::string(jpeg ? "+jpeg/" : "/") + "contour/" + robot.triangles + "/" + size.text() + "/200")
+              .c_str(),
+          [=, &robot](benchmark::State& state) { latency(state, robot, seconds, size, jpeg); })
+          ->UseManualTime()
+          ->Iterations(1000)
+          ->Unit(benchmark::kMillisecond);
+    };
+    const char* data = std::getenv("BODYSCHEMA_DATA");
+    const bool g1 = data != nullptr && std::filesystem::exists(std::filesystem::path(data) / "real/robots/g1");
     for (const Size size : {Size{320, 240}, Size{640, 480}, Size{1280, 720}}) {
-      for (const bool jpeg : {false, true}) {
-        if (!jpeg && size.width > 320) continue;  // raw pictures that large do not fit most networks
-        benchmark::RegisterBenchmark(
-            ("daemon" + std::string(jpeg ? "+jpeg" : "") + "/contour/8k/" + size.text() + "/200").c_str(),
-            [=](benchmark::State& state) { latency(state, seconds, size, jpeg); })
-            ->UseManualTime()
-            ->Iterations(1000)
-            ->Unit(benchmark::kMillisecond);
-      }
+      if (size.width == 320) add(kOurs, size, false);  // raw pictures that are larger do not fit most networks
+      add(kOurs, size, true);
+      if (g1) add(kG1, size, true);
     }
     benchmark::RunSpecifiedBenchmarks();
   } catch (const std::exception& error) {
