@@ -351,17 +351,11 @@ class Replay {
       missed.push_back(fmt::format("they rest on {} distinct postures, {} are needed", last_.postures, least));
     }
     if (last_.hand_sd_m >= last_.hand_sd_limit_m) {
-      missed.push_back(fmt::format("the hand is known to {:.1f} mm, {:.1f} mm are needed", 1e3 * last_.hand_sd_m,
+      missed.push_back(fmt::format("the hand is known to {:.3g} mm, {:.3g} mm are needed", 1e3 * last_.hand_sd_m,
                                    1e3 * last_.hand_sd_limit_m));
     }
-    if (last_.verdict != FrameVerdict::kAgrees) {
-      missed.push_back(fmt::format("the last pictures {} ({:.1f} times the usual misfit)",
-                                   last_.verdict == FrameVerdict::kNothingKnown ? "were the first of their kind"
-                                                                                : "do not agree with those before",
-                                   last_.innovation_dof > 0.0 ? last_.innovation / last_.innovation_dof : 0.0));
-    }
-    return missed.empty() ? "a reading stood still while the pictures moved"
-                          : fmt::format("{}", fmt::join(missed, "; "));
+    if (last_.verdict != FrameVerdict::kAgrees) missed.push_back("the last pictures do not agree with those before");
+    return missed.empty() ? "they still move from picture to picture" : fmt::format("{}", fmt::join(missed, "; "));
   }
 
   std::string truth_table(Json& summary) {

@@ -90,6 +90,16 @@ TEST_F(Calibrated, OffsetsAreFoundWithinWhatIsClaimedAndTheFilesSayTheSame) {
   for (const char* file : {"report.html", "corrected.urdf", "offsets.yaml", "cameras.yaml"}) {
     EXPECT_TRUE(fs::exists(folder_ / "out" / file)) << file;
   }
+  // Included behind a configuration, also one whose second camera was placed beside the first.
+  std::ofstream(folder_ / "beside.yaml")
+      << "cameras: {right: {link: ~, beside: left, X_beside_optical: [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0], "
+         "[0, 0, 0, 1]], pose: unknown}}\n";
+  std::ofstream(folder_ / "after.yaml") << "include: [" << std::string(BODYSCHEMA_SOURCE_DIR)
+                                        << "/config/arm7/robot.yaml, beside.yaml, out/cameras.yaml]\n";
+  const auto after = StereoRig::from(Configuration::load(folder_ / "after.yaml").section("cameras"));
+  ASSERT_EQ(after.cameras.size(), 2u);
+  EXPECT_FALSE(after.cameras[1].mount.relative);
+  EXPECT_NE(after.cameras[1].mount.knowledge, PlaceKnowledge::kUnknown);
 }
 
 TEST_F(Calibrated, ACameraToBeFoundNeedsMasks) {

@@ -233,6 +233,15 @@ TEST_F(ReplayTest, ALogWhoseArmLeavesThePicturesAtTheEndHasConverged) {
 }
 
 /// The offsets of a log that has converged before its end are those of then, not the estimator's last.
+TEST_F(ReplayTest, SaysWhichLimitWasMissedByHowMuch) {
+  ReplayOptions o = options("demanding");
+  o.overlays = 0;
+  EXPECT_THAT(
+      replay(configuration({"estimator.best.converged_hand_sd_mm=0.01"}), o),
+      ::testing::ContainsRegex("settled: the hand is known to [0-9.]+ mm, 0.01 mm are needed; do not use them"));
+  EXPECT_THROW(replay(configuration({"cameras.left.pose=unknown"}), o), ConfigurationError);
+}
+
 TEST_F(ReplayTest, ErrorsAndTheLastPictureAreOfTheOffsetsThatAreReported) {
   ReplayOptions o = options("one_eye");
   o.log = folder_ / "one_eye.log";
@@ -297,7 +306,9 @@ TEST_F(ReplayTest, ErrorsAndTheLastPictureAreOfTheOffsetsThatAreReported) {
   EXPECT_NEAR(summary["errors"]["left"]["final_on_all_frames"]["position_mm"]["after"].get<double>(),
               mean_mm(*converged), 1e-9);
   const fs::path picture = folder_ / "expected.png";
-  write_png(picture, draw_overlay(overlay_views(pipeline, seen.back(), *converged), "last frame"));
+  auto views = overlay_views(pipeline, seen.back(), *converged);
+  crop_to_arm(views);
+  write_png(picture, draw_overlay(views, "last frame"));
   EXPECT_TRUE(content(o.out / "overlay_final.png") == content(picture));
 }
 
