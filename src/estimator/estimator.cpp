@@ -109,6 +109,9 @@ struct Estimator::Impl {
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
     weights.resize(static_cast<Eigen::Index>(options.filter.particles));
     reading.resize(joints);
+    for (Eigen::Index k = 0; k < joints; ++k) {
+      joint_names.push_back(model.state().parameters()[static_cast<std::size_t>(k)].name);
+    }
   }
 
   // --- one step -------------------------------------------------------------------------------
@@ -451,8 +454,8 @@ struct Estimator::Impl {
     if (released.size() == 1 && released[0] < joints) {
       const double step = better.fit.x[released[0]] - state[released[0]];
       stalled.stepped(released[0], step);
-      changed = fmt::format("{} slipped by {:.1f} deg", setup.estimated_joints[static_cast<std::size_t>(released[0])],
-                            degrees(step));
+      changed =
+          fmt::format("{} slipped by {:.1f} deg", joint_names[static_cast<std::size_t>(released[0])], degrees(step));
     } else if (!young()) {
       changed = better.hypothesis.what;
     }
@@ -557,7 +560,7 @@ struct Estimator::Impl {
 
   Estimate report() {
     Estimate estimate;
-    estimate.joint_names = setup.estimated_joints;
+    estimate.joint_names = joint_names;
     estimate.offset_rad = state.head(joints);
     estimate.prior_sd_rad = model.state().prior_sd().head(joints);
     estimate.effective_sample_size = effective_size;
@@ -575,7 +578,7 @@ struct Estimator::Impl {
       estimate.X_CP_nominal.push_back(model.nominal_hand_pose(exposure));
       if (c == 0) estimate.hand_sd_m = std::sqrt(std::max(0.0, hand_covariance_m2(exposure).trace()));
     }
-    estimate.weakest = weakest_direction(estimate.covariance_rad2, setup.estimated_joints);
+    estimate.weakest = weakest_direction(estimate.covariance_rad2, joint_names);
     if (!particles_only()) conclude(estimate);
     estimate.state = current;
     return estimate;
@@ -601,7 +604,7 @@ struct Estimator::Impl {
     estimate.outline_alike = fitter.noise().front().correlated_points();
     estimate.changed = changed;
     if (const auto joint = stalled.joint(); joint >= 0) {
-      estimate.stalled_joint = setup.estimated_joints[static_cast<std::size_t>(joint)];
+      estimate.stalled_joint = joint_names[static_cast<std::size_t>(joint)];
       estimate.stalled_motion_rad = stalled.moved_rad();
     }
   }
@@ -715,8 +718,9 @@ struct Estimator::Impl {
   RobotSetup setup;
   StereoRig rig;
   FrameModel model;
-  Frame frame;          ///< the last one; its observation is gone once `step` has returned
-  Eigen::Index joints;  ///< estimated ones; the first entries of a state
+  Frame frame;                           ///< the last one; its observation is gone once `step` has returned
+  Eigen::Index joints;                   ///< estimated ones; the first entries of a state
+  std::vector<std::string> joint_names;  ///< of these, in the state's order: the configuration may list them in another
   HypothesisScorer scorer;
   ParticleFilter filter;
   PostureMemory memory;

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <map>
 #include <random>
 
 #include "outline/own_robot.hpp"
@@ -69,6 +71,24 @@ Observation emptied(Observation seen) {
 
 double position_error_m(const Estimate& estimate, const Pose& truth) {
   return (estimate.X_CP[0].translation() - truth.translation()).norm();
+}
+
+/// Of a robot with two arms, whose joints take turns in the tree, the offsets were published under each other's names.
+TEST_F(EstimatorOnOwnRobot, OffsetsBearTheirJointsNamesWhateverTheOrderOfTheConfiguration) {
+  const auto by_name = [](const Estimate& estimate) {
+    std::map<std::string, double> offsets;
+    for (std::size_t k = 0; k < estimate.joint_names.size(); ++k) {
+      offsets[estimate.joint_names[k]] = estimate.offset_rad(static_cast<Eigen::Index>(k));
+    }
+    return offsets;
+  };
+  Estimator in_order = make_estimator();
+  const auto expected = by_name(follow(in_order, *reach_, 0, 3, 100.0));
+  std::reverse(setup_.estimated_joints.begin(), setup_.estimated_joints.end());
+  Estimator reversed = make_estimator();
+  const auto found = by_name(follow(reversed, *reach_, 0, 3, 100.0));
+  ASSERT_EQ(found.size(), 7u);
+  for (const auto& [joint, offset] : expected) EXPECT_NEAR(found.at(joint), offset, radians(0.01)) << joint;
 }
 
 TEST_F(EstimatorOnOwnRobot, BestModeFindsTheHandWithinTenFrames) {
