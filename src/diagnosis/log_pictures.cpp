@@ -50,6 +50,61 @@ std::vector<std::size_t> choose(const PictureLog& log, const std::vector<Observa
   return shown;
 }
 
+/// Parts that the causes of an answer move against the others or change in shape: not those that cameras, clocks and
+/// offsets move with all the rest.
+std::vector<bool> changed_parts(LogFit& fit, const DiagnosisReport& report) {
+  const auto& roles = fit.log().roles();
+  std::vector<bool> changed(fit.measurement().part_count(), false);
+  const auto mark = [&](std::size_t segment) {
+    for (const auto part : roles.segments[segment].parts) changed[part] = true;
+  };
+  for (const auto& cause : report.causes) {
+    for (std::size_t s = 0; s < roles.segments.size(); ++s) {
+      if (roles.segments[s].name == cause.cause.source) mark(s);
+    }
+    const auto link = std::find_if(roles.links.begin(), roles.links.end(), [&](const ArmLink& l) {
+      return cause.cause.name == "link_length" && roles.names[static_cast<std::size_t>(l.joint)] == cause.cause.joint;
+    });
+    const auto joint = std::find(roles.names.begin(), roles.names.end(), cause.cause.joint);
+    const auto& rendered = fit.log().setup().model.rendered_links;
+    for (std::size_t part = 0; part < changed.size(); ++part) {
+      if (link != roles.links.end()) {
+        if (rendered[part] == link->name) changed[part] = true;
+      } else if (joint != roles.names.end()) {
+        const auto& info = fit.log().robot()->joints()[static_cast<std::size_t>(joint - roles.names.begin())];
+        if (rendered[part] == info.child_link) changed[part] = true;
+      }
+    }
+  }
+  return changed;
+}
+
+/// The first camera's picture of an observation with the changed parts in orange.
+std::optional<std::pair<Image, std::string>> draw_change(LogFit& fit, const std::vector<Observation>& kept,
+                                                         const DiagnosisReport& report, const LinearLog& after) {
+  const auto parts = changed_parts(fit, report);
+  if (std::none_of(parts.begin(), parts.end(), [](bool p) { return p; })) return std::nullopt;
+  SilhouettePreview preview(fit.log());
+  std::optional<OverlayView> best;
+  std::size_t most = 0;
+  for (const auto& observation : kept) {
+    for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
+      const auto& seen = observation.cameras[c];
+      const auto p = seen ? find(fit.log(), *seen, c) : std::nullopt;
+      if (!p || seen->image.empty()) continue;
+      const auto& q = fit.log().pictures()[*p].joints.q;
+      auto marked = preview.draw_parts(q, after.corrections[*p], c, parts);
+      const auto pixels = marked.count();
+      if (pixels <= most) continue;
+      most = pixels;
+      best = OverlayView{&seen->image, {}, preview.draw(q, after.corrections[*p], c), std::move(marked)};
+    }
+  }
+  if (!best) return std::nullopt;
+  return std::pair(draw_overlay({*best}, "", 2), std::string("Orange: the parts that the answer is about. Green: the "
+                                                             "robot as the extended model has it."));
+}
+
 }  // namespace
 
 std::vector<std::pair<Image, std::string>> draw_pictures(LogFit& fit, const std::vector<Observation>& kept,
@@ -63,6 +118,7 @@ std::vector<std::pair<Image, std::string>> draw_pictures(LogFit& fit, const std:
   SilhouettePreview preview(log);
   const OverlayNames names = {found ? "offsets and nuisances" : "encoders as they are", "extended model"};
   std::vector<std::pair<Image, std::string>> pictures;
+  if (auto change = draw_change(fit, kept, report, after)) pictures.push_back(std::move(*change));
   for (const auto i : choose(log, kept, report)) {
     std::vector<OverlayView> views;
     for (std::size_t c = 0; c < kept[i].cameras.size(); ++c) {
@@ -70,8 +126,8 @@ std::vector<std::pair<Image, std::string>> draw_pictures(LogFit& fit, const std:
       const auto p = seen ? find(log, *seen, c) : std::nullopt;
       if (!p || seen->image.empty()) continue;
       const auto& q = log.pictures()[*p].joints.q;
-      OverlayView view{
-          &seen->image, preview.draw(q, before.corrections[*p], c), preview.draw(q, after.corrections[*p], c), {}};
+      OverlayView view{&seen->image, preview.draw(q, before.corrections[*p], c),
+                       preview.draw(q, after.corrections[*p], c)};
       const auto& k = log.rig().cameras[c].intrinsics;
       const int size = std::min({2 * kHalfPart_px, k.width, k.height});
       if (const Eigen::Vector2d hand = preview.hand(); hand.allFinite()) {

@@ -27,9 +27,9 @@ EffectKind axis_shift() {
                              });
               },
           .sentence =
-              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return "the axis of " + e.target().joint + " lies beside where the URDF has it, by " + amounts[0] +
-                       " and " + amounts.back() + " along two directions across it";
+              [](const Effect& e, const JointRoles& roles, std::span<const std::string> amounts) {
+                return "the axis of " + e.target().joint + " lies beside where the URDF has it, by " +
+                       across_axis(e, roles, amounts, "along");
               },
           .lookalikes = {"link_length", "base_shift"},
           .splitting_motion = "Move the joint and its neighbours one at a time through their full ranges.",

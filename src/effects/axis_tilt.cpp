@@ -18,9 +18,9 @@ EffectKind axis_tilt() {
                              });
               },
           .sentence =
-              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return "the axis of " + e.target().joint + " is tilted against the URDF's, by " + amounts[0] + " and " +
-                       amounts.back() + " about two directions across it";
+              [](const Effect& e, const JointRoles& roles, std::span<const std::string> amounts) {
+                return "the axis of " + e.target().joint + " is tilted against the URDF's, by " +
+                       across_axis(e, roles, amounts, "about");
               },
           .not_testable = [](const EffectTarget& target, const JointRoles& roles,
                              const LogMotion& motion) { return too_little_motion(target.joint, roles, motion); },

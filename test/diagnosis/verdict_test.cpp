@@ -1,6 +1,8 @@
 #include "verdict.hpp"
 
 #include <gmock/gmock.h>
+
+#include <cmath>
 #include <gtest/gtest.h>
 
 #include "effects/roles.hpp"
@@ -104,7 +106,7 @@ TEST(Verdict, TrustsNoNameOfASizeThatNoRobotHas) {
   const auto report = worded(report_of({cause}));
   EXPECT_EQ(report.verdict, "unexplained");
   EXPECT_THAT(report.sentence, HasSubstr("larger than on any robot"));
-  EXPECT_THAT(report.sentence, HasSubstr("may only stand in for it: elbow turns 4 %"));
+  EXPECT_THAT(report.sentence, HasSubstr("may only stand in for it: elbow turns about 4 % further"));
   EXPECT_THAT(report.exclusion_limits, IsEmpty());
 }
 
@@ -140,6 +142,29 @@ TEST(Verdict, AnOutlineThatLiesOffOnOneSideIsNotExplained) {
   report = worded(std::move(report));
   EXPECT_EQ(report.verdict, "unexplained");
   EXPECT_THAT(report.sentence, HasSubstr(report.side_left_over));
+  EXPECT_THAT(report.exclusion_limits, IsEmpty());
+}
+
+TEST(Verdict, WhatIsNotExplainedHasNoIntervals) {
+  auto report = report_of({gain_of_elbow()});
+  report.side_left_over = "the left outline of hand lies 0.8 px outside of where the model has it";
+  report.offsets_ci95_deg = {{"elbow", {1.0, 1.2}}};
+  report = worded(std::move(report));
+  EXPECT_TRUE(std::isnan(report.causes[0].parameters[0].ci95[0]));
+  EXPECT_TRUE(std::isnan(report.offsets_ci95_deg.at("elbow")[1]));
+  EXPECT_THAT(report.sentence, Not(HasSubstr("3.5 to 4.5")));
+}
+
+/// An error that is alike in every block moves no test between blocks.
+TEST(Verdict, MoreThanPixelNoiseIsNotNothing) {
+  auto report = report_of({});
+  report.pixel_noise_px = 0.3;
+  report.left_px = 0.36;
+  EXPECT_EQ(worded(report).verdict, "none");
+  report.left_px = 0.45;
+  report = worded(std::move(report));
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, HasSubstr("0.45 px, of which the pixels' own noise is 0.30"));
   EXPECT_THAT(report.exclusion_limits, IsEmpty());
 }
 
