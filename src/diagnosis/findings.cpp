@@ -369,7 +369,9 @@ void Findings::exclude(const LogAbout& log, const BlockRegression& all, const st
     for (const auto& p : std::as_const(*effect).parameters()) {
       if (p.fitted) fitted.push_back(&p);
     }
-    DiagnosedCause told{.cause = candidate.cause, .z = candidate.z()};
+    DiagnosedCause told;
+    told.cause = candidate.cause;
+    told.z = candidate.z();
     for (std::size_t k = 0; k < fitted.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
       if (candidate.scores.independent[i] < limits::kRounding) continue;

@@ -83,7 +83,7 @@ class Comparison {
 
  private:
   JudgedClaim judge(std::size_t a, const DiagnosedCause& claim, std::size_t b) const {
-    JudgedClaim result{.claimed_by = a, .judged_by = b, .cause = claim.cause, .claim = claim.sentence};
+    JudgedClaim result{.claimed_by = a, .judged_by = b, .cause = claim.cause, .claim = claim.sentence, .why = {}};
     const auto& other = reports_[b];
     if (other.verdict == "unexplained") {
       result.why = "that log is not explained";
