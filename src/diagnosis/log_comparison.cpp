@@ -57,8 +57,9 @@ bool is_about(const DiagnosedCause& cause, const std::string& joint) {
 
 class Comparison {
  public:
-  Comparison(const std::vector<DiagnosisReport>& reports, const JointRoles& roles, LogComparison& out)
-      : reports_(reports), roles_(roles), out_(out) {}
+  Comparison(const std::vector<DiagnosisReport>& reports, const JointRoles& roles,
+             const std::vector<AcrossAxis>& across, LogComparison& out)
+      : reports_(reports), roles_(roles), across_(across), out_(out) {}
 
   void run() {
     for (std::size_t a = 0; a < reports_.size(); ++a) {
@@ -142,7 +143,7 @@ class Comparison {
         return std::find(own->same.begin(), own->same.end(), name) == own->same.end();
       });
     }
-    common.cause.sentence = diagnosis::sentence_of(common.cause, reports_[logs.front()], roles_);
+    common.cause.sentence = diagnosis::sentence_of(common.cause, reports_[logs.front()], roles_, across_);
     return common;
   }
 
@@ -225,6 +226,7 @@ class Comparison {
 
   const std::vector<DiagnosisReport>& reports_;
   const JointRoles& roles_;
+  const std::vector<AcrossAxis>& across_;
   LogComparison& out_;
 };
 
@@ -241,10 +243,10 @@ const char* name_of(Judgement judgement) {
 }
 
 LogComparison compare(const std::vector<DiagnosisReport>& reports, std::vector<std::string> logs,
-                      const JointRoles& roles) {
+                      const JointRoles& roles, const std::vector<AcrossAxis>& across) {
   LogComparison result;
   result.logs = std::move(logs);
-  Comparison(reports, roles, result).run();
+  Comparison(reports, roles, across, result).run();
   return result;
 }
 

@@ -207,7 +207,9 @@ LogComparison diagnose_logs(const Configuration& configuration, const LogDiagnos
   }
   const auto setup = RobotSetup::from(configuration.section("robot"));
   const auto rig = StereoRig::from(configuration.section("cameras"));
-  auto comparison = compare(reports, std::move(names), JointRoles::of(load_robot(setup, rig), setup, rig));
+  const auto robot = load_robot(setup, rig);
+  const auto roles = JointRoles::of(robot, setup, rig);
+  auto comparison = compare(reports, std::move(names), roles, across_axes(robot, setup, roles));
   if (!options.out.empty()) comparison.write(options.out);
   return comparison;
 }

@@ -39,6 +39,18 @@ std::string with_class(const DiagnosedCause& cause) {
   return text + ", which this log cannot tell from it)";
 }
 
+/// " along +y of the link r_upper_arm": of a size across the axis of a joint; of any other nothing.
+std::string direction_of(const DiagnosedParameter& p, const CauseName& cause, const std::vector<AcrossAxis>& across) {
+  const auto joint = std::find_if(across.begin(), across.end(), [&](const auto& a) { return a.joint == cause.joint; });
+  if (joint == across.end()) return "";
+  for (const std::size_t which : {0u, 1u}) {
+    const auto number = std::to_string(which + 1);
+    const char* word = p.parameter == "shift_" + number ? " along " : p.parameter == "tilt_" + number ? " about " : "";
+    if (*word != '\0') return word + joint->direction(which, p.estimate >= 0.0);
+  }
+  return "";
+}
+
 /// Why no answer of this report is to be trusted; empty: it is.
 std::string why_not(const DiagnosisReport& report) {
   const auto& causes = report.causes;
@@ -67,6 +79,17 @@ std::string why_not(const DiagnosisReport& report) {
   return "";
 }
 
+/// " among the 61 causes that it can test (65 that it cannot)".
+std::string of_how_many(const DiagnosisReport& report) {
+  std::vector<CauseName> tested;
+  for (const auto& limit : report.exclusion_limits) {
+    if (std::find(tested.begin(), tested.end(), limit.cause) == tested.end()) tested.push_back(limit.cause);
+  }
+  if (report.not_testable.empty()) return "";
+  return fmt::format(" among the {} causes that it can test ({} that it cannot)", tested.size(),
+                     report.not_testable.size());
+}
+
 /// Of a model that does not fit there are neither intervals nor limits.
 void forget_intervals(DiagnosisReport& report) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -81,7 +104,8 @@ void forget_intervals(DiagnosisReport& report) {
 
 }  // namespace
 
-std::string sentence_of(const DiagnosedCause& cause, const DiagnosisReport& report, const JointRoles& roles) {
+std::string sentence_of(const DiagnosedCause& cause, const DiagnosisReport& report, const JointRoles& roles,
+                        const std::vector<AcrossAxis>& across) {
   if (cause.cause.name == "unexplained") {
     return fmt::format("something follows the {} of {} that no known cause explains", cause.variable,
                        cause.cause.joint);
@@ -94,7 +118,7 @@ std::string sentence_of(const DiagnosedCause& cause, const DiagnosisReport& repo
     if (!p.fitted || next >= cause.parameters.size()) continue;
     const auto& e = cause.parameters[next++];
     p.value = e.estimate * p.si_per_unit;
-    amounts.push_back(amount_text(e));
+    amounts.push_back(amount_text(e) + direction_of(e, cause.cause, across));
     if (when.empty()) when = e.when(report.begin_utime);
   }
   auto text = effect_kind(cause.cause.name).sentence(*effect, roles, amounts);
@@ -102,12 +126,12 @@ std::string sentence_of(const DiagnosedCause& cause, const DiagnosisReport& repo
   return text;
 }
 
-void word_verdict(DiagnosisReport& report, const JointRoles& roles) {
+void word_verdict(DiagnosisReport& report, const JointRoles& roles, const std::vector<AcrossAxis>& across) {
   const auto is_unexplained = [](const DiagnosedCause& c) { return c.cause.name == "unexplained"; };
   const auto list_of = [&](std::vector<DiagnosedCause>& which) {
     std::string text;
     for (auto& cause : which) {
-      cause.sentence = sentence_of(cause, report, roles);
+      cause.sentence = sentence_of(cause, report, roles, across);
       // Of a curve in several pieces one is enough.
       if (is_unexplained(cause) && text.find(cause.sentence) != std::string::npos) continue;
       text += (text.empty() ? "" : "; ") + with_class(cause);
@@ -133,12 +157,13 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles) {
     return;
   }
   report.verdict = "none";
-  report.sentence = small.empty()
-                        ? "The model explains the log to its noise: nothing but joint offsets was found."
-                        : fmt::format(
-                              "Nothing that matters was found but joint offsets. What is there moves hand and "
-                              "outlines by less than {:.2g} mm: {}.",
-                              report.matters_mm, small);
+  report.sentence =
+      small.empty()
+          ? "The model explains the log to its noise: nothing but joint offsets was found" + of_how_many(report) + "."
+          : fmt::format(
+                "Nothing that matters was found but joint offsets. What is there moves hand and "
+                "outlines by less than {:.2g} mm: {}.",
+                report.matters_mm, small);
 }
 
 }  // namespace bodyschema::diagnosis

@@ -2,6 +2,7 @@
 #include <cstddef>
 
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -27,9 +28,8 @@ EffectKind axis_shift() {
                              });
               },
           .sentence =
-              [](const Effect& e, const JointRoles& roles, std::span<const std::string> amounts) {
-                return "the axis of " + e.target().joint + " lies beside where the URDF has it, by " +
-                       across_axis(e, roles, amounts, "along");
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                return "the axis of " + e.target().joint + " lies beside where the URDF has it, by " + both(amounts);
               },
           .lookalikes = {"link_length", "base_shift"},
           .splitting_motion = "Move the joint and its neighbours one at a time through their full ranges.",

@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <cmath>
 #include <deque>
-#include <string_view>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
@@ -14,23 +12,15 @@ namespace effects {
 #include "effect_list.inc"
 #undef BODYSCHEMA_EFFECT
 
-namespace {
-
-/// Of a size as people read it: its interval holds zero.
-bool may_be_zero(const std::string& amount) {
-  return amount.find("at most") != std::string::npos;
-}
-
-}  // namespace
-
 std::string camera_place(Parameters p, std::span<const std::string> amounts) {
   const char* const ways[][2] = {{"further right", "further left"},   {"lower", "higher"},
                                  {"further forward", "further back"}, {"further up", "further down"},
                                  {"further right", "further left"},   {"clockwise", "anticlockwise"}};
   std::vector<std::string> moves, turns;
-  const bool told = !std::all_of(amounts.begin(), amounts.end(), may_be_zero);
+  const bool told =
+      std::any_of(amounts.begin(), amounts.end(), [](const auto& a) { return a.find("at most") == std::string::npos; });
   for (std::size_t i = 0; i < amounts.size(); ++i) {
-    if (told && may_be_zero(amounts[i])) continue;
+    if (told && amounts[i].find("at most") != std::string::npos) continue;
     const auto by = amounts[i] + " " + by_sign(p[i], ways[i][0], ways[i][1]);
     if (i < 3)
       moves.push_back(by);
@@ -42,48 +32,6 @@ std::string camera_place(Parameters p, std::span<const std::string> amounts) {
     for (const auto& part : *list) text += (text.empty() ? "" : ", ") + part;
   }
   return text;
-}
-
-std::string part_in_words(const std::string& link) {
-  std::string plain = link;
-  for (const char* side : {"left_", "right_", "l_", "r_"}) {
-    if (plain.starts_with(side)) plain.erase(0, std::string_view(side).size());
-  }
-  for (const auto& [name, words] : {std::pair("upper_arm", "the upper arm"), std::pair("upperarm", "the upper arm"),
-                                    std::pair("forearm", "the forearm"), std::pair("hand", "the hand")}) {
-    if (plain == name || plain.starts_with(std::string(name) + "_")) return words;
-  }
-  return "the link " + link;
-}
-
-std::string direction_in_words(const Eigen::Vector3d& direction) {
-  // Nearer to an axis than a URDF's angles are written.
-  constexpr double kAlong = 0.9999;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    if (std::abs(direction[axis]) < kAlong) continue;
-    return std::string(direction[axis] > 0.0 ? "+" : "-") + "xyz"[axis];
-  }
-  std::string text = "(";
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const double rounded = std::round(100.0 * direction[axis]) / 100.0;
-    text += (axis > 0 ? ", " : "") + (rounded == 0.0 ? "0" : short_number(rounded, 2));
-  }
-  return text + ")";
-}
-
-std::string across_axis(const Effect& effect, const JointRoles& roles, std::span<const std::string> amounts,
-                        const char* word) {
-  const auto joint = roles.index(effect.target().joint);
-  const auto at = static_cast<std::size_t>(std::find(roles.arm.begin(), roles.arm.end(), joint) - roles.arm.begin());
-  const bool told = !std::all_of(amounts.begin(), amounts.end(), may_be_zero);
-  std::string text;
-  for (std::size_t i = 0; i < amounts.size(); ++i) {
-    if (told && may_be_zero(amounts[i])) continue;
-    const double sign = effect.parameters()[i].value < 0.0 ? -1.0 : 1.0;
-    text += (text.empty() ? "" : " and ") + amounts[i] + " " + word + " " +
-            direction_in_words(sign * roles.across.at(at).directions.at(i));
-  }
-  return text + " of the link " + roles.across.at(at).link;
 }
 
 Targets body_targets(const JointRoles& roles) {

@@ -133,16 +133,6 @@ class ArmAnatomy {
     return list;
   }
 
-  [[nodiscard]] std::vector<AcrossAxis> across() const {
-    std::vector<AcrossAxis> list;
-    for (const auto joint : arm_) {
-      const Eigen::Matrix3d to_link = X_WB_[rendered_.size() + 1 + position(joint)].linear().transpose();
-      list.push_back({info(joint).parent_link,
-                      {to_link * corrected_.tilt_axis(joint, 0), to_link * corrected_.tilt_axis(joint, 1)}});
-    }
-    return list;
-  }
-
  private:
   std::vector<std::string> links_of(const RobotSetup& setup) const {
     auto links = setup.model.rendered_links;
@@ -219,7 +209,6 @@ JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSe
   const ArmAnatomy anatomy(model, setup, cameras, roles.arm);
   roles.segments = anatomy.segments();
   roles.links = anatomy.links();
-  roles.across = anatomy.across();
   return roles;
 }
 

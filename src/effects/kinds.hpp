@@ -94,16 +94,6 @@ std::string short_number(double value, int decimals = 1);
 /// ("at most") are left out, unless all do.
 std::string camera_place(Parameters shifts_and_turns, std::span<const std::string> amounts);
 
-/// "the upper arm", where the link's name says which part of an arm it is; else "the link NAME".
-std::string part_in_words(const std::string& link);
-/// A vector by the axes of its frame: "+y", "-z", or "(0.71, 0, -0.7)".
-std::string direction_in_words(const Eigen::Vector3d& direction);
-/// "3.1 mm (3 to 3.2) along -z and 1 mm (0.9 to 1.1) along +x of the link r_upper_arm": what two parameters across a
-/// joint's axis do, by the axes of the URDF's link. Amounts whose intervals hold zero are left out, as in camera_place.
-/// @param word  "along" or "about"
-std::string across_axis(const Effect& effect, const JointRoles& roles, std::span<const std::string> amounts,
-                        const char* word);
-
 /// Reasons that several effects share; empty: testable.
 std::string too_little_motion(const std::string& joint, const JointRoles& roles, const LogMotion& motion);
 std::string too_slow(const LogMotion& motion);

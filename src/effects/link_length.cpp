@@ -2,6 +2,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 

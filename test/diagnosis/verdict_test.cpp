@@ -184,6 +184,11 @@ TEST(Verdict, OfNothingSaysSoAndKeepsItsLimits) {
   EXPECT_EQ(report.verdict, "none");
   EXPECT_THAT(report.sentence, HasSubstr("to its noise"));
   EXPECT_FALSE(report.exclusion_limits.empty());
+  // Five stills can test next to nothing, and finding nothing there says as much.
+  auto poor = report_of({});
+  poor.not_testable = {{{"latency", "", ""}, "the arm stands still"}, {{"slip", "elbow", ""}, "too few postures"}};
+  EXPECT_THAT(worded(std::move(poor)).sentence,
+              HasSubstr("nothing but joint offsets was found among the 1 causes that it can test (2 that it cannot)."));
 }
 
 TEST(Verdict, OfACrowdDoesNotSayThatNothingIsLeft) {

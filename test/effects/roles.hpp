@@ -19,10 +19,6 @@ inline JointRoles roles() {
   r.cameras = {"left", "right"};
   r.segments = {{"forearm", {0}}, {"hand", {1, 2}}};
   r.links = {{"upper_arm", 8, 0.15, {.along_m = 1.0}}, {"forearm", 10, 0.14, {.along_m = 0.6, .shift_1_m = 0.8}}};
-  for (const auto joint : r.arm) {
-    const auto parent = joint == r.arm.front() ? "chest" : r.names[static_cast<std::size_t>(joint - 1)] + "_link";
-    r.across.push_back({parent, {Eigen::Vector3d::UnitX(), -Eigen::Vector3d::UnitZ()}});
-  }
   return r;
 }
 

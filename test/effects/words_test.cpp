@@ -1,8 +1,9 @@
 #include <gtest/gtest.h>
 
 #include "bodyschema/effects/effect_kind.hpp"
-#include "kinds.hpp"
+#include "bodyschema/effects/across_axis.hpp"
 #include "roles.hpp"
+#include "words.hpp"
 
 namespace bodyschema {
 namespace {
@@ -29,17 +30,22 @@ TEST(Words, OfPartsAreThoseOfAnArm) {
             "the hand is 3 % (2.9 to 3.1) smaller than in the meshes");
 }
 
+TEST(Words, LeaveOutWhatMayBeNothingBesideWhatIsSomething) {
+  EXPECT_EQ(
+      said("axis_shift", {"elbow", ""}, {}, {"3 mm (2 to 4) along -x", "1 mm (0.5 to 1.5) along +y"}),
+      "the axis of elbow lies beside where the URDF has it, by 3 mm (2 to 4) along -x and 1 mm (0.5 to 1.5) along "
+      "+y");
+  EXPECT_EQ(said("axis_tilt", {"elbow", ""}, {}, {"0.6 deg (0.5 to 0.7) about +x", "0.1 deg (at most 0.2) about -y"}),
+            "the axis of elbow is tilted against the URDF's, by 0.6 deg (0.5 to 0.7) about +x");
+}
+
 /// Directions across an axis are made up; the URDF's axes are not.
 TEST(Words, OfDirectionsAreTheAxesOfTheUrdf) {
-  EXPECT_EQ(
-      said("axis_shift", {"elbow", ""}, {-0.003, 0.001}, {"3 mm (2 to 4)", "1 mm (0.5 to 1.5)"}),
-      "the axis of elbow lies beside where the URDF has it, by 3 mm (2 to 4) along -x and 1 mm (0.5 to 1.5) along "
-      "-z of the link s_yaw_link");
-  // What may be nothing is left out beside what is something.
-  EXPECT_EQ(said("axis_tilt", {"elbow", ""}, {0.01, 0.001}, {"0.6 deg (0.5 to 0.7)", "0.1 deg (at most 0.2)"}),
-            "the axis of elbow is tilted against the URDF's, by 0.6 deg (0.5 to 0.7) about +x of the link s_yaw_link");
   EXPECT_EQ(effects::direction_in_words({0.0, 1.0, 0.0}), "+y");
   EXPECT_EQ(effects::direction_in_words(Eigen::Vector3d(1.0, 0.0, -1.0).normalized()), "(0.71, 0, -0.71)");
+  const AcrossAxis across{"elbow", "r_upper_arm", {Eigen::Vector3d::UnitX(), -Eigen::Vector3d::UnitZ()}};
+  EXPECT_EQ(across.direction(1, true), "-z of the link r_upper_arm");
+  EXPECT_EQ(across.direction(1, false), "+z of the link r_upper_arm");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bodyschema/diagnosis/diagnosis_report.hpp"
+#include "bodyschema/effects/across_axis.hpp"
 
 namespace bodyschema {
 
@@ -58,7 +59,8 @@ struct LogComparison {
 
 /// Compares the diagnoses of two logs or more, in the order in which they were recorded.
 /// @param logs  their names, as many as reports
+/// @param across  directions of the joints' axes, for sentences; empty: left out
 LogComparison compare(const std::vector<DiagnosisReport>& reports, std::vector<std::string> logs,
-                      const JointRoles& roles);
+                      const JointRoles& roles, const std::vector<AcrossAxis>& across = {});
 
 }  // namespace bodyschema

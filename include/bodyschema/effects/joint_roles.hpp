@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -27,13 +26,6 @@ struct ArmLink {
   JointAdjustment per_metre;  ///< of `joint`: what one metre more of length does
 };
 
-/// Directions across the axis of a joint of the arm, along which its place and about which its axis may be off
-/// (CorrectedKinematics::tilt_axis): unit, in the axes of the URDF's link that carries the joint.
-struct AcrossAxis {
-  std::string link;
-  std::array<Eigen::Vector3d, 2> directions{};
-};
-
 /// Which joints and parts play which role on this robot, by position in RobotModel order; in that order too, so from
 /// the root outwards, however a configuration lists them.
 struct JointRoles {
@@ -49,7 +41,6 @@ struct JointRoles {
   std::vector<Eigen::Index> fingers;  ///< joints that curl a finger when they grow
   std::vector<BodySegment> segments;  ///< every rendered part is in one
   std::vector<ArmLink> links;         ///< from the root outwards
-  std::vector<AcrossAxis> across;     ///< one per joint of `arm`
   /// The roles that a configuration gives: arm and head as named there, neck and pans by what they move.
   /// Fingers are the joints that turn a rendered link but not the hand's frame, about an axis within 45
   /// deg of their finger's last one: joints that spread the fingers, oppose the thumb or slide are none.
