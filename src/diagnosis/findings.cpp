@@ -340,7 +340,7 @@ void Findings::check_outlines(const LogAbout& log) {
   const double depth = report_.samples.empty() ? 0.0 : report_.samples.front().depth_m;
   const auto left = left_over(fit_, log, search_.search(), {options_.level, options_.matters_m, depth});
   report_.side_left_over = left.side;
-  report_.pixel_noise_px = left.pixel_noise_px;
+  report_.noise_px = left.noise_px;
   report_.left_px = left.rms_px;
 }
 

@@ -12,9 +12,9 @@ struct LeftOver {
   /// "the left outline of r_hand lies 0.8 px outside of where the model has it in the pictures of left"; empty: none.
   std::string side;
   double rms_px = 0.0;
-  /// How far points of an outline scatter about others on the same flank, near them but further off than pixels err
-  /// alike. What a model has wrong moves them together and does not show in it.
-  double pixel_noise_px = 0.0;
+  /// What of it differs from block to block, rms. The rest is alike in all of them at the same places of the robot's
+  /// surface: pixels do not err so, a model does.
+  double noise_px = 0.0;
 };
 
 struct LeftOverSettings {

@@ -70,11 +70,11 @@ std::string why_not(const DiagnosisReport& report) {
   if (!report.side_left_over.empty()) {
     return fmt::format("The model does not explain what is seen: {}.", report.side_left_over);
   }
-  if (causes.empty() && report.pixel_noise_px > 0.0 && report.left_px > limits::kNoiseRatio * report.pixel_noise_px) {
+  if (causes.empty() && report.noise_px > 0.0 && report.left_px > limits::kNoiseRatio * report.noise_px) {
     return fmt::format(
         "The model does not explain what is seen, and no known cause does: outlines lie off by {:.2f} "
-        "px, of which the pixels' own noise is {:.2f}.",
-        report.left_px, report.pixel_noise_px);
+        "px, and but {:.2f} px of that differ from one part of the log to another.",
+        report.left_px, report.noise_px);
   }
   return "";
 }

@@ -68,12 +68,16 @@ double hand_error_mm(const DiagnosisReport& report, const HandTruth& truth, Rema
 /// A robot that is simulated, and the configuration with which its logs are diagnosed.
 class TrialRobot {
  public:
-  TrialRobot(const Configuration& simulated, Configuration diagnosed)
+  TrialRobot(const Configuration& simulated, Configuration diagnosed, bool masks)
       : setup_(RobotSetup::from(simulated.section("robot"))), rig_(StereoRig::from(simulated.section("cameras"))),
         robot_(load_robot(setup_, rig_)), roles_(JointRoles::of(robot_, setup_, rig_)),
         settings_(simulator::SimulatorSettings::from(simulated.section("simulator"))),
-        configuration_(std::move(diagnosed)) {
+        configuration_(std::move(diagnosed)), masks_(masks) {
     settings_.camera_rate_hz = kPictureRate_hz;
+    if (!masks_) return;
+    constexpr double kOutline_px = 0.3;
+    settings_.outline_noise.sd_px = kOutline_px;
+    settings_.background_frames = settings_.entry_frames = 0;
   }
 
   [[nodiscard]] std::vector<FaultSpec> draw(Row row, std::uint64_t seed) const {
@@ -136,7 +140,9 @@ class TrialRobot {
   void simulate(const simulator::SimulationPlan& plan, const fs::path& file, HandTruth& truth) const {
     simulator::Simulator simulator(robot_, setup_, rig_, settings_, plan);
     LogWriter log(file);
-    simulator::FramePublisher publisher(simulator.joint_names(), {});
+    simulator::FramePublisher::Options format;
+    if (masks_) format.format = simulator::PictureFormat::kMasks;
+    simulator::FramePublisher publisher(simulator.joint_names(), format);
     while (const auto frame = simulator.next()) {
       publisher.publish(*frame, log);
       for (std::size_t c = 0; c < frame->cameras.size(); ++c) {
@@ -151,6 +157,7 @@ class TrialRobot {
   JointRoles roles_;
   simulator::SimulatorSettings settings_;
   Configuration configuration_;
+  bool masks_;
 };
 
 Outcome TrialRobot::run(Row row, std::uint64_t seed) const {
@@ -166,6 +173,7 @@ Outcome TrialRobot::run(Row row, std::uint64_t seed) const {
   plan.motion = simulator::Motion::kBabble;
   plan.seconds = kLog_s;
   plan.faults = outcome.faults;
+  if (masks_) plan.output = simulator::Output::kSilhouettes;
   simulator::Random random(seed, "offsets");
   for (const auto& joint : setup_.estimated_joints) plan.offsets_deg[joint] = random.uniform(-7.0, 7.0);
   HandTruth truth;
@@ -184,6 +192,12 @@ Outcome TrialRobot::run(Row row, std::uint64_t seed) const {
   return outcome;
 }
 
+/// What a configuration needs for pictures that are masks.
+std::vector<std::string> vision_of(const ExperimentContext& context) {
+  if (!context.options.masks) return {};
+  return {"vision.method=single_colour", "vision.background_rgb=[0, 0, 0]"};
+}
+
 std::optional<TrialRobot> official_robot(const ExperimentContext& context) {
   const auto models = context.options.data / "icub-models";
   if (!fs::is_directory(models)) return std::nullopt;
@@ -192,8 +206,10 @@ std::optional<TrialRobot> official_robot(const ExperimentContext& context) {
   const std::vector<std::string> overrides = {
       "robot.urdf=" + (models / "iCub_manual/robots/iCubGazeboV2_5_visuomanip/model.urdf").string(),
       "robot.mesh_search_roots=[\"" + models.string() + "\"]"};
+  auto diagnosed = overrides;
+  for (auto& wish : vision_of(context)) diagnosed.push_back(std::move(wish));
   return std::optional<TrialRobot>(std::in_place, Configuration::load(folder / "simulator.yaml", overrides),
-                                   Configuration::load(folder / "estimator.yaml", overrides));
+                                   Configuration::load(folder / "estimator.yaml", diagnosed), context.options.masks);
 }
 
 }  // namespace
@@ -240,7 +256,9 @@ bool is_not_explained_away(const Outcome& o) {
 }
 
 std::vector<Outcome> run(ExperimentContext& context) {
-  const TrialRobot own(context.simulated, Configuration::load(context.recorded / "icub_right" / "estimator.yaml"));
+  const TrialRobot own(context.simulated,
+                       Configuration::load(context.recorded / "icub_right" / "estimator.yaml", vision_of(context)),
+                       context.options.masks);
   const auto official = official_robot(context);
   constexpr long kEveryFourth = 4;
   struct Job {

@@ -45,7 +45,9 @@ TEST_F(TellingMotion, SweepsTheJointsOfTheClassAloneWithTheHandInSight) {
   double alone = 0.0;
   for (std::size_t i = 0; i < motion->postures.size(); ++i) {
     const auto& posture = motion->postures[i];
-    if (i > 0) EXPECT_GT(posture.time_s, motion->postures[i - 1].time_s);
+    if (i > 0) {
+      EXPECT_GT(posture.time_s, motion->postures[i - 1].time_s);
+    }
     Eigen::VectorXd from_home = posture.q - motion->postures.front().q;
     const double turned = std::abs(from_home[elbow]);
     from_home[elbow] = 0.0;

@@ -158,13 +158,13 @@ TEST(Verdict, WhatIsNotExplainedHasNoIntervals) {
 /// An error that is alike in every block moves no test between blocks.
 TEST(Verdict, MoreThanPixelNoiseIsNotNothing) {
   auto report = report_of({});
-  report.pixel_noise_px = 0.3;
+  report.noise_px = 0.3;
   report.left_px = 0.36;
   EXPECT_EQ(worded(report).verdict, "none");
   report.left_px = 0.45;
   report = worded(std::move(report));
   EXPECT_EQ(report.verdict, "unexplained");
-  EXPECT_THAT(report.sentence, HasSubstr("0.45 px, of which the pixels' own noise is 0.30"));
+  EXPECT_THAT(report.sentence, HasSubstr("0.45 px, and but 0.30 px of that differ"));
   EXPECT_THAT(report.exclusion_limits, IsEmpty());
 }
 

@@ -115,9 +115,9 @@ struct DiagnosisReport {
   /// What is left on one side of one part, in block after block: "the left outline of r_hand lies 0.8 px outside of
   /// where the model has it in the pictures of left". Empty: nothing.
   std::string side_left_over;
-  /// What the final model leaves of the outlines, rms, and how far their points scatter about their neighbours: what
-  /// pixels make of an outline that the model has right. Their ratio is near one where the model is right.
-  double left_px = 0.0, pixel_noise_px = 0.0;
+  /// What the final model leaves of the outlines, rms, and what of it differs from block to block. The rest is alike in
+  /// all of them at the same places of the robot's surface: pixels do not err so, a model does.
+  double left_px = 0.0, noise_px = 0.0;
   /// What the pictures show beside the robot through most of the log, where no outline is looked for: "14 cm2 beside
   /// the robot, in 96 % of the log". Something is held, or a part has no mesh. Empty: nothing.
   std::string not_in_model;
