@@ -128,13 +128,13 @@ std::string sentence_of(const DiagnosedCause& cause, const DiagnosisReport& repo
 
 void word_verdict(DiagnosisReport& report, const JointRoles& roles, const std::vector<AcrossAxis>& across) {
   const auto is_unexplained = [](const DiagnosedCause& c) { return c.cause.name == "unexplained"; };
-  const auto list_of = [&](std::vector<DiagnosedCause>& which) {
+  const auto list_of = [&](std::vector<DiagnosedCause>& which, bool classes) {
     std::string text;
     for (auto& cause : which) {
       cause.sentence = sentence_of(cause, report, roles, across);
       // Of a curve in several pieces one is enough.
       if (is_unexplained(cause) && text.find(cause.sentence) != std::string::npos) continue;
-      text += (text.empty() ? "" : "; ") + with_class(cause);
+      text += (text.empty() ? "" : "; ") + (classes ? with_class(cause) : cause.sentence);
     }
     return text;
   };
@@ -142,7 +142,8 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles, const std::v
   const auto why = why_not(report);
   const bool unexplained = !why.empty() || std::any_of(causes.begin(), causes.end(), is_unexplained);
   if (unexplained) forget_intervals(report);
-  const auto list = list_of(report.causes), small = list_of(report.small_causes);
+  // Of what matters to nobody nobody asks which of several it is.
+  const auto list = list_of(report.causes, true), small = list_of(report.small_causes, false);
   if (!why.empty()) {
     report.verdict = "unexplained";
     report.sentence = why;

@@ -53,7 +53,7 @@ class Table {
  public:
   Table(ExperimentContext& context) : context_(context) {
     context_.table += fmt::format("\n{:<44} {:>6} {:>9}   {}\n",
-                                  context_.options.masks ? "masks, 60 s at 10 Hz" : "through pictures, 60 s at 10 Hz",
+                                  context_.options.masks ? "masks, 40 s at 5 Hz" : "through pictures, 60 s at 10 Hz",
                                   "logs", "measured", "demand");
   }
   void add(const char* row, const char* name, std::size_t logs, double value, double demand, bool at_most,

@@ -72,8 +72,8 @@ class TrialRobot {
       : setup_(RobotSetup::from(simulated.section("robot"))), rig_(StereoRig::from(simulated.section("cameras"))),
         robot_(load_robot(setup_, rig_)), roles_(JointRoles::of(robot_, setup_, rig_)),
         settings_(simulator::SimulatorSettings::from(simulated.section("simulator"))),
-        configuration_(std::move(diagnosed)), masks_(masks) {
-    settings_.camera_rate_hz = kPictureRate_hz;
+        configuration_(std::move(diagnosed)), masks_(masks), size_(masks ? kMasks : kPictures) {
+    settings_.camera_rate_hz = size_.rate_hz;
     if (!masks_) return;
     constexpr double kOutline_px = 0.3;
     settings_.outline_noise.sd_px = kOutline_px;
@@ -83,7 +83,7 @@ class TrialRobot {
   [[nodiscard]] std::vector<FaultSpec> draw(Row row, std::uint64_t seed) const {
     simulator::FaultSite site(robot_, setup_, rig_);
     site.begin_s = 0.0;
-    site.end_s = kLog_s;
+    site.end_s = size_.seconds;
     simulator::Random random(seed, "size of the fault");
     if (row == kSingle && random.uniform(0.0, 1.0) < kShareOfCoversAndCameras) return {draw_cover_or_camera(random)};
     simulator::DrawOptions options;
@@ -158,6 +158,7 @@ class TrialRobot {
   simulator::SimulatorSettings settings_;
   Configuration configuration_;
   bool masks_;
+  LogSize size_;
 };
 
 Outcome TrialRobot::run(Row row, std::uint64_t seed) const {
@@ -171,7 +172,7 @@ Outcome TrialRobot::run(Row row, std::uint64_t seed) const {
   simulator::SimulationPlan plan;
   plan.seed = seed;
   plan.motion = simulator::Motion::kBabble;
-  plan.seconds = kLog_s;
+  plan.seconds = size_.seconds;
   plan.faults = outcome.faults;
   if (masks_) plan.output = simulator::Output::kSilhouettes;
   simulator::Random random(seed, "offsets");
@@ -180,7 +181,7 @@ Outcome TrialRobot::run(Row row, std::uint64_t seed) const {
   simulate(plan, file, truth);
   LogDiagnosisOptions options;
   options.log = file;
-  options.picture_rate_hz = kPictureRate_hz;
+  options.picture_rate_hz = size_.rate_hz;
   options.threads = 1;  // other logs run beside this one
   options.quiet = true;
   outcome.report = diagnose_log(configuration_, options);

@@ -13,7 +13,10 @@
 /// Logs of rendered pictures in which the simulator's physics hides faults, and what the diagnosis says of them.
 namespace bodyschema::diagnosis_trials {
 
-inline constexpr double kLog_s = 60.0, kPictureRate_hz = 10.0;
+struct LogSize {
+  double seconds, rate_hz;
+};
+inline constexpr LogSize kPictures = {60.0, 10.0}, kMasks = {40.0, 5.0};
 /// A cause of this size is one that a user wants to know; those at the limit have a quarter to a half of it.
 inline constexpr double kMatters_mm = 2.0, kMatters_px = 1.0;
 
