@@ -31,11 +31,17 @@ std::string capitalised(std::string text) {
   return text;
 }
 
+/// "joint coupling of elbow with prosup".
+std::string in_words(CauseName cause) {
+  std::replace(cause.name.begin(), cause.name.end(), '_', ' ');
+  return cause.text();
+}
+
 std::string with_class(const DiagnosedCause& cause) {
   std::string text = cause.sentence;
   if (cause.same.size() < 2) return text;
   text += " (or";
-  for (std::size_t i = 1; i < cause.same.size(); ++i) text += (i > 1 ? ", " : " ") + cause.same[i].text();
+  for (std::size_t i = 1; i < cause.same.size(); ++i) text += (i > 1 ? ", " : " ") + in_words(cause.same[i]);
   return text + ", which this log cannot tell from it)";
 }
 

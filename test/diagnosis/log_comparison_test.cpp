@@ -73,6 +73,16 @@ TEST(LogComparison, AnOffsetThatChangedSlippedBetweenThem) {
   EXPECT_THAT(c.to_json(), HasSubstr("\"change_deg\": 2.0"));
 }
 
+/// Other postures show other errors of the model: logs differ by more than each of them knows.
+TEST(LogComparison, WhatAllOffsetsDoIsNoSlip) {
+  const std::map<std::string, double> first = {{"s_pitch", 0.0}, {"s_roll", 0.0}, {"s_yaw", 0.0}, {"elbow", 0.0}},
+                                      second = {{"s_pitch", 0.3}, {"s_roll", -0.3}, {"s_yaw", 0.3}, {"elbow", 2.5}};
+  const auto c = compared({log_with({gain(4.0, 0.1)}, first), log_with({gain(4.3, 0.1)}, second)});
+  ASSERT_EQ(c.changes.size(), 1u) << c.sentence;
+  EXPECT_EQ(c.changes[0].joint, "elbow");
+  EXPECT_EQ(c.common.size(), 1u) << "sizes are told no better than offsets";
+}
+
 /// The offset before a slip is not the one after it.
 TEST(LogComparison, ASlipWithinALogIsNoneBetweenThem) {
   DiagnosedCause slip;

@@ -95,7 +95,7 @@ TEST(Verdict, SaysAClassWhereSeveralFit) {
   const auto report = worded(report_of({cause}));
   EXPECT_EQ(report.verdict, "class");
   EXPECT_THAT(report.sentence,
-              HasSubstr("(or eccentricity of elbow, joint_coupling of elbow with prosup, which this log cannot "
+              HasSubstr("(or eccentricity of elbow, joint coupling of elbow with prosup, which this log cannot "
                         "tell from it)"));
 }
 
