@@ -18,6 +18,7 @@
 #include "bodyschema/core/installation.hpp"
 #include "bodyschema/core/logging.hpp"
 #include "bodyschema/core/progress_bar.hpp"
+#include "bodyschema/robot/motion_file.hpp"
 #include "bodyschema/simulator/contact_sheet.hpp"
 #include "bodyschema/simulator/random.hpp"
 #include "bodyschema/simulator/recording.hpp"
@@ -47,6 +48,7 @@ struct Arguments {
   double babble_s = 0.0;
   double one_way_s = 0.0;
   int poses = 0;
+  std::string motion;
   int frames = 100;
   std::optional<int> background_frames;
   bool head_moves = false;
@@ -152,6 +154,24 @@ sim::PictureFormat picture_format(const Arguments& a, const StereoRig& rig) {
   return sim::PictureFormat::kJpeg;
 }
 
+sim::Trajectory given_motion(const std::string& file, const RobotModel& model, const RobotSetup& setup) {
+  const auto motion = MotionFile::read(file, [&](const std::string& joint) {
+    return model.joints()[static_cast<std::size_t>(model.joint_index(joint))].slides;
+  });
+  const auto posture = [&](std::size_t i) {
+    Eigen::VectorXd q = setup.default_joints(model);
+    for (std::size_t j = 0; j < motion.joints.size(); ++j) {
+      q[model.joint_index(motion.joints[j])] = motion.postures[i].q[static_cast<Eigen::Index>(j)];
+    }
+    return q;
+  };
+  sim::Trajectory trajectory(posture(0));
+  for (std::size_t i = 1; i < motion.postures.size(); ++i) {
+    trajectory.move_to(posture(i), motion.postures[i].time_s - motion.postures[i - 1].time_s);
+  }
+  return trajectory;
+}
+
 void run(const Arguments& a) {
   set_up_logging(a.log_level);
   if (!a.contact_sheet.empty() && !a.contact_sheet.ends_with(".png")) {
@@ -198,6 +218,10 @@ void run(const Arguments& a) {
   } else if (a.poses > 0) {
     plan.motion = sim::Motion::kPoses;
     plan.poses = a.poses;
+  }
+  if (!a.motion.empty()) {
+    plan.motion = sim::Motion::kGiven;
+    plan.given = given_motion(a.motion, *model, setup);
   }
   plan.frozen_joints = a.frozen;
   plan.offsets_deg = read_offsets(a.offsets, a.seed, setup.estimated_joints);
@@ -301,6 +325,13 @@ int main(int argc, char** argv) {
   auto* poses = app.add_option("--poses", a.poses, "Stop and go: this many postures, each held still for a second")
                     ->check(number_in(2, 3600))
                     ->group("Motion");
+  app.add_option("--motion", a.motion,
+                 "Play this motion: CSV with time_s and joints in deg, as `bodyschema diagnose` writes it")
+      ->excludes(reach)
+      ->excludes(babble)
+      ->excludes(one_way)
+      ->excludes(poses)
+      ->group("Motion");
   reach->excludes(babble)->excludes(one_way)->excludes(poses);
   babble->excludes(one_way)->excludes(poses);
   one_way->excludes(poses);

@@ -53,7 +53,8 @@ class Diagnoser {
     search_.polish(block_s_);
     progress(0.85);
     findings.conclude(search_.about(block_s_), candidates_of_end());
-    word_verdict(report_, fit_.log().roles());
+    const auto& log = fit_.log();
+    word_verdict(report_, log.roles(), across_axes(log.robot(), log.setup(), log.roles()));
     progress(1.0);
     return std::move(report_);
   }

@@ -95,11 +95,12 @@ class Page {
     page_.verdict(d_.sentence);
     if (!d_.side_left_over.empty()) page_.paragraph("Left over: " + d_.side_left_over + ".");
     if (!d_.not_in_model.empty()) page_.paragraph("Not in the model: " + d_.not_in_model + ".");
+    next_steps();
     causes();
     small_causes();
     gain();
     if (!pictures.empty()) {
-      page_.heading("Pictures");
+      page_.heading("Where it shows");
       for (const auto& [image, caption] : pictures) page_.picture(image, caption);
     }
     candidates();
@@ -148,6 +149,12 @@ class Page {
       }
       page_.paragraph("This log cannot tell " + cause.same.front().text() + " from " + others + ". " + cause.advice);
     }
+  }
+
+  void next_steps() {
+    if (d_.next_steps.empty()) return;
+    page_.heading("What to do next");
+    page_.list(d_.next_steps);
   }
 
   void small_causes() {

@@ -129,6 +129,9 @@ std::string DiagnosisReport::to_json() const {
               {"blocks", blocks},
               {"block_s", number(block_s)}};
   j["warnings"] = warnings;
+  j["next_steps"] = next_steps;
+  j["left_px"] = number(left_px);
+  j["noise_px"] = number(noise_px);
   j["side_left_over"] = optional_text(side_left_over);
   j["not_in_model"] = optional_text(not_in_model);
   return j.dump(2) + "\n";

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <mutex>
 
 #include "bodyschema/evidence/distributions.hpp"
+#include "left_over.hpp"
 #include "limits.hpp"
 #include "surplus.hpp"
 
@@ -221,7 +221,7 @@ void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candi
     report_.offsets_ci95_deg[name] = {offset - half, offset + half};
   }
   describe_causes(log, all, candidates);
-  check_sides(log);
+  check_outlines(log);
   check_surplus(log);
   exclude(log, all, candidates);
 }
@@ -336,56 +336,12 @@ void Findings::find_class(const BlockRegression& all, std::size_t cause, const s
   for (const auto& motion : motions) out.advice += (out.advice.empty() ? "" : " ") + motion;
 }
 
-void Findings::check_sides(const LogAbout& log) {
-  const auto& roles = fit_.log().roles();
-  constexpr std::size_t kSides = 4;
-  const std::size_t groups = roles.segments.size() * fit_.log().rig().cameras.size() * kSides;
-  std::vector<Eigen::MatrixXd> sums(
-      2, Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(groups), static_cast<Eigen::Index>(log.blocks)));
-  std::vector<std::size_t> segment_of(fit_.measurement().part_count(), 0);
-  for (std::size_t s = 0; s < roles.segments.size(); ++s) {
-    for (const auto part : roles.segments[s].parts) segment_of[part] = s;
-  }
-  std::mutex mutex;
-  fit_.linearise(log.state.model(), {}, search_.search(), {}, [&](std::size_t p, std::span<const OutlinePoint> points) {
-    const std::scoped_lock lock(mutex);
-    const auto camera = fit_.log().pictures()[p].camera;
-    for (const auto& point : points) {
-      const bool flat = std::abs(point.normal.x()) > std::abs(point.normal.y());
-      const std::size_t side = flat ? (point.normal.x() > 0 ? 0u : 1u) : (point.normal.y() > 0 ? 2u : 3u);
-      const auto row = static_cast<Eigen::Index>(
-          (segment_of[point.part] * fit_.log().rig().cameras.size() + camera) * kSides + side);
-      const auto column = static_cast<Eigen::Index>(log.block_of[p]);
-      sums[0](row, column) += point.weight * point.residual_px;
-      sums[1](row, column) += point.weight;
-    }
-  });
-  static const char* const kNames[] = {"right", "left", "lower", "upper"};
-  // As many comparisons as groups: Bonferroni.
-  const double tail = options_.level / static_cast<double>(groups);
-  double worst = 0.0;
-  for (Eigen::Index row = 0; row < sums[0].rows(); ++row) {
-    const double weight = sums[1].row(row).sum();
-    const auto seen = (sums[1].row(row).array() > 0.0).count();
-    if (seen < 3) continue;
-    const double mean = sums[0].row(row).sum() / weight;
-    const Eigen::RowVectorXd off = sums[0].row(row) - mean * sums[1].row(row);
-    const double sd = std::sqrt(off.squaredNorm() * static_cast<double>(seen) / static_cast<double>(seen - 1)) / weight;
-    const auto group = static_cast<std::size_t>(row);
-    const auto& camera = fit_.log().rig().cameras[(group / kSides) % fit_.log().rig().cameras.size()];
-    const double unit = picture_unit(camera.intrinsics);
-    // Beyond what matters, and beyond what a picture places a flank to.
-    const double depth = report_.samples.empty() ? 0.0 : report_.samples.front().depth_m;
-    const double matters_px = depth > 0.0 ? options_.matters_m * camera.intrinsics.fx / depth : 0.0;
-    const double least = std::max(matters_px, 3.0 * limits::kFloor_px * unit);
-    if (std::abs(mean) < least + student_quantile(tail, static_cast<double>(seen - 1)) * sd || std::abs(mean) <= worst)
-      continue;
-    worst = std::abs(mean);
-    report_.side_left_over =
-        fmt::format("the {} outline of {} lies {:.1f} px {} where the model has it in the pictures of {}",
-                    kNames[group % kSides], roles.segments[group / kSides / fit_.log().rig().cameras.size()].name,
-                    std::abs(mean), mean > 0.0 ? "outside of" : "inside of", camera.name);
-  }
+void Findings::check_outlines(const LogAbout& log) {
+  const double depth = report_.samples.empty() ? 0.0 : report_.samples.front().depth_m;
+  const auto left = left_over(fit_, log, search_.search(), {options_.level, options_.matters_m, depth});
+  report_.side_left_over = left.side;
+  report_.noise_px = left.noise_px;
+  report_.left_px = left.rms_px;
 }
 
 void Findings::check_surplus(const LogAbout& log) {
@@ -413,13 +369,21 @@ void Findings::exclude(const LogAbout& log, const BlockRegression& all, const st
     for (const auto& p : std::as_const(*effect).parameters()) {
       if (p.fitted) fitted.push_back(&p);
     }
+    DiagnosedCause told;
+    told.cause = candidate.cause;
+    told.z = candidate.z();
     for (std::size_t k = 0; k < fitted.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
       if (candidate.scores.independent[i] < limits::kRounding) continue;
-      const double limit = std::abs(estimate[i]) + quantile(log) * std::sqrt(covariance(i, i));
+      const double half = quantile(log) * std::sqrt(covariance(i, i)), unit = fitted[k]->si_per_unit;
+      told.parameters.push_back({fitted[k]->name,
+                                 fitted[k]->unit,
+                                 estimate[i] / unit,
+                                 {(estimate[i] - half) / unit, (estimate[i] + half) / unit}});
       report_.exclusion_limits.push_back(
-          {candidate.cause, fitted[k]->name, fitted[k]->unit, limit / fitted[k]->si_per_unit});
+          {candidate.cause, fitted[k]->name, fitted[k]->unit, (std::abs(estimate[i]) + half) / unit});
     }
+    report_.estimates.push_back(std::move(told));
   }
 }
 

@@ -43,8 +43,8 @@ class Findings {
   void find_class(const BlockRegression& all, std::size_t cause, const std::vector<Candidate>& candidates,
                   DiagnosedCause& out);
   void exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
-  /// Where outlines lie off on one side of one part, block after block.
-  void check_sides(const LogAbout& log);
+  /// Where outlines lie off on one side of one part, block after block, and how much is left for pixel noise.
+  void check_outlines(const LogAbout& log);
   /// What the pictures show and the model lacks.
   void check_surplus(const LogAbout& log);
   [[nodiscard]] double quantile(const LogAbout& log) const;

@@ -12,6 +12,7 @@
 #include "bodyschema/pipeline/watched_log.hpp"
 #include "log_motion.hpp"
 #include "log_pictures.hpp"
+#include "telling_motion.hpp"
 
 namespace bodyschema {
 namespace {
@@ -55,7 +56,10 @@ class LogDiagnosis {
           "for around the predicted robot, as by vision.method: statistics");
     }
     if (!options_.out.empty()) {
+      const auto motion = diagnosis::telling_motion(fit, report);
+      report.next_steps = next_steps(report, motion.has_value());
       report.write(options_.out);
+      if (motion) motion->write(options_.out / "motion.csv");
       diagnosis_page(report, options_.log.filename().string(), diagnosis::draw_pictures(fit, watched_.kept, report))
           .write(options_.out / "report.html");
     }
@@ -108,6 +112,36 @@ class LogDiagnosis {
     return widest;
   }
 
+  /// What to do with the answer.
+  [[nodiscard]] std::vector<std::string> next_steps(const DiagnosisReport& report, bool has_motion) const {
+    const auto out = options_.out.string(), log = options_.log.string();
+    std::vector<std::string> steps;
+    if (report.verdict == "none") {
+      steps.push_back("Nothing to extend. Apply the offsets: bodyschema replay " + log + " --config CONFIG --out " +
+                      out + "/replay, then bodyschema export.");
+    }
+    if (report.verdict == "unexplained") {
+      steps.push_back(
+          "Apply nothing. Look at the pictures and at what is left, mend what they show (masks, a held thing, meshes), "
+          "or record another log and diagnose both: bodyschema diagnose " +
+          log + " SECOND.log --config CONFIG --out " + out + "_both");
+    }
+    if (report.verdict == "named" || report.verdict == "class") {
+      steps.push_back("See on a second log whether it holds: bodyschema diagnose " + log +
+                      " SECOND.log --config CONFIG --out " + out + "_both");
+      steps.push_back("Apply it: bodyschema replay " + log + " --config CONFIG --extended-model " + out +
+                      "/extended_model.yaml --out " + out + "/replay, then bodyschema export " + out +
+                      "/replay/summary.json --config CONFIG --extended-model " + out + "/extended_model.yaml --out " +
+                      out + "/apply");
+    }
+    if (has_motion) {
+      steps.push_back("To tell the causes of the class apart, record the motion in " + out +
+                      "/motion.csv (look at it first: bodyschema-sim --config SIMULATOR --motion " + out +
+                      "/motion.csv --log seen.log --contact-sheet seen.png) and diagnose both logs");
+    }
+    return steps;
+  }
+
   /// What no regression says: which motion is missing altogether.
   void add_remarks(DiagnosisReport& report) const {
     if (auto turn = describe(pipeline_.background_turn()); !turn.empty()) {
@@ -155,6 +189,29 @@ DiagnosisReport diagnose_log(const Configuration& configuration, const LogDiagno
   }
   LogDiagnosis diagnosis(configuration, options, SegmentationMethod::kStatistics);
   return diagnosis.conclude(true);
+}
+
+LogComparison diagnose_logs(const Configuration& configuration, const LogDiagnosisOptions& options,
+                            const std::vector<std::filesystem::path>& logs) {
+  std::vector<DiagnosisReport> reports;
+  std::vector<std::string> names;
+  for (const auto& log : logs) {
+    // Two logs of one name in two folders are told apart by a number.
+    auto name = log.stem().string();
+    if (std::find(names.begin(), names.end(), name) != names.end()) name += fmt::format("_{}", names.size() + 1);
+    auto own = options;
+    own.log = log;
+    if (!own.out.empty()) own.out /= name;
+    reports.push_back(diagnose_log(configuration, own));
+    names.push_back(std::move(name));
+  }
+  const auto setup = RobotSetup::from(configuration.section("robot"));
+  const auto rig = StereoRig::from(configuration.section("cameras"));
+  const auto robot = load_robot(setup, rig);
+  const auto roles = JointRoles::of(robot, setup, rig);
+  auto comparison = compare(reports, std::move(names), roles, across_axes(robot, setup, roles));
+  if (!options.out.empty()) comparison.write(options.out);
+  return comparison;
 }
 
 }  // namespace bodyschema

@@ -10,7 +10,8 @@
 namespace bodyschema::diagnosis {
 
 /// A few of a log's pictures for the page about it: the hand enlarged with the outlines of the fit before and after the
-/// extension, where the extension helps most; with the outline of the encoders as they are where nothing was found.
+/// extension, where the extension helps most, after a picture in which the parts that the answer is about are tinted;
+/// with the outline of the encoders as they are where nothing was found.
 /// @param kept  observations whose pictures are at hand
 std::vector<std::pair<Image, std::string>> draw_pictures(LogFit& fit, const std::vector<Observation>& kept,
                                                          const DiagnosisReport& report);

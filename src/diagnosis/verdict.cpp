@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -12,10 +13,12 @@
 namespace bodyschema::diagnosis {
 namespace {
 
-/// "6.2 mm (5.9 to 6.5)": of a size and its interval, without sign; an interval that reaches over zero says "up to".
+/// "6.2 mm (5.9 to 6.5)": of a size and its interval, where there is one, without sign; an interval that reaches over
+/// zero says "at most".
 std::string amount_text(const DiagnosedParameter& p) {
   const std::string unit = p.unit == "1" ? "" : p.unit == "%" ? " %" : " " + p.unit;
   double low = p.ci95[0], high = p.ci95[1];
+  if (!std::isfinite(low)) return fmt::format("about {:.3g}{}", std::abs(p.estimate), unit);
   if (p.estimate < 0.0) std::tie(low, high) = std::pair(-high, -low);
   if (low < 0.0) return fmt::format("{:.3g}{} (at most {:.3g})", std::abs(p.estimate), unit, high);
   return fmt::format("{:.3g}{} ({:.3g} to {:.3g})", std::abs(p.estimate), unit, low, high);
@@ -28,7 +31,87 @@ std::string capitalised(std::string text) {
   return text;
 }
 
-std::string sentence_of(const DiagnosedCause& cause, const DiagnosisReport& report, const JointRoles& roles) {
+/// "joint coupling of elbow with prosup".
+std::string in_words(CauseName cause) {
+  std::replace(cause.name.begin(), cause.name.end(), '_', ' ');
+  return cause.text();
+}
+
+std::string with_class(const DiagnosedCause& cause) {
+  std::string text = cause.sentence;
+  if (cause.same.size() < 2) return text;
+  text += " (or";
+  for (std::size_t i = 1; i < cause.same.size(); ++i) text += (i > 1 ? ", " : " ") + in_words(cause.same[i]);
+  return text + ", which this log cannot tell from it)";
+}
+
+/// " along +y of the link r_upper_arm": of a size across the axis of a joint; of any other nothing.
+std::string direction_of(const DiagnosedParameter& p, const CauseName& cause, const std::vector<AcrossAxis>& across) {
+  const auto joint = std::find_if(across.begin(), across.end(), [&](const auto& a) { return a.joint == cause.joint; });
+  if (joint == across.end()) return "";
+  for (const std::size_t which : {0u, 1u}) {
+    const auto number = std::to_string(which + 1);
+    const char* word = p.parameter == "shift_" + number ? " along " : p.parameter == "tilt_" + number ? " about " : "";
+    if (*word != '\0') return word + joint->direction(which, p.estimate >= 0.0);
+  }
+  return "";
+}
+
+/// Why no answer of this report is to be trusted; empty: it is.
+std::string why_not(const DiagnosisReport& report) {
+  const auto& causes = report.causes;
+  if (const double found = report.after.outline_found; found < limits::kLeastFound) {
+    return fmt::format(
+        "No cause can be told from this log: only {:.0f} % of the predicted outlines are found in "
+        "the pictures. The parts have another shape, or the masks miss some of them.",
+        100.0 * found);
+  }
+  if (std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.implausible; })) {
+    return "No known cause explains this log: what fits is larger than on any robot.";
+  }
+  if (!report.not_in_model.empty()) {
+    return "The pictures show something that the model lacks: " + report.not_in_model +
+           ". The hand holds a thing, or a part has no mesh.";
+  }
+  if (!report.side_left_over.empty()) {
+    return fmt::format("The model does not explain what is seen: {}.", report.side_left_over);
+  }
+  if (causes.empty() && report.noise_px > 0.0 && report.left_px > limits::kNoiseRatio * report.noise_px) {
+    return fmt::format(
+        "The model does not explain what is seen, and no known cause does: outlines lie off by {:.2f} "
+        "px, and but {:.2f} px of that differ from one part of the log to another.",
+        report.left_px, report.noise_px);
+  }
+  return "";
+}
+
+/// " among the 61 causes that it can test (65 that it cannot)".
+std::string of_how_many(const DiagnosisReport& report) {
+  std::vector<CauseName> tested;
+  for (const auto& limit : report.exclusion_limits) {
+    if (std::find(tested.begin(), tested.end(), limit.cause) == tested.end()) tested.push_back(limit.cause);
+  }
+  if (report.not_testable.empty()) return "";
+  return fmt::format(" among the {} causes that it can test ({} that it cannot)", tested.size(),
+                     report.not_testable.size());
+}
+
+/// Of a model that does not fit there are neither intervals nor limits.
+void forget_intervals(DiagnosisReport& report) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  for (auto* list : {&report.causes, &report.small_causes, &report.estimates}) {
+    for (auto& cause : *list) {
+      for (auto& p : cause.parameters) p.ci95 = {kNone, kNone};
+    }
+  }
+  for (auto& [joint, ci] : report.offsets_ci95_deg) ci = {kNone, kNone};
+  report.exclusion_limits.clear();
+}
+
+}  // namespace
+
+std::string sentence_of(const DiagnosedCause& cause, const DiagnosisReport& report, const JointRoles& roles,
+                        const std::vector<AcrossAxis>& across) {
   if (cause.cause.name == "unexplained") {
     return fmt::format("something follows the {} of {} that no known cause explains", cause.variable,
                        cause.cause.joint);
@@ -41,7 +124,7 @@ std::string sentence_of(const DiagnosedCause& cause, const DiagnosisReport& repo
     if (!p.fitted || next >= cause.parameters.size()) continue;
     const auto& e = cause.parameters[next++];
     p.value = e.estimate * p.si_per_unit;
-    amounts.push_back(amount_text(e));
+    amounts.push_back(amount_text(e) + direction_of(e, cause.cause, across));
     if (when.empty()) when = e.when(report.begin_utime);
   }
   auto text = effect_kind(cause.cause.name).sentence(*effect, roles, amounts);
@@ -49,69 +132,45 @@ std::string sentence_of(const DiagnosedCause& cause, const DiagnosisReport& repo
   return text;
 }
 
-std::string with_class(const DiagnosedCause& cause) {
-  std::string text = cause.sentence;
-  if (cause.same.size() < 2) return text;
-  text += " (or";
-  for (std::size_t i = 1; i < cause.same.size(); ++i) text += (i > 1 ? ", " : " ") + cause.same[i].text();
-  return text + ", which this log cannot tell from it)";
-}
-
-}  // namespace
-
-void word_verdict(DiagnosisReport& report, const JointRoles& roles) {
+void word_verdict(DiagnosisReport& report, const JointRoles& roles, const std::vector<AcrossAxis>& across) {
   const auto is_unexplained = [](const DiagnosedCause& c) { return c.cause.name == "unexplained"; };
-  const auto list_of = [&](std::vector<DiagnosedCause>& which) {
+  const auto list_of = [&](std::vector<DiagnosedCause>& which, bool classes) {
     std::string text;
     for (auto& cause : which) {
-      cause.sentence = sentence_of(cause, report, roles);
+      cause.sentence = sentence_of(cause, report, roles, across);
       // Of a curve in several pieces one is enough.
       if (is_unexplained(cause) && text.find(cause.sentence) != std::string::npos) continue;
-      text += (text.empty() ? "" : "; ") + with_class(cause);
+      text += (text.empty() ? "" : "; ") + (classes ? with_class(cause) : cause.sentence);
     }
     return text;
   };
-  const auto list = list_of(report.causes), small = list_of(report.small_causes);
   const auto& causes = report.causes;
-  const auto unexplained = [&](std::string why) {
+  const auto why = why_not(report);
+  const bool unexplained = !why.empty() || std::any_of(causes.begin(), causes.end(), is_unexplained);
+  if (unexplained) forget_intervals(report);
+  // Of what matters to nobody nobody asks which of several it is.
+  const auto list = list_of(report.causes, true), small = list_of(report.small_causes, false);
+  if (!why.empty()) {
     report.verdict = "unexplained";
-    report.sentence = std::move(why);
+    report.sentence = why;
     if (!list.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + list + ".";
-    report.exclusion_limits.clear();
-  };
-  if (const double found = report.after.outline_found; found < limits::kLeastFound) {
-    return unexplained(
-        fmt::format("No cause can be told from this log: only {:.0f} % of the predicted outlines are found in "
-                    "the pictures. The parts have another shape, or the masks miss some of them.",
-                    100.0 * found));
-  }
-  if (std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.implausible; })) {
-    return unexplained("No known cause explains this log: what fits is larger than on any robot.");
-  }
-  if (!report.not_in_model.empty()) {
-    return unexplained("The pictures show something that the model lacks: " + report.not_in_model +
-                       ". The hand holds a thing, or a part has no mesh.");
-  }
-  if (!report.side_left_over.empty()) {
-    return unexplained(fmt::format("The model does not explain what is seen: {}.", report.side_left_over));
+    return;
   }
   report.crowded = causes.empty() && report.small_causes.size() > 1;
   if (!causes.empty()) {
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });
-    report.verdict = std::any_of(causes.begin(), causes.end(), is_unexplained) ? "unexplained"
-                     : several                                                 ? "class"
-                                                                               : "named";
+    report.verdict = unexplained ? "unexplained" : several ? "class" : "named";
     report.sentence = capitalised(list) + ".";
-    if (report.verdict == "unexplained") report.exclusion_limits.clear();
     return;
   }
   report.verdict = "none";
-  report.sentence = small.empty()
-                        ? "The model explains the log to its noise: nothing but joint offsets was found."
-                        : fmt::format(
-                              "Nothing that matters was found but joint offsets. What is there moves hand and "
-                              "outlines by less than {:.2g} mm: {}.",
-                              report.matters_mm, small);
+  report.sentence =
+      small.empty()
+          ? "The model explains the log to its noise: nothing but joint offsets was found" + of_how_many(report) + "."
+          : fmt::format(
+                "Nothing that matters was found but joint offsets. What is there moves hand and "
+                "outlines by less than {:.2g} mm: {}.",
+                report.matters_mm, small);
 }
 
 }  // namespace bodyschema::diagnosis

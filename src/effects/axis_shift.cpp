@@ -2,6 +2,7 @@
 #include <cstddef>
 
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -28,8 +29,7 @@ EffectKind axis_shift() {
               },
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return "the axis of " + e.target().joint + " lies beside where the URDF has it, by " + amounts[0] +
-                       " and " + amounts.back() + " along two directions across it";
+                return "the axis of " + e.target().joint + " lies beside where the URDF has it, by " + both(amounts);
               },
           .lookalikes = {"link_length", "base_shift"},
           .splitting_motion = "Move the joint and its neighbours one at a time through their full ranges.",

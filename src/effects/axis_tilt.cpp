@@ -1,4 +1,5 @@
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -19,8 +20,7 @@ EffectKind axis_tilt() {
               },
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return "the axis of " + e.target().joint + " is tilted against the URDF's, by " + amounts[0] + " and " +
-                       amounts.back() + " about two directions across it";
+                return "the axis of " + e.target().joint + " is tilted against the URDF's, by " + both(amounts);
               },
           .not_testable = [](const EffectTarget& target, const JointRoles& roles,
                              const LogMotion& motion) { return too_little_motion(target.joint, roles, motion); },

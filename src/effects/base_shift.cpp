@@ -1,4 +1,5 @@
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -15,11 +16,14 @@ EffectKind base_shift() {
                              });
               },
           .sentence =
-              [](const Effect&, const JointRoles&, std::span<const std::string> amounts) {
-                std::string text =
-                    "the arm is mounted elsewhere, seen from the cameras: moved along the root's axes by ";
-                for (std::size_t i = 0; i < amounts.size(); ++i) text += (i > 0 ? ", " : "") + amounts[i];
-                return text;
+              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+                std::string text;
+                for (std::size_t i = 0; i < amounts.size(); ++i) {
+                  const auto axis = (e.parameters()[i].value < 0.0 ? -1.0 : 1.0) *
+                                    Eigen::Vector3d::Unit(static_cast<Eigen::Index>(i));
+                  text += (i > 0 ? ", " : "") + amounts[i] + " along " + direction_in_words(axis);
+                }
+                return "the arm is mounted elsewhere, seen from the cameras: moved by " + text + " of the root link";
               },
           .not_testable = [](const EffectTarget&, const JointRoles& roles, const LogMotion& motion) -> std::string {
             constexpr double kHeadStill = 5.0 * kDeg;

@@ -2,6 +2,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -35,8 +36,11 @@ EffectKind link_length() {
                 const auto joint = roles.index(e.target().joint);
                 const auto link = std::find_if(roles.links.begin(), roles.links.end(),
                                                [&](const ArmLink& l) { return l.joint == joint; });
-                return "the link " + link->name + ", which ends at " + e.target().joint + ", is " + amounts[0] +
-                       by_sign(e.parameters()[0], " longer", " shorter") + " than in the URDF";
+                const auto part = part_in_words(link->name);
+                // A link that is called by its place in the arm needs no more.
+                const auto where = part.starts_with("the link ") ? ", which ends at " + e.target().joint + "," : "";
+                return part + where + " is " + amounts[0] + by_sign(e.parameters()[0], " longer", " shorter") +
+                       " than in the URDF";
               },
           .lookalikes = {"axis_shift"},
           .splitting_motion = "Show the hand near and far, and from palm and back.",

@@ -1,4 +1,5 @@
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -16,7 +17,7 @@ EffectKind mesh_scale() {
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
                 return (e.target().source.empty() ? "all parts of the body are "
-                                                  : "the part " + e.target().source + " is ") +
+                                                  : part_in_words(e.target().source) + " is ") +
                        amounts[0] + by_sign(e.parameters()[0], " larger", " smaller") + " than in the meshes";
               },
           .lookalikes = {"silhouette_bias", "focal_length"},

@@ -1,4 +1,5 @@
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -16,7 +17,8 @@ EffectKind silhouette_bias() {
               },
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return "the outline " + (e.target().source.empty() ? "" : "of " + e.target().source + " ") +
+                return "the outline " +
+                       (e.target().source.empty() ? "" : "of " + part_in_words(e.target().source) + " ") +
                        "in the pictures lies " + amounts[0] + by_sign(e.parameters()[0], " outside", " inside") +
                        " that of the meshes";
               },

@@ -235,10 +235,11 @@ std::string date_text(Microseconds utime) {
 std::string causes_text(const FleetLog& log) {
   std::vector<std::string> parts;
   for (const auto& cause : log.causes) {
-    parts.push_back(std::isfinite(cause.estimate)
-                        ? fmt::format("{}: {:.3g} {} ({:.3g} to {:.3g})", cause.name, cause.estimate, cause.unit,
-                                      cause.ci95[0], cause.ci95[1])
-                        : cause.name);
+    auto text = cause.name;
+    if (std::isfinite(cause.estimate)) text += fmt::format(": {:.3g} {}", cause.estimate, cause.unit);
+    // What a diagnosis does not explain has none.
+    if (std::isfinite(cause.ci95[0])) text += fmt::format(" ({:.3g} to {:.3g})", cause.ci95[0], cause.ci95[1]);
+    parts.push_back(std::move(text));
   }
   return fmt::format("{}", fmt::join(parts, "; "));
 }

@@ -117,6 +117,21 @@ cv::Mat header(int width_px, const Pen& pen, const std::string& caption, const O
   return bar;
 }
 
+void tint(cv::Mat& picture, const BinaryMask& mask, int enlargement) {
+  if (mask.empty()) return;
+  const cv::Vec3b orange(255, 150, 0);
+  constexpr double kOpaque = 0.55;
+  for (int v = 0; v < picture.rows; ++v) {
+    for (int u = 0; u < picture.cols; ++u) {
+      if (!mask.at(u / enlargement, v / enlargement)) continue;
+      auto& pixel = picture.at<cv::Vec3b>(v, u);
+      for (int c = 0; c < 3; ++c) {
+        pixel[c] = cv::saturate_cast<std::uint8_t>((1.0 - kOpaque) * pixel[c] + kOpaque * orange[c]);
+      }
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<OverlayView> overlay_views(Pipeline& pipeline, const Observation& observation, const Estimate& estimate) {
@@ -162,6 +177,7 @@ Image draw_overlay(const std::vector<OverlayView>& views, const std::string& cap
   for (const auto& view : views) {
     cv::Mat picture;
     cv::resize(to_matrix(*view.image), picture, {}, enlargement, enlargement, cv::INTER_LINEAR);
+    tint(picture, view.marked, enlargement);
     draw_outline(picture, view.nominal, enlargement, pen.px(1.0), kRed);
     draw_outline(picture, view.corrected, enlargement, pen.px(1.0), kGreen);
     const cv::Rect shown = shown_part(view);

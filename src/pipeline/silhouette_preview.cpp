@@ -43,6 +43,20 @@ BinaryMask SilhouettePreview::draw(const Eigen::Ref<const Eigen::VectorXd>& q, c
   return k1 == 0.0 ? silhouette : bent(silhouette, projection_.intrinsics(camera), k1);
 }
 
+BinaryMask SilhouettePreview::draw_parts(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
+                                         std::size_t camera, const std::vector<bool>& parts) {
+  camera_ = camera;
+  projection_.place(q, corrections, camera);
+  projection_.parts(X_CB_);
+  constexpr float kOutOfSight_m = 1000.0f;  // to the side
+  for (std::size_t part = 0; part < X_CB_.size(); ++part) {
+    if (!parts[part]) X_CB_[part].pretranslate(Eigen::Vector3f(kOutOfSight_m, 0.0f, 0.0f));
+  }
+  const BinaryMask silhouette = scorer_->render(X_CB_, camera);
+  const double k1 = corrections.camera.k1;
+  return k1 == 0.0 ? silhouette : bent(silhouette, projection_.intrinsics(camera), k1);
+}
+
 Eigen::Vector2d SilhouettePreview::hand() const {
   const Eigen::Vector3d p = projection_.hand().translation();
   const auto& k = projection_.intrinsics(camera_);

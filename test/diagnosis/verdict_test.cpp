@@ -1,6 +1,8 @@
 #include "verdict.hpp"
 
 #include <gmock/gmock.h>
+
+#include <cmath>
 #include <gtest/gtest.h>
 
 #include "effects/roles.hpp"
@@ -93,7 +95,7 @@ TEST(Verdict, SaysAClassWhereSeveralFit) {
   const auto report = worded(report_of({cause}));
   EXPECT_EQ(report.verdict, "class");
   EXPECT_THAT(report.sentence,
-              HasSubstr("(or eccentricity of elbow, joint_coupling of elbow with prosup, which this log cannot "
+              HasSubstr("(or eccentricity of elbow, joint coupling of elbow with prosup, which this log cannot "
                         "tell from it)"));
 }
 
@@ -104,7 +106,7 @@ TEST(Verdict, TrustsNoNameOfASizeThatNoRobotHas) {
   const auto report = worded(report_of({cause}));
   EXPECT_EQ(report.verdict, "unexplained");
   EXPECT_THAT(report.sentence, HasSubstr("larger than on any robot"));
-  EXPECT_THAT(report.sentence, HasSubstr("may only stand in for it: elbow turns 4 %"));
+  EXPECT_THAT(report.sentence, HasSubstr("may only stand in for it: elbow turns about 4 % further"));
   EXPECT_THAT(report.exclusion_limits, IsEmpty());
 }
 
@@ -143,6 +145,29 @@ TEST(Verdict, AnOutlineThatLiesOffOnOneSideIsNotExplained) {
   EXPECT_THAT(report.exclusion_limits, IsEmpty());
 }
 
+TEST(Verdict, WhatIsNotExplainedHasNoIntervals) {
+  auto report = report_of({gain_of_elbow()});
+  report.side_left_over = "the left outline of hand lies 0.8 px outside of where the model has it";
+  report.offsets_ci95_deg = {{"elbow", {1.0, 1.2}}};
+  report = worded(std::move(report));
+  EXPECT_TRUE(std::isnan(report.causes[0].parameters[0].ci95[0]));
+  EXPECT_TRUE(std::isnan(report.offsets_ci95_deg.at("elbow")[1]));
+  EXPECT_THAT(report.sentence, Not(HasSubstr("3.5 to 4.5")));
+}
+
+/// An error that is alike in every block moves no test between blocks.
+TEST(Verdict, MoreThanPixelNoiseIsNotNothing) {
+  auto report = report_of({});
+  report.noise_px = 0.3;
+  report.left_px = 0.36;
+  EXPECT_EQ(worded(report).verdict, "none");
+  report.left_px = 0.45;
+  report = worded(std::move(report));
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, HasSubstr("0.45 px, and but 0.30 px of that differ"));
+  EXPECT_THAT(report.exclusion_limits, IsEmpty());
+}
+
 TEST(Verdict, SaysWhatAnUnknownStructureFollows) {
   DiagnosedCause cause;
   cause.cause = {"unexplained", "elbow", ""};
@@ -159,6 +184,11 @@ TEST(Verdict, OfNothingSaysSoAndKeepsItsLimits) {
   EXPECT_EQ(report.verdict, "none");
   EXPECT_THAT(report.sentence, HasSubstr("to its noise"));
   EXPECT_FALSE(report.exclusion_limits.empty());
+  // Five stills can test next to nothing, and finding nothing there says as much.
+  auto poor = report_of({});
+  poor.not_testable = {{{"latency", "", ""}, "the arm stands still"}, {{"slip", "elbow", ""}, "too few postures"}};
+  EXPECT_THAT(worded(std::move(poor)).sentence,
+              HasSubstr("nothing but joint offsets was found among the 1 causes that it can test (2 that it cannot)."));
 }
 
 TEST(Verdict, OfACrowdDoesNotSayThatNothingIsLeft) {

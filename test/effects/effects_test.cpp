@@ -101,8 +101,8 @@ TEST(Catalogue, EffectsSayWhatTheyFollow) {
 TEST(Catalogue, EveryParameterHasItsMeaningInTheHandbook) {
   const auto r = roles();
   for (const auto& name : shipped_effects()) {
-    std::ifstream page(std::string(BODYSCHEMA_SOURCE_DIR) + "/docs/diagnose.md");
-    ASSERT_TRUE(page) << "docs/diagnose.md";
+    std::ifstream page(std::string(BODYSCHEMA_SOURCE_DIR) + "/docs/diagnosis_reference.md");
+    ASSERT_TRUE(page) << "docs/diagnosis_reference.md";
     const auto begin = "| `" + name + "` | ";
     std::string line, row;
     while (std::getline(page, line)) {
@@ -119,7 +119,7 @@ TEST(Catalogue, EveryParameterHasItsMeaningInTheHandbook) {
       last = &p;
     }
     EXPECT_TRUE(row.starts_with(begin + names + " " + last->unit + " | "))
-        << "docs/diagnose.md: expected a row '" << begin << names << " " << last->unit << " | meaning |', found '"
+        << "docs/diagnosis_reference.md: expected a row '" << begin << names << " " << last->unit << " | meaning |', found '"
         << row << "'";
   }
 }

@@ -180,6 +180,8 @@ struct Parameters {
         const double value = fault["value"].get<double>();
         const auto number = [&](const Json& j) { return j.is_number() ? j.get<double>() : std::nan(""); };
         const double low = number((*p)["ci95"][0]), high = number((*p)["ci95"][1]);
+        // An answer that is not explained claims no interval.
+        if (std::isnan(low)) continue;
         ++known;
         near += std::abs(number((*p)["estimate"]) - value) <= kNear * std::abs(value);
         held += low <= value && value <= high;

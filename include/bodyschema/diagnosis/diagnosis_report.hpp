@@ -109,9 +109,15 @@ struct DiagnosisReport {
   std::vector<DiagnosedCause> causes;
   std::vector<NotTestable> not_testable;
   std::vector<ExclusionLimit> exclusion_limits;
+  /// What the log says of every cause that it tells and that is not in the answer: sizes beside the extended model. For
+  /// comparing logs (log_comparison.hpp); in report.json they are the exclusion limits.
+  std::vector<DiagnosedCause> estimates;
   /// What is left on one side of one part, in block after block: "the left outline of r_hand lies 0.8 px outside of
   /// where the model has it in the pictures of left". Empty: nothing.
   std::string side_left_over;
+  /// What the final model leaves of the outlines, rms, and what of it differs from block to block. The rest is alike in
+  /// all of them at the same places of the robot's surface: pixels do not err so, a model does.
+  double left_px = 0.0, noise_px = 0.0;
   /// What the pictures show beside the robot through most of the log, where no outline is looked for: "14 cm2 beside
   /// the robot, in 96 % of the log". Something is held, or a part has no mesh. Empty: nothing.
   std::string not_in_model;
@@ -124,6 +130,7 @@ struct DiagnosisReport {
   std::map<std::string, double> offsets_deg_before, offsets_deg_after;
   std::map<std::string, std::array<double, 2>> offsets_ci95_deg;
   std::vector<std::string> warnings;
+  std::vector<std::string> next_steps;  ///< what to do with the answer, with commands
 
   // For charts.
   std::vector<std::string> arm_joints;

@@ -5,6 +5,7 @@
 
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/diagnosis/diagnoser.hpp"
+#include "bodyschema/diagnosis/log_comparison.hpp"
 
 namespace bodyschema {
 
@@ -20,5 +21,11 @@ struct LogDiagnosisOptions {
 /// The background is learned from the whole log, the estimator gives offsets to start from.
 /// Throws Error; DataError says what to record where the log cannot be used.
 DiagnosisReport diagnose_log(const Configuration& configuration, const LogDiagnosisOptions& options);
+
+/// Diagnoses several logs of one robot, in the order in which they were recorded, each into a folder of its own in
+/// `out`, and compares them: comparison.json and comparison.html. Throws as diagnose_log.
+/// @param options  `log` is not looked at
+LogComparison diagnose_logs(const Configuration& configuration, const LogDiagnosisOptions& options,
+                            const std::vector<std::filesystem::path>& logs);
 
 }  // namespace bodyschema

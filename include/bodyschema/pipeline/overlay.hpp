@@ -20,6 +20,7 @@ struct OverlayView {
   const Image* image = nullptr;
   BinaryMask nominal;
   BinaryMask corrected;
+  BinaryMask marked{};  ///< pixels that are tinted orange; empty: none
   /// Left edge, top edge, width and height in px of the part that is shown; zero width: all.
   std::array<int, 4> part{};
   /// Length in px of a metre across the line of sight, as far away as the hand; 0: not known, no scale bar.

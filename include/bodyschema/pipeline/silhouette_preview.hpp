@@ -15,6 +15,9 @@ class SilhouettePreview {
   /// @param q  encoders, rad, RobotModel order
   /// @param corrections  what the model adds to them and to the camera
   BinaryMask draw(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera);
+  /// The same of some parts alone, by position in RobotSetup's rendered links, whatever hides them.
+  BinaryMask draw_parts(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera,
+                        const std::vector<bool>& parts);
   /// The hand's pixel in the last drawn picture; behind the camera: not finite.
   [[nodiscard]] Eigen::Vector2d hand() const;
   /// Length in px of a metre across the line of sight at the hand's distance; behind the camera: 0.

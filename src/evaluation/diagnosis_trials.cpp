@@ -1,0 +1,310 @@
+#include "diagnosis_trials.hpp"
+
+#include <spdlog/fmt/fmt.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "bodyschema/bus/log.hpp"
+#include "bodyschema/core/progress_bar.hpp"
+#include "bodyschema/diagnosis/log_diagnosis.hpp"
+#include "bodyschema/simulator/random.hpp"
+#include "bodyschema/simulator/recording.hpp"
+
+namespace bodyschema::diagnosis_trials {
+namespace {
+
+namespace fs = std::filesystem;
+using simulator::FaultSpec;
+
+using HandTruth = std::map<std::pair<Microseconds, std::size_t>, Eigen::Vector3d>;
+
+/// Faults of covers, cameras and held things, which draw_fault does not draw; sizes from invisible to gross.
+struct Drawn {
+  const char* spec;
+  double least, most;  ///< of `value`, in its unit; 0: it has none
+};
+constexpr std::array<Drawn, 9> kCoversAndCameras = {{{"mesh_scale:part=hand", 0.3, 8.0},
+                                                     {"mesh_scale:part=forearm", 0.3, 8.0},
+                                                     {"cover_dilation:part=hand", 0.1, 3.0},
+                                                     {"cover_dilation:part=forearm", 0.1, 3.0},
+                                                     {"camera_rotation:source=left,axis=x", 0.1, 2.0},
+                                                     {"camera_rotation:source=right,axis=z", 0.1, 2.0},
+                                                     {"held:thing=stick", 0.0, 0.0},
+                                                     {"held:thing=bottle", 0.0, 0.0},
+                                                     {"held:thing=box", 0.0, 0.0}}};
+constexpr double kShareOfCoversAndCameras = 0.25;
+
+std::string argument(const FaultSpec& fault, const char* key) {
+  const auto at = fault.arguments.find(key);
+  return at == fault.arguments.end() ? std::string() : at->second;
+}
+
+bool among(const RightAnswers& answers, const CauseName& cause) {
+  return std::find(answers.begin(), answers.end(), cause) != answers.end();
+}
+
+bool is_held(const FaultSpec& fault) {
+  return fault.name == "held";
+}
+
+double hand_error_mm(const DiagnosisReport& report, const HandTruth& truth, Remainder ResidualSample::*which) {
+  double square = 0.0, n = 0.0;
+  for (const auto& sample : report.samples) {
+    const auto at = truth.find({sample.utime, sample.camera});
+    if (at == truth.end() || (sample.*which).rms_px <= 0.0) continue;
+    square += ((sample.*which).hand_C_m - at->second).squaredNorm();
+    n += 1.0;
+  }
+  return n > 0.0 ? 1e3 * std::sqrt(square / n) : 0.0;
+}
+
+/// A robot that is simulated, and the configuration with which its logs are diagnosed.
+class TrialRobot {
+ public:
+  TrialRobot(const Configuration& simulated, Configuration diagnosed, bool masks)
+      : setup_(RobotSetup::from(simulated.section("robot"))), rig_(StereoRig::from(simulated.section("cameras"))),
+        robot_(load_robot(setup_, rig_)), roles_(JointRoles::of(robot_, setup_, rig_)),
+        settings_(simulator::SimulatorSettings::from(simulated.section("simulator"))),
+        configuration_(std::move(diagnosed)), masks_(masks), size_(masks ? kMasks : kPictures) {
+    settings_.camera_rate_hz = size_.rate_hz;
+    if (!masks_) return;
+    constexpr double kOutline_px = 0.3;
+    settings_.outline_noise.sd_px = kOutline_px;
+    settings_.background_frames = settings_.entry_frames = 0;
+  }
+
+  [[nodiscard]] std::vector<FaultSpec> draw(Row row, std::uint64_t seed) const {
+    simulator::FaultSite site(robot_, setup_, rig_);
+    site.begin_s = 0.0;
+    site.end_s = size_.seconds;
+    simulator::Random random(seed, "size of the fault");
+    if (row == kSingle && random.uniform(0.0, 1.0) < kShareOfCoversAndCameras) return {draw_cover_or_camera(random)};
+    simulator::DrawOptions options;
+    options.outside_catalogue = row == kOutside;
+    std::vector<FaultSpec> faults;
+    // Single causes of all sizes, from invisible to gross; of several, those that are well seen alone; in the
+    // background, those that are not.
+    const auto [lowest, highest] = row == kSingle       ? std::pair(0.3, 15.0)
+                                   : row == kBackground ? std::pair(0.2, 0.8)
+                                                        : std::pair(4.0, 10.0);
+    constexpr int kCrowd = 9;
+    const int count = row == kNull ? 0 : row == kTwo ? 2 : row == kBackground ? kCrowd : 1;
+    for (int i = 0; i < count; ++i) {
+      options.multiple_of_detectable = lowest * std::pow(highest / lowest, random.uniform(0.0, 1.0));
+      faults.push_back(simulator::draw_fault(seed + 100000u * static_cast<std::uint64_t>(i), site, options));
+      options.exclude.push_back(faults.back().name);
+    }
+    return faults;
+  }
+
+  [[nodiscard]] RightAnswers answers_to(const FaultSpec& fault) const {
+    const auto part = argument(fault, "part"), joint = argument(fault, "joint"), source = argument(fault, "source");
+    if (is_held(fault)) return {};
+    if (fault.name == "camera_rotation") {
+      return {{"camera_pair", "", ""}, {"vergence", "", ""}, {"principal_point", "", "difference"}};
+    }
+    if (part.empty()) return {{fault.name, joint, source}};
+    RightAnswers answers;
+    for (const auto* name : {"mesh_scale", "silhouette_bias"}) answers.push_back({name, "", segment_of(part)});
+    return answers;
+  }
+
+  Outcome run(Row row, std::uint64_t seed) const;
+
+ private:
+  static FaultSpec draw_cover_or_camera(simulator::Random& random) {
+    const auto& drawn = kCoversAndCameras[random.below(kCoversAndCameras.size())];
+    auto fault = FaultSpec::parse(drawn.spec);
+    if (drawn.most <= 0.0) return fault;
+    // A cover is never drilled out: it is as moulded, or thicker.
+    const double sign = fault.name == "cover_dilation" ? 1.0 : random.sign();
+    return fault.set("value", sign * drawn.least * std::pow(drawn.most / drawn.least, random.uniform(0.0, 1.0)));
+  }
+
+  /// The segment of the diagnosis that is called so here: the hand, or what comes before it.
+  [[nodiscard]] std::string segment_of(const std::string& part) const {
+    if (part == "hand") return setup_.hand_link;
+    for (const auto& segment : roles_.segments) {
+      if (segment.name.find(part) != std::string::npos) return segment.name;
+    }
+    return part;
+  }
+
+  void simulate(const simulator::SimulationPlan& plan, const fs::path& file, HandTruth& truth) const {
+    simulator::Simulator simulator(robot_, setup_, rig_, settings_, plan);
+    LogWriter log(file);
+    simulator::FramePublisher::Options format;
+    if (masks_) format.format = simulator::PictureFormat::kMasks;
+    simulator::FramePublisher publisher(simulator.joint_names(), format);
+    while (const auto frame = simulator.next()) {
+      publisher.publish(*frame, log);
+      for (std::size_t c = 0; c < frame->cameras.size(); ++c) {
+        if (frame->cameras[c]) truth[{frame->cameras[c]->utime, c}] = frame->truth[c].X_CP.translation();
+      }
+    }
+  }
+
+  RobotSetup setup_;
+  StereoRig rig_;
+  std::shared_ptr<const RobotModel> robot_;
+  JointRoles roles_;
+  simulator::SimulatorSettings settings_;
+  Configuration configuration_;
+  bool masks_;
+  LogSize size_;
+};
+
+Outcome TrialRobot::run(Row row, std::uint64_t seed) const {
+  static std::atomic<int> number{0};
+  const auto file = fs::temp_directory_path() / fmt::format("bodyschema_{}_diagnosis_{}.log", getpid(), number++);
+  Outcome outcome;
+  outcome.row = row;
+  outcome.seed = seed;
+  outcome.faults = draw(row, seed);
+  for (const auto& fault : outcome.faults) outcome.answers.push_back(answers_to(fault));
+  simulator::SimulationPlan plan;
+  plan.seed = seed;
+  plan.motion = simulator::Motion::kBabble;
+  plan.seconds = size_.seconds;
+  plan.faults = outcome.faults;
+  if (masks_) plan.output = simulator::Output::kSilhouettes;
+  simulator::Random random(seed, "offsets");
+  for (const auto& joint : setup_.estimated_joints) plan.offsets_deg[joint] = random.uniform(-7.0, 7.0);
+  HandTruth truth;
+  simulate(plan, file, truth);
+  LogDiagnosisOptions options;
+  options.log = file;
+  options.picture_rate_hz = size_.rate_hz;
+  options.threads = 1;  // other logs run beside this one
+  options.quiet = true;
+  outcome.report = diagnose_log(configuration_, options);
+  std::error_code error;
+  fs::remove(file, error);
+  outcome.size_mm = hand_error_mm(outcome.report, truth, &ResidualSample::before);
+  outcome.left_mm = hand_error_mm(outcome.report, truth, &ResidualSample::after);
+  outcome.size_px = outcome.report.before.rms_px;  // the noise of healthy logs comes off once that is known
+  return outcome;
+}
+
+/// What a configuration needs for pictures that are masks.
+std::vector<std::string> vision_of(const ExperimentContext& context) {
+  if (!context.options.masks) return {};
+  return {"vision.method=single_colour", "vision.background_rgb=[0, 0, 0]"};
+}
+
+std::optional<TrialRobot> official_robot(const ExperimentContext& context) {
+  const auto models = context.options.data / "icub-models";
+  if (!fs::is_directory(models)) return std::nullopt;
+  const auto folder = context.recorded / "icub_v2_5";
+  // The configurations look for the data where BODYSCHEMA_DATA says; here it is where the caller says.
+  const std::vector<std::string> overrides = {
+      "robot.urdf=" + (models / "iCub_manual/robots/iCubGazeboV2_5_visuomanip/model.urdf").string(),
+      "robot.mesh_search_roots=[\"" + models.string() + "\"]"};
+  auto diagnosed = overrides;
+  for (auto& wish : vision_of(context)) diagnosed.push_back(std::move(wish));
+  return std::optional<TrialRobot>(std::in_place, Configuration::load(folder / "simulator.yaml", overrides),
+                                   Configuration::load(folder / "estimator.yaml", diagnosed), context.options.masks);
+}
+
+}  // namespace
+
+double Outcome::size() const {
+  const bool held = std::any_of(faults.begin(), faults.end(), is_held);
+  // No outline of the model shows a thing that is held: it is as large as it is.
+  return held ? 1e3 : std::max(size_mm / kMatters_mm, size_px / kMatters_px);
+}
+
+bool is_named(const Outcome& o) {
+  return o.report.verdict == "named" || o.report.verdict == "class";
+}
+
+bool is_found(const Outcome& o, std::size_t fault) {
+  if (is_held(o.faults[fault])) return !o.report.not_in_model.empty();
+  return is_named(o) && std::any_of(o.report.causes.begin(), o.report.causes.end(), [&](const DiagnosedCause& cause) {
+           return std::any_of(cause.same.begin(), cause.same.end(),
+                              [&](const auto& name) { return among(o.answers[fault], name); });
+         });
+}
+
+bool is_first(const Outcome& o) {
+  if (is_held(o.faults[0])) return is_found(o, 0);
+  return is_named(o) && !o.report.causes.empty() && among(o.answers[0], o.report.causes.front().cause);
+}
+
+bool is_wrong(const Outcome& o) {
+  if (!is_named(o)) return false;
+  return std::any_of(o.report.causes.begin(), o.report.causes.end(), [&](const DiagnosedCause& cause) {
+    return std::none_of(o.answers.begin(), o.answers.end(), [&](const RightAnswers& answers) {
+      return std::any_of(cause.same.begin(), cause.same.end(), [&](const auto& name) { return among(answers, name); });
+    });
+  });
+}
+
+bool is_not_explained_away(const Outcome& o) {
+  if (o.report.verdict != "class") return o.report.verdict == "unexplained";
+  const auto joint = argument(o.faults[0], "joint");
+  return std::any_of(o.report.causes.begin(), o.report.causes.end(), [&](const DiagnosedCause& cause) {
+    return std::any_of(cause.same.begin(), cause.same.end(),
+                       [&](const auto& name) { return name.joint == joint || name.source == joint; });
+  });
+}
+
+std::vector<Outcome> run(ExperimentContext& context) {
+  const TrialRobot own(context.simulated,
+                       Configuration::load(context.recorded / "icub_right" / "estimator.yaml", vision_of(context)),
+                       context.options.masks);
+  const auto official = official_robot(context);
+  constexpr long kEveryFourth = 4;
+  struct Job {
+    Row row;
+    std::uint64_t seed;
+    const TrialRobot* robot;
+  };
+  std::vector<Job> jobs;
+  for (int row = 0; row < kRows; ++row) {
+    const auto count =
+        std::max(1L, std::lround(kLogsOf60[static_cast<std::size_t>(row)] * context.options.trials / 60.0));
+    for (long i = 0; i < count; ++i) {
+      const bool other = official && i % kEveryFourth == kEveryFourth - 1;
+      jobs.push_back({static_cast<Row>(row),
+                      context.options.seed + 1000u * static_cast<std::uint64_t>(row) + static_cast<std::uint64_t>(i),
+                      other ? &*official : &own});
+    }
+  }
+  std::vector<Outcome> outcomes(jobs.size());
+  ProgressBar bar("logs with hidden faults", jobs.size());
+  std::atomic<std::size_t> next{0}, done{0};
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    for (std::size_t i; (i = next++) < jobs.size();) {
+      try {
+        outcomes[i] = jobs[i].robot->run(jobs[i].row, jobs[i].seed);
+        outcomes[i].official = jobs[i].robot != &own;
+      } catch (...) {
+        const std::scoped_lock lock(mutex);
+        failure = std::current_exception();
+        next = jobs.size();
+      }
+      const std::scoped_lock lock(mutex);
+      bar.set(++done);
+    }
+  };
+  const int wanted = context.options.threads > 0 ? context.options.threads
+                                                 : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  std::vector<std::jthread> threads;
+  for (int t = 1; t < wanted; ++t) threads.emplace_back(work);
+  work();
+  threads.clear();
+  if (failure) std::rethrow_exception(failure);
+  return outcomes;
+}
+
+}  // namespace bodyschema::diagnosis_trials

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bodyschema/diagnosis/diagnosis_report.hpp"
+#include "bodyschema/simulator/fault.hpp"
+#include "experiments.hpp"
+
+/// Logs of rendered pictures in which the simulator's physics hides faults, and what the diagnosis says of them.
+namespace bodyschema::diagnosis_trials {
+
+struct LogSize {
+  double seconds, rate_hz;
+};
+inline constexpr LogSize kPictures = {60.0, 10.0}, kMasks = {40.0, 5.0};
+/// A cause of this size is one that a user wants to know; those at the limit have a quarter to a half of it.
+inline constexpr double kMatters_mm = 2.0, kMatters_px = 1.0;
+
+enum Row { kNull, kBackground, kSingle, kTwo, kOutside, kRows };
+/// For 60 logs with one cause. Those come in all sizes, so that of more of them some are at the limit.
+inline constexpr std::array<double, kRows> kLogsOf60 = {100, 20, 90, 25, 20};
+inline constexpr std::array<const char*, kRows> kNames = {"null", "background", "single", "two", "outside"};
+
+/// What a fault of the simulator is called in a diagnosis: any of these is right.
+using RightAnswers = std::vector<CauseName>;
+
+struct Outcome {
+  Row row = kNull;
+  std::uint64_t seed = 0;
+  bool official = false;  ///< the official iCub's, not our own robot's
+  std::vector<simulator::FaultSpec> faults;
+  std::vector<RightAnswers> answers;  ///< of each; none for a thing that is held: no cause names it
+  DiagnosisReport report;
+  double size_mm = 0.0, size_px = 0.0;  ///< of the faults, offsets and nuisances fitted
+  double left_mm = 0.0;                 ///< of the hand's error under the extended model
+  [[nodiscard]] double size() const;
+};
+
+/// Whether the answer stands behind what it lists.
+bool is_named(const Outcome& o);
+/// The fault is in the class of some cause that is named; a thing that is held is said to be there.
+bool is_found(const Outcome& o, std::size_t fault);
+/// ... and stands first in it, as the cause with the largest gain.
+bool is_first(const Outcome& o);
+/// Something is named that is not there.
+bool is_wrong(const Outcome& o);
+/// For a fault that no cause describes: unexplained, or a class that holds its joint.
+bool is_not_explained_away(const Outcome& o);
+
+/// Simulates and diagnoses all rows' logs, options.trials of 60; every fourth is of the official iCub where its data
+/// is there.
+std::vector<Outcome> run(ExperimentContext& context);
+
+}  // namespace bodyschema::diagnosis_trials

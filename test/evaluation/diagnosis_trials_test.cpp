@@ -1,0 +1,78 @@
+#include "diagnosis_trials.hpp"
+
+#include <gtest/gtest.h>
+
+namespace bodyschema::diagnosis_trials {
+namespace {
+
+using simulator::FaultSpec;
+
+DiagnosedCause named(const CauseName& name) {
+  DiagnosedCause cause;
+  cause.cause = name;
+  cause.same = {name};
+  return cause;
+}
+
+Outcome outcome(const char* fault, RightAnswers answers, std::vector<DiagnosedCause> causes) {
+  Outcome o;
+  o.row = kSingle;
+  o.faults = {FaultSpec::parse(fault)};
+  o.answers = {std::move(answers)};
+  o.report.verdict = causes.empty() ? "none" : "named";
+  o.report.causes = std::move(causes);
+  return o;
+}
+
+const CauseName kLatency{"latency", "", ""}, kGain{"encoder_gain", "elbow", ""}, kCover{"mesh_scale", "", "hand"},
+    kBias{"silhouette_bias", "", "hand"};
+
+TEST(DiagnosisTrials, WhatIsNamedIsRightOrWrong) {
+  const auto right = outcome("latency:value=40", {kLatency}, {named(kLatency)});
+  EXPECT_TRUE(is_found(right, 0));
+  EXPECT_TRUE(is_first(right));
+  EXPECT_FALSE(is_wrong(right));
+  const auto wrong = outcome("latency:value=40", {kLatency}, {named(kGain)});
+  EXPECT_FALSE(is_found(wrong, 0));
+  EXPECT_TRUE(is_wrong(wrong));
+  auto second = outcome("latency:value=40", {kLatency}, {named(kGain)});
+  second.report.causes[0].same.push_back(kLatency);
+  EXPECT_TRUE(is_found(second, 0));
+  EXPECT_FALSE(is_first(second));
+  EXPECT_FALSE(is_wrong(second));
+}
+
+TEST(DiagnosisTrials, OfACoverThePartIsTheAnswer) {
+  EXPECT_TRUE(is_first(outcome("cover_dilation:part=hand,value=2", {kCover, kBias}, {named(kCover)})));
+}
+
+/// What an unexplained answer lists stands in for something: it neither finds nor errs.
+TEST(DiagnosisTrials, WhatTheAnswerDoesNotStandBehindCountsForNothing) {
+  auto o = outcome("latency:value=40", {kLatency}, {named(kLatency), named(kGain)});
+  o.report.verdict = "unexplained";
+  EXPECT_FALSE(is_found(o, 0));
+  EXPECT_FALSE(is_wrong(o));
+}
+
+TEST(DiagnosisTrials, AThingThatIsHeldIsFoundWhereSomethingIsSaidToBeThere) {
+  auto o = outcome("held:thing=stick", {}, {});
+  EXPECT_FALSE(is_found(o, 0));
+  EXPECT_GT(o.size(), 1.0);
+  o.report.verdict = "unexplained";
+  o.report.not_in_model = "14 cm2 beside the robot";
+  EXPECT_TRUE(is_first(o));
+}
+
+TEST(DiagnosisTrials, OutsideTheCatalogueTheJointIsEnough) {
+  auto o = outcome("wobble:joint=elbow,value=1", {{"wobble", "elbow", ""}}, {named(kGain)});
+  EXPECT_FALSE(is_not_explained_away(o)) << "one name for it is wrong";
+  o.report.verdict = "class";
+  EXPECT_TRUE(is_not_explained_away(o));
+  o.report.causes = {named(kLatency)};
+  EXPECT_FALSE(is_not_explained_away(o));
+  o.report.verdict = "unexplained";
+  EXPECT_TRUE(is_not_explained_away(o));
+}
+
+}  // namespace
+}  // namespace bodyschema::diagnosis_trials
