@@ -15,6 +15,7 @@
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/core/write_file.hpp"
 #include "bodyschema/evidence/batch_fit.hpp"
+#include "bodyschema/evidence/outline_distance.hpp"
 #include "bodyschema/pipeline/watched_log.hpp"
 #include "calibration_files.hpp"
 #include "next_posture.hpp"
@@ -144,12 +145,12 @@ class Calibrator {
   BatchFit fitted(LogFit& fit, const std::vector<StereoRig>& starts, const std::vector<std::size_t>& pictures) {
     std::optional<BatchFit> best;
     StereoRig best_rig;
-    std::vector<std::pair<double, std::vector<Eigen::Vector3d>>> answers;
+    std::vector<std::pair<double, std::vector<CalibratedView>>> answers;
     std::size_t best_answer = 0;
     for (const auto& rig : starts) {
       use(fit, rig);
       BatchFit batch = from(fit, pictures, kFrom_px);
-      answers.emplace_back(batch.misfit(), hands(fit, batch));
+      answers.emplace_back(batch.misfit(), views(fit, batch));
       if (best && batch.misfit() >= best->misfit()) continue;
       best.emplace(std::move(batch));
       best_rig = rig;
@@ -166,19 +167,21 @@ class Calibrator {
   }
 
   /// Where the answer has the hand in each picture: all that is seen of an answer, whatever it is made of.
-  std::vector<Eigen::Vector3d> hands(LogFit& fit, const BatchFit& batch) const {
+  std::vector<CalibratedView> views(LogFit& fit, const BatchFit& batch) const {
     auto& projection = fit.measurement().projection();
-    std::vector<Eigen::Vector3d> places;
+    std::vector<CalibratedView> list;
     for (std::size_t p = 0; p < log_->pictures().size(); ++p) {
       const auto& picture = log_->pictures()[p];
       projection.place(picture.joints.q, batch.at().corrections[p], picture.camera);
-      places.push_back(projection.hand().translation());
+      list.push_back({picture.joints.utime, picture.camera, projection.hand()});
     }
-    return places;
+    return list;
   }
-  static double apart(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b) {
+  static double apart(const std::vector<CalibratedView>& a, const std::vector<CalibratedView>& b) {
     double sum = 0.0;
-    for (std::size_t p = 0; p < a.size(); ++p) sum += (a[p] - b[p]).norm();
+    for (std::size_t p = 0; p < a.size(); ++p) {
+      sum += (a[p].X_camera_hand.translation() - b[p].X_camera_hand.translation()).norm();
+    }
     return sum / static_cast<double>(std::max<std::size_t>(1, a.size()));
   }
 
@@ -190,7 +193,13 @@ class Calibrator {
     options.noise = pipeline_.options().noise;
     options.spacing_px = pipeline_.options().outline_spacing_px;
     options.starts = {best.state().x()};
-    const auto report = diagnose(fit, beliefs.state, beliefs.tolerances, options);
+    DiagnosisReport report;
+    try {
+      report = diagnose(fit, beliefs.state, beliefs.tolerances, options);
+    } catch (const DataError& error) {
+      result_.remarks.push_back(std::string("no further causes were looked for: ") + error.what());
+      return std::nullopt;
+    }
     auto more = beliefs;
     for (const auto& cause : report.causes) {
       CalibratedEffect effect{cause.cause.name, cause.cause.joint, cause.cause.source, cause.sentence, {}};
@@ -270,9 +279,10 @@ class Calibrator {
     result_.outline_sd_px = batch.noise().front().sd_px() * picture_unit(rig_.cameras.front().intrinsics);
     result_.outline_points_alike = batch.noise().front().correlated_points();
     describe_cameras(batch);
-    result_.outline_px.before = median_distance_px(fit, ErrorModel(log_->roles()), {});
-    result_.outline_px.after = median_distance_px(fit, state.model(), {});
+    result_.outline_px.before = median_outline_distance_px(fit, ErrorModel(log_->roles()));
+    result_.outline_px.after = median_outline_distance_px(fit, state.model());
     result_.hand_sd_m = hand_sd_m(fit, batch);
+    result_.views = views(fit, batch);
   }
 
   /// A joint that moves no outline, or one whose motion something else imitates.
@@ -298,6 +308,12 @@ class Calibrator {
   /// Where a camera is in the frame of the link that carries it, and how that depends on the state.
   void describe_cameras(const BatchFit& batch) {
     const auto& state = batch.state();
+    ErrorModel lenses(log_->roles());
+    for (std::size_t e = 0; e < state.model().size(); ++e) {
+      const Effect& effect = state.model()[e];
+      if (effect_kind(effect.name()).home == EffectHome::kCameras) lenses.add(effect.clone());
+    }
+    const StereoRig corrected = lenses.corrected(rig_);
     for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
       const auto& camera = rig_.cameras[c];
       CalibratedCamera found;
@@ -307,6 +323,8 @@ class Calibrator {
       const auto place = [&](const Eigen::VectorXd& x) { return camera_place(state, x, c); };
       const Eigen::VectorXd x = state.x();
       found.X_link_optical = place(x);
+      found.intrinsics = corrected.cameras[c].intrinsics;
+      found.distortion = corrected.cameras[c].distortion;
       Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, state.size());
       for (Eigen::Index k = 0; k < state.size(); ++k) {
         const auto& effect = state.model()[state.parameters()[static_cast<std::size_t>(k)].ref.effect].name();
@@ -357,28 +375,6 @@ class Calibrator {
     return X_CL[0].inverse(Eigen::Isometry);
   }
 
-  /// Median distance of outline points to the masks' edges; far ones count as far as was looked.
-  [[nodiscard]] double median_distance_px(LogFit& fit, const ErrorModel& model,
-                                          const std::vector<std::size_t>& pictures) const {
-    constexpr double kReach_px = 30.0;
-    std::vector<std::vector<double>> own(log_->pictures().size());
-    const auto at = fit.linearise(model, {}, {kReach_px, 3.0, 1e6}, pictures,
-                                  [&](std::size_t p, std::span<const OutlinePoint> points) {
-                                    for (const auto& point : points) own[p].push_back(std::abs(point.residual_px));
-                                  });
-    std::vector<double> all;
-    for (std::size_t p = 0; p < own.size(); ++p) {
-      const double unit = picture_unit(rig_.cameras[log_->pictures()[p].camera].intrinsics);
-      // Points that found no edge at all.
-      own[p].resize(static_cast<std::size_t>(at.evidence[p].sampled), kReach_px * unit);
-      all.insert(all.end(), own[p].begin(), own[p].end());
-    }
-    if (all.empty()) return 0.0;
-    const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-    std::nth_element(all.begin(), middle, all.end());
-    return *middle;
-  }
-
   [[nodiscard]] double hand_sd_m(LogFit& fit, const BatchFit& batch) const {
     const auto& state = batch.state();
     std::vector<ParameterRef> refs;
@@ -424,7 +420,7 @@ class Calibrator {
       BatchFit part(fit, start, beliefs.tolerances, settings());
       part.start_at(batch.state().x());
       part.run(0.0, kept);
-      sum += median_distance_px(fit, part.state().model(), left_out) * static_cast<double>(left_out.size());
+      sum += median_outline_distance_px(fit, part.state().model(), left_out) * static_cast<double>(left_out.size());
       n += static_cast<double>(left_out.size());
     }
     if (n > 0.0) result_.outline_px.heldout = sum / n;

@@ -60,6 +60,11 @@ Json to_json(const Calibration& c, const std::string& root) {
                                             {"sd_deg", degrees(camera.sd_rad_beside_first_joint)}};
     }
   }
+  for (const auto& view : c.views) {
+    json["views"].push_back({{"utime", view.utime},
+                             {"camera", c.cameras[view.camera].name},
+                             {"X_camera_hand", matrix_json(view.X_camera_hand)}});
+  }
   json["outline_px"] = {{"before", c.outline_px.before}, {"after", c.outline_px.after}};
   if (c.outline_px.heldout) json["outline_px"]["heldout"] = *c.outline_px.heldout;
   json["parameters"] = Json::array();
@@ -114,14 +119,15 @@ std::string offsets_yaml(const Calibration& c, bool all) {
   return text + offsets + sds;
 }
 
-std::string cameras_yaml(const Calibration& c, const StereoRig& rig) {
+std::string cameras_yaml(const Calibration& c) {
   std::string text =
       "# Cameras as found: to be included behind robot.yaml, or put in place of its section of the same "
-      "name.\ncameras:\n";
-  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
-    const auto& camera = c.cameras[i];
-    const auto& k = rig.cameras[i].intrinsics;
-    const auto& d = rig.cameras[i].distortion;
+      "name.
+cameras:
+";
+  for (const auto& camera : c.cameras) {
+    const auto& k = camera.intrinsics;
+    const auto& d = camera.distortion;
     const Eigen::Matrix4d X = camera.X_link_optical.matrix();
     text += fmt::format(
         "  {}:\n    link: {}\n    beside: ~  # instead of a place beside the first camera\n    X_beside_optical: ~\n   "
@@ -150,7 +156,7 @@ std::vector<RosCamera> ros_cameras_of(const Calibration& c, const StereoRig& rig
     const auto& camera = c.cameras[i];
     const bool as_in_urdf =
         camera.link == rig.cameras[i].link && camera.X_link_optical.isApprox(Pose::Identity(), 1e-12);
-    cameras.push_back({camera.name, rig.cameras[i].intrinsics, rig.cameras[i].distortion, as_in_urdf ? "" : camera.link,
+    cameras.push_back({camera.name, camera.intrinsics, camera.distortion, as_in_urdf ? "" : camera.link,
                        camera.X_link_optical});
   }
   return cameras;
@@ -253,16 +259,11 @@ void write_calibration(const Calibration& calibration, const BatchFit& batch, Pi
   replace_file(options.out / "calibration.json", json.dump(2) + '\n');
   write_page(calibration, batch, log, kept, options);
   replace_file(options.out / "offsets.yaml", offsets_yaml(calibration, options.all_parameters));
-  ErrorModel cameras(log.roles());
-  for (std::size_t e = 0; e < batch.state().model().size(); ++e) {
-    const Effect& effect = batch.state().model()[e];
-    if (effect_kind(effect.name()).home == EffectHome::kCameras) cameras.add(effect.clone());
-  }
-  replace_file(options.out / "cameras.yaml", cameras_yaml(calibration, cameras.corrected(log.rig())));
+  replace_file(options.out / "cameras.yaml", cameras_yaml(calibration));
   const Correction correction = correction_of(calibration, options.all_parameters);
   write_corrected_urdf(pipeline.setup().model.urdf, correction, options.out / "corrected.urdf");
   write_ros_files(options.out / "ros", pipeline.setup().model.urdf, options.out / "corrected.urdf", correction,
-                  ros_cameras_of(calibration, cameras.corrected(log.rig())));
+                  ros_cameras_of(calibration, log.rig()));
 }
 
 std::string to_table(const Calibration& c) {

@@ -9,6 +9,8 @@
 
 #include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/outline/robot_projection.hpp"
+#include "bodyschema/search/simplified_mesh.hpp"
+#include "bodyschema/search/search_level.hpp"
 #include "bodyschema/silhouette/silhouette_scorer.hpp"
 
 namespace bodyschema {
@@ -131,6 +133,19 @@ struct CameraSearch::Impl {
     return chosen;
   }
 
+  /// What the masks show of the robot, as fine as small pictures need it.
+  [[nodiscard]] SilhouetteModel shown_model(const PinholeIntrinsics& small) const {
+    SilhouetteModel all = silhouette_model(*log.robot(), log.setup()), model;
+    model.culling = all.culling;
+    const auto shown = log.parts_shown();
+    for (std::size_t b = 0; b < all.parts.size(); ++b) {
+      if (shown[b]) model.parts.push_back(std::move(all.parts[b]));
+    }
+    const double bound_m = search_mesh_bound_m(model, std::vector{small});
+    for (auto& part : model.parts) part = simplified_mesh(part, bound_m);
+    return model;
+  }
+
   bool prepare(std::size_t camera) {
     const auto pictures = chosen(camera);
     if (pictures.size() < kFewest) return false;
@@ -138,11 +153,16 @@ struct CameraSearch::Impl {
     const auto& k = rig.cameras[camera].intrinsics;
     const int factor = std::max(1, k.width / kWidth_px);
     const PinholeIntrinsics small = shrunk(k, factor);
-    auto links = log.setup().model.rendered_links;
+    std::vector<std::string> links;
+    const auto shown = log.parts_shown();
+    for (std::size_t b = 0; b < shown.size(); ++b) {
+      if (shown[b]) links.push_back(log.setup().model.rendered_links[b]);
+    }
+    if (links.empty()) return false;
     links.push_back(rig.cameras[camera].link);
     ForwardKinematics kinematics(log.robot(), links);
     std::vector<Pose> X_WB(links.size());
-    const SilhouetteModel model = silhouette_model(*log.robot(), log.setup());
+    const SilhouetteModel model = shown_model(small);
     std::vector<ObservedSilhouette> observed;
     postures.clear();
     for (const auto p : pictures) {

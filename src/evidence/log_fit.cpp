@@ -96,8 +96,11 @@ void LogFit::weigh_parts() {
     posture = picture.joints.q;
     postures += 1.0;
   }
-  if (postures < 2.0 || std::none_of(still.begin(), still.end(), [](bool s) { return s; })) return;
-  for (const bool s : still) part_weight_.push_back(s ? 1.0 / postures : 1.0);
+  const auto shown = log_.parts_shown();
+  if (postures < 2.0) return;
+  for (std::size_t l = 0; l < still.size(); ++l) {
+    part_weight_.push_back(!shown[l] ? 0.0 : still[l] ? 1.0 / postures : 1.0);
+  }
 }
 
 LogFit::~LogFit() = default;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "bodyschema/observation/joint_motion.hpp"
+#include "bodyschema/robot/forward_kinematics.hpp"
 
 namespace bodyschema {
 
@@ -50,6 +51,32 @@ void PictureLog::replace_rig(std::shared_ptr<const RobotModel> robot, const Ster
   rig_ = rig;
   roles_ = JointRoles::of(robot_, setup_, rig_);
   instants_ = std::make_unique<InstantBuilder>(robot_, setup_.hand_link, setup_.gravity_W);
+}
+
+std::vector<bool> PictureLog::parts_shown() const {
+  // Physical: the width of a thin limb. What moves less uncovers no background, or only a rim of it.
+  constexpr double kOutOfTheWay_m = 0.03, kReach_m = 0.1;
+  const auto& links = setup_.model.rendered_links;
+  std::vector<bool> shown(links.size(), !learned_background_);
+  if (!learned_background_) return shown;
+  std::vector<std::string> frames = links;
+  for (const auto& camera : rig_.cameras) frames.push_back(camera.link);
+  ForwardKinematics kinematics(robot_, frames);
+  std::vector<Pose> X_WF(frames.size());
+  std::vector<std::vector<Pose>> first(rig_.cameras.size());
+  for (const auto& picture : pictures_) {
+    kinematics.compute(picture.joints.q, X_WF);
+    const Pose X_CW = X_WF[links.size() + picture.camera].inverse(Eigen::Isometry);
+    auto& reference = first[picture.camera];
+    for (std::size_t l = 0; l < links.size(); ++l) {
+      const Pose X_CL = X_CW * X_WF[l];
+      if (reference.size() <= l) reference.push_back(X_CL);
+      const double moved = (X_CL.translation() - reference[l].translation()).norm() +
+                           kReach_m * rotation_distance(X_CL.linear(), reference[l].linear());
+      if (moved > kOutOfTheWay_m) shown[l] = true;
+    }
+  }
+  return shown;
 }
 
 void PictureLog::finish() {

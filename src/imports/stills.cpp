@@ -333,6 +333,7 @@ StillsFolder StillsFolder::list(const fs::path& folder) {
 StillsColumns StillsColumns::read(const fs::path& folder) {
   const CsvTable table = CsvTable::read(folder / "joints.csv");
   StillsColumns columns;
+  columns.moving = table.find({"time_s"}) != CsvTable::kNone;
   for (std::size_t c = 0; c < table.names.size(); ++c) {
     if (table.names[c] == "posture" || table.names[c] == "frame" || table.names[c] == "time_s") continue;
     columns.names.push_back(table.names[c]);

@@ -77,6 +77,8 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
   projection_.parts(X_CB_);
   points_.clear();
   for (const auto& predicted : extractor_.extract(X_CB_, camera, static_cast<float>(unit * search.spacing_px))) {
+    const double factor = search.part_weight.empty() ? 1.0 : search.part_weight[predicted.part];
+    if (factor <= 0.0) continue;
     OutlinePoint point;
     point.part = predicted.part;
     point.p_C = unwarp * predicted.p_C.cast<double>();
@@ -100,7 +102,6 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
       continue;
     }
     const double share = damping(r, robust_px);
-    const double factor = search.part_weight.empty() ? 1.0 : search.part_weight[point.part];
     point.residual_px = r;
     point.weight = factor * share * share;
     out.cost += r * r * share;

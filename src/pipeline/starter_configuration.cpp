@@ -26,6 +26,8 @@ namespace fs = std::filesystem;
 
 constexpr double kGuessedFieldOfView_rad = 1.05;       // 60 deg across, a common camera
 constexpr double kPairSd_deg = 0.1, kPairSd_mm = 1.0;  // of a stereo pair that was calibrated as one
+/// Physical: joined by arrival, pictures come late by some frames; a lens that nobody measured bends by as much.
+constexpr double kLag_sd_ms = 60.0, kLens_sd = 0.05;
 
 bool among(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -125,8 +127,12 @@ class Starter {
       throw ConfigurationError(fmt::format("--hand '{}': no joint moves it against the cameras", hand_));
     }
     if (parts_.rendered.empty()) throw FileError(o_.urdf.string() + ": no link of the arm has a <visual> shape");
-    add_base(links);
     masks_ = o_.masks.value_or(stills_ && !stills_->masks.empty());
+    const bool moving = columns_ && columns_->moving;
+    learned_ = !masks_ && moving;
+    moving_ = moving;
+    // What never moves is learned as background, the robot's base like the rest.
+    if (!learned_) add_base(links);
     look_at_columns();
   }
 
@@ -451,8 +457,14 @@ class Starter {
         "docs/calibrate_my_robot.md\n"
         "bus:\n"
         "  channel_prefix: {}\n",
-        masks_ ? "given" : "statistics", masks_ ? "statistics, without masks" : "single_colour, learned_background",
+        masks_     ? "given"
+        : learned_ ? "learned_background"
+                   : "statistics",
+        masks_     ? "statistics, without masks"
+        : learned_ ? "statistics, where the cameras move"
+                   : "single_colour, learned_background",
         yaml(o_.channel_prefix));
+    text += state_yaml();
     if (!in_degrees_ && strangers_.empty()) return text;
     text += "# Which column of a recording is which joint; docs/import_recordings.md.\nimport:\n";
     if (in_degrees_) text += "  unit: deg\n";
@@ -463,6 +475,21 @@ class Starter {
           fmt::format("    {}: \"-\"   # a joint of {}; \"-\": left out\n", yaml(name), o_.urdf.filename().string());
     }
     return text;
+  }
+
+  /// What may be wrong in this recording besides what may be on any robot.
+  [[nodiscard]] std::string state_yaml() const {
+    const bool straight = std::any_of(cameras_.begin(), cameras_.end(), [](const StarterCamera& camera) {
+      return std::all_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d == 0.0; });
+    });
+    std::string text;
+    if (moving_) {
+      text += fmt::format("    latency: {{sd_ms: {}}}             # pictures against encoders\n", kLag_sd_ms);
+    }
+    if (straight && !o_.rectified && cameras_.size() == 1) {
+      text += fmt::format("    distortion: {{sd: {}}}           # a lens without any is none\n", kLens_sd);
+    }
+    return text.empty() ? text : "estimator:\n  state:\n" + text;
   }
 
   /// The distances of the motion are left out: the simulator finds them.
@@ -512,6 +539,8 @@ class Starter {
   std::vector<std::string> base_;       ///< links without motion against the cameras that may be seen
   std::vector<std::string> strangers_;  ///< columns of joints.csv that are no joints
   bool masks_ = false, in_degrees_ = false;
+  bool moving_ = false;   ///< the stills are a recording of a moving arm
+  bool learned_ = false;  ///< masks come of a learned background
   std::vector<std::string> notes_;  ///< what was guessed
   std::vector<std::string> wrong_;  ///< what must be put right
 };

@@ -57,7 +57,10 @@ class Watcher {
                                PictureLog(pipeline.shared_robot(), pipeline.setup(), pipeline.rig()), {}, {}, {}, {}} {}
 
   WatchedLog run(bool estimate_first) {
-    if (pipeline_.learns_background()) learn();
+    if (pipeline_.learns_background()) {
+      learn();
+      result_.pictures.learned_background();
+    }
     read(estimate_first);
     return std::move(result_);
   }

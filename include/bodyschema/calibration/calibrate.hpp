@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -8,6 +9,8 @@
 #include <vector>
 
 #include "bodyschema/core/configuration.hpp"
+#include "bodyschema/core/time.hpp"
+#include "bodyschema/geometry/pinhole.hpp"
 #include "bodyschema/geometry/pose.hpp"
 
 namespace bodyschema {
@@ -41,6 +44,8 @@ struct CalibratedCamera {
   std::string name;
   std::string link;                        ///< that carries it
   Pose X_link_optical = Pose::Identity();  ///< OpenCV axes, m
+  PinholeIntrinsics intrinsics;            ///< px, as estimated
+  std::array<double, 5> distortion{};      ///< k1 k2 p1 p2 k3 as OpenCV, as estimated
   double sd_m = 0.0;                       ///< root of the summed variances of its place in the link's frame
   double sd_rad = 0.0;                     ///< ... of its rotation
   /// The same if the arm's first joint were known: where the camera does not move with the robot's base, no picture
@@ -48,6 +53,13 @@ struct CalibratedCamera {
   double sd_m_beside_first_joint = 0.0, sd_rad_beside_first_joint = 0.0;
   bool estimated = false;  ///< false: as configured
   bool searched = false;   ///< nothing was known of it
+};
+
+/// Where the calibrated robot has its hand in one picture: for a witness of one's own, a board that the hand carries.
+struct CalibratedView {
+  Microseconds utime = 0;
+  std::size_t camera = 0;
+  Pose X_camera_hand = Pose::Identity();  ///< camera in OpenCV axes, m; lag and all else that was found taken in
 };
 
 /// One joint's offset: encoder = true + offset.
@@ -82,6 +94,7 @@ struct Calibration {
       effects;  ///< what else was found; estimated with the rest where they do not depend on time
   OutlineDistances outline_px;
   double hand_sd_m = 0.0;  ///< of the hand's place in the first camera's picture, mean over postures
+  std::vector<CalibratedView> views;  ///< of all pictures, in order of time
   std::size_t postures = 0, pictures = 0;
   double dispersion = 1.0;      ///< how postures disagree, by what is claimed; 1: as claimed
   double posture_sd_rad = 0.0;  ///< what a posture gets wrong, per joint

@@ -37,6 +37,11 @@ class PictureLog {
   void set_encoders(std::vector<JointSample> encoders) { encoders_ = std::move(encoders); }
   /// Of the same pictures, a robot whose cameras sit elsewhere.
   void replace_rig(std::shared_ptr<const RobotModel> robot, const StereoRig& rig);
+  /// The masks come of a background that was learned from these pictures: what never left its place is part of it.
+  void learned_background() { learned_background_ = true; }
+  /// Of each rendered link, whether it moved out of the way in the course of the pictures; all, unless the background
+  /// was learned from them. Of others no mask shows anything.
+  [[nodiscard]] std::vector<bool> parts_shown() const;
   /// Finds the arm's motion at every exposure, once all observations are in.
   void finish();
 
@@ -61,6 +66,7 @@ class PictureLog {
   std::unique_ptr<InstantBuilder> instants_;
   std::vector<Picture> pictures_;
   std::vector<JointSample> encoders_;
+  bool learned_background_ = false;
 };
 
 }  // namespace bodyschema

@@ -37,6 +37,7 @@ struct StillsFolder {
 struct StillsColumns {
   std::vector<std::string> names;
   std::vector<double> largest;  ///< absolute value in each, in the file's unit
+  bool moving = false;          ///< rows have times: a recording of a moving arm, not of postures held still
   /// Throws FileError for a file that is not there or cannot be read (LeftOut::check).
   static StillsColumns read(const std::filesystem::path& folder);
 };

@@ -22,7 +22,7 @@ struct OutlineSearch {
   /// Robust scale c: a residual r costs r^2 c^2 / (r^2 + c^2) and weighs (c^2 / (r^2 + c^2))^2 (Geman and McClure):
   /// what lies many c away, a tool that no mesh shows or somebody's arm, says nothing.
   double robust_px = 3.0;
-  /// Factor on every point of a part; empty: 1.
+  /// Factor on every point of a part; empty: 1. 0: the part has no say, it only hides others.
   std::vector<double> part_weight{};
 };
 
