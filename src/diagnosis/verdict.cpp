@@ -71,6 +71,7 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles) {
     }
     return text;
   };
+  list_of(report.estimated);
   const auto list = list_of(report.causes), small = list_of(report.small_causes);
   const auto& causes = report.causes;
   const auto unexplained = [&](std::string why) {
