@@ -66,7 +66,8 @@ std::vector<std::vector<Direction>> directions_of(LogFit& fit, const LogAbout& l
 /// How a joint's correction by these amounts moves the pictures: [picture][column].
 std::vector<std::vector<Direction>> along_joint(const LogFit& fit, Eigen::Index joint,
                                                 const std::vector<std::vector<double>>& amounts);
-/// A slip of every arm joint at every picture (or where every block begins), scored. `best` keeps of every joint the time at which one explains most.
+/// A slip of every arm joint at every picture (or where every block begins), scored. `best` keeps of every joint the
+/// time at which one explains most.
 struct Slips {
   std::vector<Scores> all;
   std::vector<Candidate> best;

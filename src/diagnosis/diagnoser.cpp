@@ -127,12 +127,11 @@ class Diagnoser {
     std::move(slips.best.begin(), slips.best.end(), std::back_inserter(candidates));
     const double threshold = chance_threshold(scores, options_.level, options_.seed);
     // A look has no time for curves, but where something is about to be named that may only stand in for one.
-    if (!search_.refits() && std::any_of(candidates.begin(), candidates.end(),
-                                         [&](const Candidate& c) { return c.z() >= threshold; })) {
+    if (!search_.refits() &&
+        std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& c) { return c.z() >= threshold; })) {
       const auto known = candidates.size();
       add_curves(log, candidates);
-      for (std::size_t c = known; c < candidates.size(); ++c)
-        candidates[c].scores = base.score(candidates[c].columns);
+      for (std::size_t c = known; c < candidates.size(); ++c) candidates[c].scores = base.score(candidates[c].columns);
     }
     asked_.reset();
     return asked_.emplace(Field{std::move(log), std::move(base), std::move(candidates), threshold});
@@ -351,7 +350,7 @@ class Diagnoser {
   DiagnosisReport report_;
   double block_s_ = 0.0;
   std::optional<Field> asked_;  ///< about the present model
-  double alike_ = 0.0;  ///< correlation of neighbouring blocks, at the last look
+  double alike_ = 0.0;          ///< correlation of neighbouring blocks, at the last look
   std::vector<CauseName> refused_;
 };
 

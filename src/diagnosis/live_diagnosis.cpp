@@ -20,12 +20,12 @@
 namespace bodyschema {
 namespace {
 
-constexpr int kNice = 10;                     // of the thread: less than the estimator's, more than the page's
-constexpr double kEncoderPeriod_s = 0.008;    // what has a memory needs 100 Hz; more is thinned
+constexpr int kNice = 10;                       // of the thread: less than the estimator's, more than the page's
+constexpr double kEncoderPeriod_s = 0.008;      // what has a memory needs 100 Hz; more is thinned
 constexpr std::ptrdiff_t kMostEncoders = 2000;  // samples kept beside
-constexpr std::size_t kMostWaiting = 60;      // frames kept for a look that is late
-constexpr double kRobust_px = 3.0;            // before the noise of outlines is known, as in a diagnosis of a log
-constexpr double kNoisePictures = 100.0;      // after so many a picture's noise has faded
+constexpr std::size_t kMostWaiting = 60;        // frames kept for a look that is late
+constexpr double kRobust_px = 3.0;              // before the noise of outlines is known, as in a diagnosis of a log
+constexpr double kNoisePictures = 100.0;        // after so many a picture's noise has faded
 
 /// What a look works on.
 struct Batch {
@@ -42,8 +42,14 @@ double thread_time_s() {
 
 Finding to_finding(const DiagnosedCause& cause) {
   const bool unexplained = cause.cause.name == "unexplained";
-  Finding finding{cause.cause.name, cause.cause.joint, unexplained ? cause.variable : cause.cause.source,
-                  cause.sentence, {}, cause.z, cause.hand_mm, cause.outline_px};
+  Finding finding{cause.cause.name,
+                  cause.cause.joint,
+                  unexplained ? cause.variable : cause.cause.source,
+                  cause.sentence,
+                  {},
+                  cause.z,
+                  cause.hand_mm,
+                  cause.outline_px};
   for (const auto& p : cause.parameters) {
     finding.parameters.push_back({p.parameter, p.unit, p.estimate, p.sd});
     if (p.from && !p.duration_s) finding.from = *p.from;
@@ -87,7 +93,8 @@ class Window {
     found.span_s = seconds(last - log_.pictures().front().joints.utime);
     found_ = found;
     if (found.span_s < diagnosis_.shortest_log_s) return found;
-    // A share of what may be wrong for every look, all of them together (Lan and DeMets 1983): of the k-th 6 / (pi k)^2.
+    // A share of what may be wrong for every look, all of them together (Lan and DeMets 1983): of the k-th 6 / (pi
+    // k)^2.
     const double k = static_cast<double>(++looks_);
     diagnosis_.level = options_.level * 6.0 / (kPi * kPi * k * k);
     const auto report = diagnosis::look(fit_, state_, at_, noise_, tolerances_, diagnosis_);
@@ -141,8 +148,8 @@ class Window {
     search.robust_px = 0.0;
     for (const auto& noise : noise_) search.robust_px = std::max(search.robust_px, noise.robust_px());
     const bool known = at_ != nullptr;
-    auto now = std::make_shared<LinearLog>(fit_.linearise(
-        state_.model(), all_, search, fresh, [&](std::size_t p, std::span<const OutlinePoint> points) {
+    auto now = std::make_shared<LinearLog>(
+        fit_.linearise(state_.model(), all_, search, fresh, [&](std::size_t p, std::span<const OutlinePoint> points) {
           const auto camera = log_.pictures()[p].camera;
           const double unit = picture_unit(log_.rig().cameras[camera].intrinsics);
           if (known) noise_[camera].add(points, unit, kNoisePictures);
@@ -261,8 +268,8 @@ struct LiveDiagnosis::Impl {
   void begin_look(Microseconds now) {
     if (waiting.frames.empty() || looking.valid()) return;
     if (look_utime == 0) first_utime = look_utime = now;
-    const double period_s = std::clamp(options.period_share * seconds(now - first_utime), options.least_period_s,
-                                       options.most_period_s);
+    const double period_s =
+        std::clamp(options.period_share * seconds(now - first_utime), options.least_period_s, options.most_period_s);
     if (seconds(now - look_utime) < period_s) return;
     look_utime = now;
     waiting.x = x;

@@ -218,9 +218,12 @@ void ModelSearch::add_causes(LogAbout& log) const {
   for (const auto& cause : causes_) {
     if (!cause.generic()) log.found.push_back(cause.name);
     if (in_state(cause)) continue;
-    const auto more = directions_of(
-        fit_, log,
-        {.cause = cause.name, .variable = cause.variable, .parameters = {}, .from = cause.from, .amounts = cause.amounts});
+    const auto more = directions_of(fit_, log,
+                                    {.cause = cause.name,
+                                     .variable = cause.variable,
+                                     .parameters = {},
+                                     .from = cause.from,
+                                     .amounts = cause.amounts});
     for (std::size_t p = 0; p < more.size(); ++p) log.base[p].insert(log.base[p].end(), more[p].begin(), more[p].end());
   }
 }

@@ -147,8 +147,8 @@ class Runs {
 
   void watch(Run& run) {
     // A port of this run's own, so that robots and other runs on this machine are not disturbed.
-    const std::string url =
-        fmt::format("udpm://239.255.76.67:{}?ttl=0", 20'000 + (static_cast<std::uint64_t>(getpid()) + run.seed) % 12'000);
+    const std::string url = fmt::format("udpm://239.255.76.67:{}?ttl=0",
+                                        20'000 + (static_cast<std::uint64_t>(getpid()) + run.seed) % 12'000);
     LcmLink link(url);
     const auto channels = BusOptions::from(context_.simulated.section("bus")).channels();
     const auto begin = Clock::now();
@@ -174,9 +174,9 @@ class Runs {
       }
     });
     const auto configurations = context_.recorded / "icub_right";
-    std::vector<std::string> arguments = {"bodyschemad",       "--config", (configurations / "estimator.yaml").string(),
-                                          "--lcm-url",         url,        "--stop-after-idle",
-                                          "3"};
+    std::vector<std::string> arguments = {
+        "bodyschemad",       "--config", (configurations / "estimator.yaml").string(), "--lcm-url", url,
+        "--stop-after-idle", "3"};
     for (const auto& choice : context_.options.overrides) arguments.insert(arguments.end(), {"--set", choice});
     Program service(std::move(arguments), folder_ / fmt::format("service_{}.txt", run.seed));
     const auto until = [&](auto condition, double limit_s) {
@@ -185,13 +185,22 @@ class Runs {
       return condition();
     };
     constexpr double kStart_s = 60.0, kEnd_s = 120.0;
-    if (!until([&] { return service.words().find("waiting for") != std::string::npos || !service.running(); }, kStart_s))
+    if (!until([&] { return service.words().find("waiting for") != std::string::npos || !service.running(); },
+               kStart_s))
       throw DataError("bodyschemad did not start: " + service.words());
-    arguments = {"bodyschema-sim", "--config", (configurations / "simulator.yaml").string(), "--lcm-url", url,
-                 "--babble",       fmt::format("{}", kRun_s),
-                 "--offsets",      "random",
-                 "--seed",         std::to_string(run.seed),
-                 "--set",          fmt::format("simulator.cameras.rate_hz={}", kPictureRate_hz)};
+    arguments = {"bodyschema-sim",
+                 "--config",
+                 (configurations / "simulator.yaml").string(),
+                 "--lcm-url",
+                 url,
+                 "--babble",
+                 fmt::format("{}", kRun_s),
+                 "--offsets",
+                 "random",
+                 "--seed",
+                 std::to_string(run.seed),
+                 "--set",
+                 fmt::format("simulator.cameras.rate_hz={}", kPictureRate_hz)};
     if (run.fault) arguments.insert(arguments.end(), {"--fault", run.fault->text()});
     Program robot(std::move(arguments), folder_ / fmt::format("robot_{}.txt", run.seed));
     until([&] { return !service.running(); }, kRun_s + kEnd_s);
@@ -248,8 +257,8 @@ void run_live(ExperimentContext& context) {
     right += run.last && !run.last->finding.empty() && names(*run.fault, run.last->finding.front()) ? 1.0 : 0.0;
   }
   replace_file(context.options.out / "live_runs.jsonl", lines);
-  context.table += fmt::format("\n{:<44} {:>6} {:>9}   {}\n", "through the service, 60 s at 10 Hz", "runs", "measured",
-                               "demand");
+  context.table +=
+      fmt::format("\n{:<44} {:>6} {:>9}   {}\n", "through the service, 60 s at 10 Hz", "runs", "measured", "demand");
   const auto add = [&](const char* name, double n, double value, double demand, bool at_most) {
     context.summary["live"][name] = value;
     const bool met = at_most ? value <= demand : value >= demand;

@@ -198,12 +198,8 @@ Json json_of(const findings_t& m, const std::set<std::string>&) {
                     {"estimated", f.estimated != 0},
                     {"alike", f.alike}});
   }
-  return {{"timestamp", timestamp(m.utime)},
-          {"span_s", number(m.span_s)},
-          {"blocks", m.blocks},
-          {"z_threshold", number(m.z_threshold)},
-          {"count", m.num_findings},
-          {"findings", list}};
+  return {{"timestamp", timestamp(m.utime)},      {"span_s", number(m.span_s)}, {"blocks", m.blocks},
+          {"z_threshold", number(m.z_threshold)}, {"count", m.num_findings},    {"findings", list}};
 }
 
 class Exporter {

@@ -17,7 +17,7 @@ std::vector<ParameterRef> fitted_parameters(const ErrorModel& model) {
 
 EffectProbes::EffectProbes(const ErrorModel& model, std::vector<ParameterRef> parameters,
                            const Coordinates& coordinates)
-    : coordinates_(coordinates), parameters_(std::move(parameters)), low_(model.roles().no_corrections()), high_(low_), alone_(low_) {
+    : coordinates_(coordinates), parameters_(std::move(parameters)), low_(model.roles().no_corrections()), high_(low_) {
   for (const auto& ref : parameters_) {
     probes_.push_back({model[ref.effect].clone(), model[ref.effect].clone(), 1.0});
   }
@@ -40,9 +40,6 @@ void EffectProbes::follow(const ErrorModel& model) {
     for (std::size_t p = 0; p < effect.parameters().size(); ++p) {
       probes_[i].low->parameters()[p].value = probes_[i].high->parameters()[p].value = effect.parameters()[p].value;
     }
-    const auto parameters = effect.parameters();
-    probes_[i].from_nothing =
-        std::all_of(parameters.begin(), parameters.end(), [](const auto& p) { return !p.fitted || p.value == 0.0; });
     place(probes_[i], parameters_[i].parameter, effect.parameters()[parameters_[i].parameter].value);
   }
 }
@@ -65,23 +62,15 @@ void EffectProbes::forget() {
 void EffectProbes::directions(const Instant& at, std::vector<Direction>& out) {
   out.resize(probes_.size());
   for (std::size_t i = 0; i < probes_.size(); ++i) {
-    if (probes_[i].from_nothing) {
-      // The usual case, of a whole catalogue in every picture: only what has changed is put back.
-      out[i].clear();
-      std::as_const(*probes_[i].high).apply(at, alone_);
-      for (std::size_t c = 0; c < coordinates_.all().size(); ++c) {
-        double& moved = coordinates_[c].in(alone_);
-        if (moved != 0.0) out[i].push_back({static_cast<std::uint32_t>(c), std::exchange(moved, 0.0) / probes_[i].step});
-      }
-      continue;
-    }
-    low_.clear();
-    high_.clear();
-    std::as_const(*probes_[i].low).apply(at, low_);
-    std::as_const(*probes_[i].high).apply(at, high_);
+    const Effect &low = *probes_[i].low, &high = *probes_[i].high;
+    const auto is_nothing = [](const EffectParameter& p) { return !p.fitted || p.value == 0.0; };
+    // Of an effect that is at zero nothing is known but its own change: the usual case, of a whole catalogue.
+    if (!std::all_of(low.parameters().begin(), low.parameters().end(), is_nothing)) low.apply(at, low_);
+    high.apply(at, high_);
     out[i].clear();
     for (std::size_t c = 0; c < coordinates_.all().size(); ++c) {
-      const double d = coordinates_[c].in(std::as_const(high_)) - coordinates_[c].in(std::as_const(low_));
+      // Only what an effect has changed is put back.
+      const double d = std::exchange(coordinates_[c].in(high_), 0.0) - std::exchange(coordinates_[c].in(low_), 0.0);
       if (d != 0.0) out[i].push_back({static_cast<std::uint32_t>(c), d / probes_[i].step});
     }
   }

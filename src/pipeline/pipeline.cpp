@@ -25,7 +25,7 @@ StereoRig corrected(const StereoRig& rig, const std::optional<ErrorModel>& model
 
 /// What of an extended model is not in the rig already, and not found anew.
 ErrorModel effects_beside(const std::optional<ErrorModel>& model, const std::shared_ptr<const RobotModel>& robot,
-                              const RobotSetup& setup, const StereoRig& rig) {
+                          const RobotSetup& setup, const StereoRig& rig) {
   ErrorModel rest(JointRoles::of(robot, setup, rig));
   for (std::size_t e = 0; model && e < model->size(); ++e) {
     const auto& effect = (*model)[e];

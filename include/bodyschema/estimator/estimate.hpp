@@ -56,9 +56,9 @@ struct Finding {
     double value = 0.0, sd = 0.0;  ///< in `unit`
   };
   std::vector<Parameter> parameters;
-  double z = 0.0;           ///< by how many standard deviations blocks of pictures agree that it is there
-  double hand_mm = 0.0;     ///< what it moves, root mean square: the hand, the joints' offsets fitted anew ...
-  double outline_px = 0.0;  ///< ... and the outlines
+  double z = 0.0;                    ///< by how many standard deviations blocks of pictures agree that it is there
+  double hand_mm = 0.0;              ///< what it moves, root mean square: the hand, the joints' offsets fitted anew ...
+  double outline_px = 0.0;           ///< ... and the outlines
   std::vector<std::string> alike{};  ///< what these pictures cannot tell from it: "backlash of r_elbow"
   Microseconds from = 0;             ///< of a slip: when it happened
   bool estimated = false;            ///< the state holds it: it is taken into account

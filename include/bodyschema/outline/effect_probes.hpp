@@ -39,16 +39,14 @@ class EffectProbes {
  private:
   struct Probe {
     std::unique_ptr<Effect> low, high;
-    double step = 1.0;          ///< between them, SI
-    bool from_nothing = false;  ///< the low one has all parameters zero, and so changes nothing
+    double step = 1.0;  ///< between them, SI
   };
   void place(Probe& probe, std::size_t parameter, double value) const;
 
   const Coordinates& coordinates_;
   std::vector<ParameterRef> parameters_;
   std::vector<Probe> probes_;
-  Corrections low_, high_;
-  Corrections alone_;  ///< what one effect does beside nothing; zero between two of them
+  Corrections low_, high_;  ///< zero between two effects
 };
 
 }  // namespace bodyschema
