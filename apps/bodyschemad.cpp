@@ -21,11 +21,11 @@ void check_configuration(const apps::CommonOptions& common, const std::string& l
   const Channels channels = pipeline.bus().channels();
   std::printf(
       "%s: good\nrobot: %s, %zu joints, offsets of %zu estimated\ncameras: %zu\n"
-      "silhouettes: %s\nchannels: %s and %s in, %s and %s out\n",
+      "silhouettes: %s\nchannels: %s and %s in, %s, %s and %s out\n",
       common.config.c_str(), pipeline.robot().name().c_str(), pipeline.robot().joints().size(),
       pipeline.setup().estimated_joints.size(), pipeline.rig().cameras.size(),
       pipeline.estimator().engine_description().c_str(), channels.joint_state.c_str(), channels.cameras.c_str(),
-      channels.joint_offsets.c_str(), channels.offsets_status.c_str());
+      channels.joint_offsets.c_str(), channels.findings.c_str(), channels.offsets_status.c_str());
   if (const auto& model = pipeline.error_model()) {
     std::printf("extended model: %s\n", describe(*model).c_str());
   }

@@ -1,3 +1,4 @@
+#include "bodyschema/diagnosis/live_diagnosis.hpp"
 #include "bodyschema/pipeline/replay.hpp"
 
 #include <cstdio>
@@ -49,6 +50,11 @@ void add_replay(CLI::App& app) {
     options.overlays = a->overlays;
     options.masks = a->masks;
     options.learn_background_online = a->learn_online;
+    options.watcher = [](const Pipeline& pipeline) -> ReplayOptions::Watcher {
+      if (!pipeline.options().live_diagnosis) return {};
+      auto live = std::make_shared<LiveDiagnosis>(pipeline, LiveDiagnosisOptions{.waits = true});
+      return [live](const Observation& observation, Estimate& estimate) { live->watch(observation, estimate); };
+    };
     std::fputs(replay(configuration, options).c_str(), stdout);
     std::printf("\nresults in %s\n", a->out.c_str());
   });

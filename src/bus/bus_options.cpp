@@ -14,8 +14,8 @@ Microseconds milliseconds(const Configuration& section, const std::string& key, 
 }  // namespace
 
 Channels Channels::with_prefix(const std::string& prefix) {
-  return {prefix + "_JOINT_STATE", prefix + "_CAMERAS", prefix + "_JOINT_OFFSETS", prefix + "_OFFSETS_STATUS",
-          prefix + "_MASKS"};
+  return {prefix + "_JOINT_STATE",    prefix + "_CAMERAS",  prefix + "_JOINT_OFFSETS",
+          prefix + "_OFFSETS_STATUS", prefix + "_FINDINGS", prefix + "_MASKS"};
 }
 
 std::size_t BusOptions::longest_message_bytes(std::size_t cameras) const {

@@ -16,6 +16,7 @@ namespace {
 constexpr std::size_t kMinText = 5;   // length word and terminating zero
 constexpr int kMaxParameters = 4096;  // joints' offsets are few; extended models hold more
 constexpr int kMaxStatusEntries = 4096;
+constexpr int kMaxFindings = 256;
 
 /// Sentences and names of renderers are longer than joint names.
 DecodeLimits with_long_text(DecodeLimits limits) {
@@ -141,6 +142,40 @@ DecodeResult decode(Bytes message, joint_offsets_t& out, const DecodeLimits& giv
   out.cameras_swapped = in.integer<std::int8_t>();
   in.text("model_hash", out.model_hash);
   in.text("config_hash", out.config_hash);
+  return in.finish();
+}
+
+DecodeResult decode(Bytes message, findings_t& out, const DecodeLimits& given) {
+  // Four texts, two counts, three numbers and a stamp.
+  constexpr std::size_t kMinFinding = 4 * kMinText + 2 * 4 + 4 * 8 + 1;
+  const DecodeLimits limits = with_long_text(given);
+  WireReader in(message, limits);
+  in.fingerprint(findings_t::getHash());
+  out.utime = in.stamp("utime");
+  out.span_s = in.float64();
+  out.blocks = in.integer<std::int32_t>();
+  out.z_threshold = in.float64();
+  const int n = out.num_findings = in.count<std::int32_t>("num_findings", kMaxFindings, kMinFinding);
+  out.finding.resize(static_cast<std::size_t>(in.ok() ? n : 0));
+  for (auto& f : out.finding) {
+    in.text("effect", f.effect);
+    in.text("joint", f.joint);
+    in.text("source", f.source);
+    in.text("sentence", f.sentence);
+    const int parameters = f.num_parameters =
+        in.count<std::int32_t>("num_parameters", kMaxFindings, 2 * kMinText + 2 * 8);
+    in.texts("parameter_name", f.parameter_name, parameters);
+    in.texts("parameter_unit", f.parameter_unit, parameters);
+    in.doubles(f.parameter_value, parameters);
+    in.doubles(f.parameter_stddev, parameters);
+    f.z = in.float64();
+    f.hand_m = in.float64();
+    f.outline_px = in.float64();
+    f.from_utime = in.stamp("from_utime");
+    f.estimated = in.integer<std::int8_t>();
+    const int alike = f.num_alike = in.count<std::int32_t>("num_alike", kMaxFindings, kMinText);
+    in.texts("alike", f.alike, alike);
+  }
   return in.finish();
 }
 

@@ -5,6 +5,8 @@
 #include <random>
 #include <utility>
 
+#include "bodyschema/evidence/distributions.hpp"
+
 namespace bodyschema::diagnosis {
 namespace {
 
@@ -33,6 +35,16 @@ AddedColumns::AddedColumns(std::size_t blocks, Eigen::Index base, Eigen::Index a
     : B(blocks, Eigen::MatrixXd::Zero(base, added)), C(blocks, Eigen::MatrixXd::Zero(added, added)),
       d(blocks, Eigen::VectorXd::Zero(added)) {}
 
+AddedColumns AddedColumns::only(const std::vector<Eigen::Index>& columns) const {
+  AddedColumns some;
+  for (std::size_t b = 0; b < d.size(); ++b) {
+    some.B.push_back(B[b](Eigen::all, columns));
+    some.C.push_back(C[b](columns, columns));
+    some.d.push_back(d[b](columns));
+  }
+  return some;
+}
+
 double Scores::z() const {
   const Eigen::VectorXd all = t();
   double largest = 0.0;
@@ -59,6 +71,7 @@ BlockRegression::BlockRegression(std::vector<BaseBlock> blocks, Eigen::VectorXd 
   with_beliefs.diagonal() += precision_;
   total_.compute(stiffened(with_beliefs));
   step_ = total_.solve(g);
+  for (const auto& block : blocks_) left_.push_back(block.g - block.H * step_);
 }
 
 Scores BlockRegression::score(const AddedColumns& added) const {
@@ -76,8 +89,7 @@ Scores BlockRegression::score(const AddedColumns& added) const {
   Eigen::MatrixXd share(k, n);  // of the information
   for (Eigen::Index b = 0; b < n; ++b) {
     const auto at = static_cast<std::size_t>(b);
-    s.u.col(b) =
-        added.d[at] - added.B[at].transpose() * step_ - s.Y.transpose() * (blocks_[at].g - blocks_[at].H * step_);
+    s.u.col(b) = added.d[at] - added.B[at].transpose() * step_ - s.Y.transpose() * left_[at];
     for (Eigen::Index i = 0; i < k; ++i) {
       const auto y = s.Y.col(i);
       share(i, b) = added.C[at](i, i) - 2.0 * y.dot(added.B[at].col(i)) + y.dot(blocks_[at].H * y);
@@ -149,10 +161,7 @@ Eigen::MatrixXd BlockRegression::covariance() const {
   with_beliefs.diagonal() += precision_;
   const Eigen::MatrixXd Q = symmetric_inverse(stiffened(with_beliefs));
   Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(size(), size());
-  for (const auto& block : blocks_) {
-    const Eigen::VectorXd u = block.g - block.H * step_;
-    meat += u * u.transpose();
-  }
+  for (const auto& u : left_) meat += u * u.transpose();
   meat *= blocks_factor(blocks_.size());
   meat.diagonal() += precision_;
   Eigen::MatrixXd covariance = Q * meat * Q;
@@ -207,8 +216,14 @@ double chance_threshold(const std::vector<Scores>& scores, double level, std::ui
     }
   }
   std::sort(largest.begin(), largest.end());
-  const auto at = static_cast<std::size_t>(std::ceil((1.0 - level) * kDraws));
-  return static_cast<double>(largest[std::min<std::size_t>(at, kDraws - 1)]);
+  const auto exceeded = [&](double share) {
+    const auto at = static_cast<std::size_t>(std::ceil((1.0 - share) * kDraws));
+    return static_cast<double>(largest[std::min<std::size_t>(at, kDraws - 1)]);
+  };
+  constexpr double kTold = 10.0 / kDraws;  // ten of them lie beyond
+  if (level >= kTold) return exceeded(level);
+  const double comparisons = kTold / normal_tail(exceeded(kTold));
+  return normal_quantile(level / comparisons);
 }
 
 double neighbours_alike(const std::vector<Scores>& scores) {

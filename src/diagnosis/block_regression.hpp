@@ -22,6 +22,8 @@ struct AddedColumns {
   AddedColumns() = default;
   AddedColumns(std::size_t blocks, Eigen::Index base, Eigen::Index added);
   [[nodiscard]] Eigen::Index size() const { return d.empty() ? 0 : d.front().size(); }
+  /// Some of them.
+  [[nodiscard]] AddedColumns only(const std::vector<Eigen::Index>& columns) const;
 };
 
 /// What is left of added columns once the base has taken what it can explain; each column by itself.
@@ -79,10 +81,12 @@ class BlockRegression {
   Eigen::MatrixXd H_;
   Eigen::LDLT<Eigen::MatrixXd> total_;
   Eigen::VectorXd step_;
+  std::vector<Eigen::VectorXd> left_;  ///< per block: what its gradient is at the optimum
 };
 
 /// The |z| that the largest of all candidates exceeds by chance in a share `level` of logs: every block's say times a
 /// random number, the same one for all candidates (wild bootstrap: Wu 1986; largest of all: Westfall and Young 1993).
+/// Levels that so few draws do not tell follow from how many comparisons of their own the draws behave like.
 double chance_threshold(const std::vector<Scores>& scores, double level, std::uint64_t seed);
 
 /// How alike neighbouring blocks err: mean lag-one autocorrelation of the candidates' scores about their means.

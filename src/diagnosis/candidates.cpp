@@ -208,6 +208,21 @@ std::pair<double, double> seen_span(const LogFit& fit, const LinearLog& at) {
   return {first, last};
 }
 
+std::vector<std::vector<Direction>> directions_of(LogFit& fit, const LogAbout& log, const Candidate& candidate) {
+  const auto& roles = log.state.model().roles();
+  if (candidate.generic()) return along_joint(fit, roles.index(candidate.cause.joint), candidate.amounts);
+  ErrorModel model(roles);
+  auto& effect = model.add(candidate.cause.name, {candidate.cause.joint, candidate.cause.source});
+  const auto timing = effect_kind(candidate.cause.name).timing;
+  if (timing == EffectTiming::kFromATime) effect.parameters()[1].value = seconds(candidate.from);
+  if (timing == EffectTiming::kOverTheLog) {
+    const auto [begin, end] = seen_span(fit, log.at);
+    effect.parameters()[1].value = begin;
+    effect.parameters()[2].value = end - begin;
+  }
+  return fit.directions(log.at, model, fitted_parameters(model));
+}
+
 std::vector<Candidate> catalogue_candidates(LogFit& fit, const LogAbout& log,
                                             const std::vector<NotTestable>& untestable) {
   const auto& roles = log.state.model().roles();
@@ -264,7 +279,8 @@ std::vector<Candidate> free_curves(LogFit& fit, const LogAbout& log) {
   return list;
 }
 
-Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<NotTestable>& untestable) {
+Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<NotTestable>& untestable,
+            bool at_every_picture) {
   const auto n = base.size();
   const auto& parameters = log.state.parameters();
   const auto pictures = log.base.size();
@@ -289,6 +305,7 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
         tail.d[b][0] -= log.precision[p] * gradient(log.at.evidence[p], own);
       }
       if (log.at.instants[p].utime == log.at.instants[p - 1].utime || log.precision[p] <= 0.0) continue;
+      if (!at_every_picture && log.block_of[p] == log.block_of[p - 1]) continue;
       result.all.push_back(base.score(tail));
       const auto& scores = result.all.back();
       // When it was is where it explains most (maximum likelihood): how far it stands out hardly says.

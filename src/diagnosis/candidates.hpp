@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,9 +30,11 @@ struct Candidate {
 /// A log about one state: what every picture says about the state's parameters and about everything else that may be
 /// wrong, summed up in blocks.
 struct LogAbout {
-  explicit LogAbout(State s) : state(std::move(s)) {}
+  LogAbout(State s, std::shared_ptr<const LinearLog> pictures)
+      : state(std::move(s)), linear(std::move(pictures)), at(*linear) {}
   State state;
-  LinearLog at;                   ///< over all coordinates
+  std::shared_ptr<const LinearLog> linear;
+  const LinearLog& at;            ///< over all coordinates
   std::vector<double> precision;  ///< per picture: 1 / variance of a residual, 1/px^2; 0: nothing seen
   /// [picture][column]: the state's parameters, the free curves that were found, and what is not estimated but may be
   /// wrong within the robot's tolerances or a picture's sharpness.
@@ -58,15 +61,19 @@ std::vector<Candidate> catalogue_candidates(LogFit& fit, const LogAbout& log,
                                             const std::vector<NotTestable>& untestable);
 /// Free curves of every arm joint over time, angle, velocity, acceleration and torque.
 std::vector<Candidate> free_curves(LogFit& fit, const LogAbout& log);
+/// How a candidate's columns move each picture: [picture][column].
+std::vector<std::vector<Direction>> directions_of(LogFit& fit, const LogAbout& log, const Candidate& candidate);
 /// How a joint's correction by these amounts moves the pictures: [picture][column].
 std::vector<std::vector<Direction>> along_joint(const LogFit& fit, Eigen::Index joint,
                                                 const std::vector<std::vector<double>>& amounts);
-/// A slip of every arm joint at every picture, scored. `best` keeps of every joint the time at which one explains most.
+/// A slip of every arm joint at every picture (or where every block begins), scored. `best` keeps of every joint the
+/// time at which one explains most.
 struct Slips {
   std::vector<Scores> all;
   std::vector<Candidate> best;
 };
-Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<NotTestable>& untestable);
+Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<NotTestable>& untestable,
+            bool at_every_picture = true);
 
 /// Whether a cause would stand out of a log, with this threshold of z, before it is larger than on any robot.
 bool is_told(const Candidate& candidate, const JointRoles& roles, double threshold);

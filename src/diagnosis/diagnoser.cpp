@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "block_regression.hpp"
@@ -15,6 +16,7 @@
 #include "findings.hpp"
 #include "limits.hpp"
 #include "log_motion.hpp"
+#include "look.hpp"
 #include "model_search.hpp"
 #include "verdict.hpp"
 
@@ -24,9 +26,8 @@ namespace {
 
 class Diagnoser {
  public:
-  Diagnoser(LogFit& fit, const std::vector<Belief>& beliefs, const std::vector<Belief>& tolerances,
-            const DiagnosisOptions& options)
-      : fit_(fit), options_(options), search_(fit, beliefs, tolerances, options) {}
+  Diagnoser(LogFit& fit, ModelSearch search, const DiagnosisOptions& options)
+      : fit_(fit), options_(options), search_(std::move(search)) {}
 
   DiagnosisReport run() {
     refuse_unusable();
@@ -39,23 +40,23 @@ class Diagnoser {
     Findings findings(fit_, search_, options_, report_);
     const auto begin = search_.about(options_.block_s);
     findings.before(begin);
-    block_s_ = options_.block_s;
-    for (std::size_t round = 0; round < limits::kMostCauses; ++round) {
-      const bool taken = take_one(round);
-      progress(0.2 + 0.1 * static_cast<double>(round + 1));
-      if (taken) continue;
-      // Blocks that err alike are no witnesses of their own.
-      if (alike_ <= limits::kNeighboursAlike || search_.about(2.0 * block_s_).blocks < limits::kFewestBlocks) break;
-      block_s_ *= 2.0;
-    }
-    while (drop_one()) {
-    }
+    find_causes();
     search_.polish(block_s_);
     progress(0.85);
     findings.conclude(search_.about(block_s_), candidates_of_end());
     const auto& log = fit_.log();
     word_verdict(report_, log.roles(), across_axes(log.robot(), log.setup(), log.roles()));
     progress(1.0);
+    return std::move(report_);
+  }
+
+  /// The search alone, about pictures that were linearised already.
+  DiagnosisReport look() {
+    report_.not_testable = untestable(fit_.log().roles(), motion());
+    find_causes();
+    if (!asked_) field();
+    Findings(fit_, search_, options_, report_).name_causes(asked_->log, asked_->candidates);
+    word_verdict(report_, fit_.log().roles());
     return std::move(report_);
   }
 
@@ -111,28 +112,57 @@ class Diagnoser {
     std::vector<Candidate> candidates;  ///< the catalogue's, free curves, of each joint the best slip
     double threshold = 0.0;
   };
-  Field field() {
+  Field& field() {
     LogAbout log = search_.about(block_s_);
     BlockRegression base = search_.regression(log);
     auto candidates = catalogue_candidates(fit_, log, report_.not_testable);
-    auto curves = free_curves(fit_, log);
-    std::move(curves.begin(), curves.end(), std::back_inserter(candidates));
     std::vector<Scores> scores;
+    if (search_.refits()) add_curves(log, candidates);
     for (auto& candidate : candidates) {
       candidate.scores = base.score(candidate.columns);
       scores.push_back(candidate.scores);
     }
     alike_ = neighbours_alike(scores);
-    auto slips = diagnosis::slips(log, base, report_.not_testable);
+    auto slips = diagnosis::slips(log, base, report_.not_testable, search_.refits());
     std::move(slips.all.begin(), slips.all.end(), std::back_inserter(scores));
     std::move(slips.best.begin(), slips.best.end(), std::back_inserter(candidates));
     const double threshold = chance_threshold(scores, options_.level, options_.seed);
-    return {std::move(log), std::move(base), std::move(candidates), threshold};
+    // A look has no time for curves, but where something is about to be named that may only stand in for one.
+    if (!search_.refits() &&
+        std::any_of(candidates.begin(), candidates.end(), [&](const Candidate& c) { return c.z() >= threshold; })) {
+      const auto known = candidates.size();
+      add_curves(log, candidates);
+      for (std::size_t c = known; c < candidates.size(); ++c) candidates[c].scores = base.score(candidates[c].columns);
+    }
+    asked_.reset();
+    return asked_.emplace(Field{std::move(log), std::move(base), std::move(candidates), threshold});
+  }
+
+  void add_curves(const LogAbout& log, std::vector<Candidate>& candidates) {
+    auto curves = free_curves(fit_, log);
+    std::move(curves.begin(), curves.end(), std::back_inserter(candidates));
+  }
+
+  void find_causes() {
+    block_s_ = options_.block_s;
+    for (std::size_t round = 0; round < limits::kMostCauses; ++round) {
+      const bool taken = take_one(round);
+      progress(0.2 + 0.1 * static_cast<double>(round + 1));
+      if (taken) {
+        asked_.reset();
+        continue;
+      }
+      // Blocks that err alike are no witnesses of their own.
+      if (alike_ <= limits::kNeighboursAlike || search_.about(2.0 * block_s_).blocks < limits::kFewestBlocks) break;
+      block_s_ *= 2.0;
+      asked_.reset();
+    }
+    while (drop_one()) asked_.reset();
   }
 
   /// Finds the next cause and takes it into the model; false: there is none.
   bool take_one(std::size_t round) {
-    Field field = this->field();
+    const Field& field = this->field();
     report_.z_threshold = field.threshold;
     if (round == 0) leave_out_untold(field);
     auto trials = trials_of(field, round == 0);
@@ -223,7 +253,7 @@ class Diagnoser {
     const auto& candidate = *trial.candidate;
     Eigen::VectorXd amount = trial.heldout.estimate.tail(candidate.columns.size());
     if (!candidate.generic()) {
-      const auto nuisance = search_.columns_of(candidate.cause);
+      const auto nuisance = search_.refits() ? search_.columns_of(candidate.cause) : std::vector<Eigen::Index>{};
       if (!nuisance.empty() && static_cast<Eigen::Index>(nuisance.size()) != amount.size()) return {};
       if (!nuisance.empty()) amount = search_.state().x()(nuisance);
     }
@@ -244,7 +274,9 @@ class Diagnoser {
     cause.begin_s = begin;
     cause.duration_s = end - begin;
     cause.amounts = candidate.amounts;
-    cause.small = size_of(field, trial).metres() < options_.matters_m;
+    cause.columns = static_cast<std::size_t>(candidate.columns.size());
+    cause.size = size_of(field, trial);
+    cause.small = cause.size.metres() < options_.matters_m;
     return search_.add(cause, trial.heldout.estimate, field.base.size());
   }
 
@@ -272,7 +304,7 @@ class Diagnoser {
   }
 
   std::vector<Candidate> candidates_of_end() {
-    Field field = this->field();
+    Field& field = this->field();
     for (const auto& candidate : field.candidates) {
       for (auto& bar : report_.bars) {
         if (bar.label == label_of(candidate)) bar.z_after = std::max(bar.z_after, candidate.z());
@@ -318,7 +350,8 @@ class Diagnoser {
   ModelSearch search_;
   DiagnosisReport report_;
   double block_s_ = 0.0;
-  double alike_ = 0.0;  ///< correlation of neighbouring blocks, at the last look
+  std::optional<Field> asked_;  ///< about the present model
+  double alike_ = 0.0;          ///< correlation of neighbouring blocks, at the last look
   std::vector<CauseName> refused_;
 };
 
@@ -327,7 +360,14 @@ class Diagnoser {
 
 DiagnosisReport diagnose(LogFit& fit, const std::vector<Belief>& beliefs, const std::vector<Belief>& tolerances,
                          const DiagnosisOptions& options) {
-  return diagnosis::Diagnoser(fit, beliefs, tolerances, options).run();
+  return diagnosis::Diagnoser(fit, diagnosis::ModelSearch(fit, beliefs, tolerances, options), options).run();
+}
+
+DiagnosisReport diagnosis::look(LogFit& fit, State state, std::shared_ptr<const LinearLog> pictures,
+                                std::vector<OutlineNoise> noise, const std::vector<Belief>& tolerances,
+                                const DiagnosisOptions& options) {
+  ModelSearch search(fit, std::move(state), std::move(pictures), std::move(noise), tolerances, options);
+  return Diagnoser(fit, std::move(search), options).look();
 }
 
 }  // namespace bodyschema

@@ -80,21 +80,6 @@ Reduced without(const ModelSearch& search, const BlockRegression& all, const std
   return {BlockRegression(std::move(blocks), all.precision()(kept), all.away()(kept)), std::move(own), std::move(kept)};
 }
 
-std::vector<std::vector<Direction>> directions_of(LogFit& fit, const LogAbout& log, const Candidate& candidate) {
-  const auto& roles = log.state.model().roles();
-  if (candidate.generic()) return along_joint(fit, roles.index(candidate.cause.joint), candidate.amounts);
-  ErrorModel model(roles);
-  auto& effect = model.add(candidate.cause.name, {candidate.cause.joint, candidate.cause.source});
-  const auto timing = effect_kind(candidate.cause.name).timing;
-  if (timing == EffectTiming::kFromATime) effect.parameters()[1].value = seconds(candidate.from);
-  if (timing == EffectTiming::kOverTheLog) {
-    const auto [begin, end] = seen_span(fit, log.at);
-    effect.parameters()[1].value = begin;
-    effect.parameters()[2].value = end - begin;
-  }
-  return fit.directions(log.at, model, fitted_parameters(model));
-}
-
 double Findings::quantile(const LogAbout& log) const {
   return student_quantile(limits::kConfidence, std::max(1.0, static_cast<double>(log.blocks) - 1.0));
 }
@@ -205,6 +190,22 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
           found / sampled, where_seen / sampled_seen};
 }
 
+void Findings::name_causes(const LogAbout& log, const std::vector<Candidate>& candidates) {
+  const auto all = search_.regression(log);
+  covariance_ = all.covariance();
+  report_.blocks = log.blocks;
+  describe_causes(log, all, candidates);
+  std::vector<std::string> kinds;
+  for (const auto& p : search_.state().parameters()) {
+    const auto& kind = search_.state().model()[p.ref.effect].name();
+    const bool found = std::any_of(search_.causes().begin(), search_.causes().end(),
+                                   [&](const FoundCause& cause) { return cause.name.name == kind; });
+    if (kind == "joint_offset" || found || std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) continue;
+    kinds.push_back(kind);
+    add_estimated(log, all, kind, candidates);
+  }
+}
+
 void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candidates) {
   const auto all = search_.regression(log);
   const auto& state = search_.state();
@@ -240,7 +241,11 @@ bool Findings::is_small(const LogAbout& log, const BlockRegression& all, std::si
     ++pieces;
   }
   if (pieces < 2) return true;
-  const Eigen::VectorXd amount = values_of(search_, columns) + all.step()(columns);
+  return size_of(log, all, columns, values_of(search_, columns) + all.step()(columns)).metres() < options_.matters_m;
+}
+
+Size Findings::size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns,
+                       const Eigen::VectorXd& amount) {
   const auto joints = search_.state().joints();
   Eigen::MatrixXd H = all.precision().head(joints).asDiagonal(), B = Eigen::MatrixXd::Zero(joints, amount.size());
   for (const auto& block : all.parts()) {
@@ -251,7 +256,68 @@ bool Findings::is_small(const LogAbout& log, const BlockRegression& all, std::si
   for (std::size_t p = 0; p < directions.size(); ++p) {
     for (const auto i : columns) directions[p].push_back(log.base[p][static_cast<std::size_t>(i)]);
   }
-  return search_.size_of(log, directions, amount, -H.ldlt().solve(B * amount)).metres() < options_.matters_m;
+  return search_.size_of(log, directions, amount, -H.ldlt().solve(B * amount));
+}
+
+void Findings::add_estimated(const LogAbout& log, const BlockRegression& all, const std::string& kind,
+                             const std::vector<Candidate>& candidates) {
+  const auto& state = search_.state();
+  std::vector<EffectTarget> targets;
+  std::vector<std::vector<Eigen::Index>> columns;
+  std::vector<Eigen::Index> out;
+  for (Eigen::Index i = state.joints(); i < state.size(); ++i) {
+    const auto& effect = state.model()[state.parameters()[static_cast<std::size_t>(i)].ref.effect];
+    if (effect.name() != kind) continue;
+    if (targets.empty() || !(targets.back() == effect.target())) {
+      targets.push_back(effect.target());
+      columns.emplace_back();
+    }
+    columns.back().push_back(i);
+    out.push_back(i);
+  }
+  const auto reduced = without(search_, all, out);
+  const double loss = reduced.base.heldout().total();
+  double most = 0.0;
+  std::size_t best = targets.size();
+  AddedColumns own;
+  for (std::size_t t = 0; t < targets.size(); ++t) {
+    std::vector<Eigen::Index> at;
+    for (const auto i : columns[t]) at.push_back(std::find(out.begin(), out.end(), i) - out.begin());
+    auto part = reduced.own.only(at);
+    const double gain = loss - reduced.base.heldout(part).total();
+    if (gain <= most) continue;
+    most = gain;
+    best = t;
+    own = std::move(part);
+  }
+  if (best == targets.size()) return;
+  const auto scores = reduced.base.score(own);
+  DiagnosedCause cause;
+  cause.cause = {kind, targets[best].joint, targets[best].source};
+  cause.z = scores.z();
+  if (cause.z < report_.z_threshold) return;
+  const Eigen::VectorXd estimate = scores.estimate();
+  const auto size = size_of(log, all, columns[best], estimate);
+  if (size.metres() < options_.matters_m) return;
+  cause.hand_mm = 1e3 * size.hand_m;
+  cause.outline_px = size.outline_px;
+  cause.heldout_gain = loss > 0.0 ? most / loss : 0.0;
+  const Eigen::MatrixXd covariance = reduced.base.covariance(scores);
+  for (std::size_t k = 0; k < columns[best].size(); ++k) {
+    const auto& p = state.parameters()[static_cast<std::size_t>(columns[best][k])];
+    const auto i = static_cast<Eigen::Index>(k);
+    cause.parameters.push_back(parameter_of(log, state.model()[p.ref.effect].parameters()[p.ref.parameter], estimate[i],
+                                            std::sqrt(covariance(i, i))));
+  }
+  cause.same = {cause.cause};
+  find_class(reduced, out, columns[best], own, candidates, cause);
+  report_.estimated.push_back(std::move(cause));
+}
+
+DiagnosedParameter Findings::parameter_of(const LogAbout& log, const EffectParameter& parameter, double value,
+                                          double sd) const {
+  const double half = quantile(log) * sd, unit = parameter.si_per_unit;
+  return {parameter.name, parameter.unit, value / unit, {(value - half) / unit, (value + half) / unit}, sd / unit};
 }
 
 void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
@@ -263,23 +329,22 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
     DiagnosedCause cause;
     cause.cause = found.name;
     cause.variable = found.variable;
-    const auto [base, own, kept] = without(search_, all, search_.columns_of(c));
-    static_cast<void>(kept);
-    cause.z = base.score(own).z();
-    const double lost = base.heldout().loss.sum();
+    const auto columns = search_.columns_of(c);
+    const auto reduced = without(search_, all, columns);
+    cause.z = reduced.base.score(reduced.own).z();
+    const double lost = reduced.base.heldout().loss.sum();
     cause.heldout_gain = lost > 0.0 ? std::max(0.0, 1.0 - loss / lost) : 0.0;
     cause.same = {found.name};
+    cause.hand_mm = 1e3 * found.size.hand_m;
+    cause.outline_px = found.size.outline_px;
     if (!found.generic()) {
-      const auto columns = search_.columns_of(c);
-      for (std::size_t k = 0; k < columns.size(); ++k) {
-        const auto i = columns[k];
-        const auto& p = state.parameters()[static_cast<std::size_t>(i)];
-        const auto& parameter = state.model()[p.ref.effect].parameters()[p.ref.parameter];
-        const double value = state.x()[i], half = quantile(log) * std::sqrt(covariance_(i, i));
-        DiagnosedParameter e{parameter.name,
-                             p.unit,
-                             value / p.si_per_unit,
-                             {(value - half) / p.si_per_unit, (value + half) / p.si_per_unit}};
+      const auto effect = make_effect(found.name.name, {found.name.joint, found.name.source}, state.model().roles());
+      std::size_t next = 0;
+      for (const auto& parameter : std::as_const(*effect).parameters()) {
+        if (!parameter.fitted) continue;
+        const auto i = columns[next++];
+        const double value = search_.in_state(found) ? state.x()[i] : all.step()[i];
+        auto e = parameter_of(log, parameter, value, std::sqrt(covariance_(i, i)));
         const auto timing = effect_kind(found.name.name).timing;
         if (timing == EffectTiming::kFromATime) e.from = found.from;
         if (timing == EffectTiming::kOverTheLog) {
@@ -289,7 +354,7 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
         cause.parameters.push_back(std::move(e));
         cause.implausible = cause.implausible || std::abs(value) > limits::kImplausible * parameter.typical;
       }
-      find_class(all, c, candidates, cause);
+      find_class(reduced, columns, columns, reduced.own, candidates, cause);
     }
     (is_small(log, all, c) ? report_.small_causes : report_.causes).push_back(std::move(cause));
   }
@@ -298,18 +363,19 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
                    [](const auto& a, const auto& b) { return a.heldout_gain > b.heldout_gain; });
 }
 
-void Findings::find_class(const BlockRegression& all, std::size_t cause, const std::vector<Candidate>& candidates,
-                          DiagnosedCause& out) {
-  const auto columns = search_.columns_of(cause);
-  const Eigen::VectorXd value = values_of(search_, columns);
-  const auto [base, own, kept] = without(search_, all, columns);
+void Findings::find_class(const Reduced& reduced, const std::vector<Eigen::Index>& out,
+                          const std::vector<Eigen::Index>& columns, const AddedColumns& own,
+                          const std::vector<Candidate>& candidates, DiagnosedCause& cause) {
+  const auto& [base, all_out, kept] = reduced;
+  static_cast<void>(all_out);
+  const Eigen::VectorXd value = values_of(search_, out);
   const auto with = base.heldout(own);
   const double gain = base.heldout().total() - with.total();
-  const double dof = static_cast<double>(all.blocks()) - 1.0;
+  const double dof = static_cast<double>(base.blocks()) - 1.0;
   const auto own_columns = static_cast<Eigen::Index>(columns.size());
   for (const auto& candidate : candidates) {
-    if (candidate.generic()) continue;
-    const auto rival = beside(candidate.columns, kept, columns, value);
+    if (candidate.generic() || candidate.cause == cause.cause) continue;
+    const auto rival = beside(candidate.columns, kept, out, value);
     const auto scores = base.score(rival);
     if (scores.independent.maxCoeff() < limits::kRounding) continue;
     const auto other = base.heldout(rival);
@@ -318,22 +384,22 @@ void Findings::find_class(const BlockRegression& all, std::size_t cause, const s
     // One that can say the same and more besides is no other explanation: what is left of the cause beside it?
     if (rival.size() > own_columns) {
       Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(own_columns, rival.size());
-      for (std::size_t b = 0; b < all.blocks(); ++b) shared += candidate.columns.B[b](columns, Eigen::all);
+      for (std::size_t b = 0; b < base.blocks(); ++b) shared += candidate.columns.B[b](columns, Eigen::all);
       const auto own_scores = base.score(own);
       const Eigen::MatrixXd cross = shared - own_scores.Y.transpose() * sum_of(rival.B);
       const Eigen::MatrixXd left = own_scores.S - cross * scores.S.ldlt().solve(cross.transpose());
       if (left.diagonal().cwiseQuotient(own_scores.S.diagonal()).maxCoeff() < limits::kSameChange) continue;
     }
-    out.same.push_back(candidate.cause);
+    cause.same.push_back(candidate.cause);
   }
-  if (out.same.size() < 2) return;
+  if (cause.same.size() < 2) return;
   std::vector<std::string> motions;
-  for (const auto& name : out.same) {
+  for (const auto& name : cause.same) {
     const auto& motion = effect_kind(name.name).splitting_motion;
     if (!motion.empty() && std::find(motions.begin(), motions.end(), motion) == motions.end())
       motions.push_back(motion);
   }
-  for (const auto& motion : motions) out.advice += (out.advice.empty() ? "" : " ") + motion;
+  for (const auto& motion : motions) cause.advice += (cause.advice.empty() ? "" : " ") + motion;
 }
 
 void Findings::check_outlines(const LogAbout& log) {

@@ -18,9 +18,6 @@ struct Reduced {
 };
 Reduced without(const ModelSearch& search, const BlockRegression& all, const std::vector<Eigen::Index>& out);
 
-/// How a candidate's columns move each picture: [picture][column].
-std::vector<std::vector<Direction>> directions_of(LogFit& fit, const LogAbout& log, const Candidate& candidate);
-
 /// What the answer says of a model: sizes with their intervals, what else would explain the same, what is excluded, and
 /// how well pictures are predicted.
 class Findings {
@@ -29,6 +26,9 @@ class Findings {
       : fit_(fit), search_(search), options_(options), report_(report) {}
   /// The model without any cause.
   void before(const LogAbout& log);
+  /// The causes alone, and which of the effects that are estimated anyway stand out (report.estimated).
+  /// @param candidates  all that are not in the model, about it
+  void name_causes(const LogAbout& log, const std::vector<Candidate>& candidates);
   /// The final one. @param candidates  all that are not in it, about it
   void conclude(const LogAbout& log, const std::vector<Candidate>& candidates);
 
@@ -40,8 +40,20 @@ class Findings {
   void describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
   /// Whether a cause moves less than what matters, all else that was found of its joint together with it.
   [[nodiscard]] bool is_small(const LogAbout& log, const BlockRegression& all, std::size_t cause);
-  void find_class(const BlockRegression& all, std::size_t cause, const std::vector<Candidate>& candidates,
-                  DiagnosedCause& out);
+  /// What some of the base's columns move by so much, the joints' offsets fitted anew.
+  [[nodiscard]] Size size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns,
+                             const Eigen::VectorXd& amount);
+  /// An effect of the state against a model that knows no effect of its kind: of joints of one kind that move the
+  /// pictures alike the one is taken that explains most.
+  void add_estimated(const LogAbout& log, const BlockRegression& all, const std::string& kind,
+                     const std::vector<Candidate>& candidates);
+  /// @param out  positions in the base of what `reduced` lacks
+  /// @param columns  ... of those among them that are the cause's; `own` are their columns
+  void find_class(const Reduced& reduced, const std::vector<Eigen::Index>& out,
+                  const std::vector<Eigen::Index>& columns, const AddedColumns& own,
+                  const std::vector<Candidate>& candidates, DiagnosedCause& cause);
+  [[nodiscard]] DiagnosedParameter parameter_of(const LogAbout& log, const EffectParameter& parameter, double value,
+                                                double sd) const;
   void exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
   /// Where outlines lie off on one side of one part, block after block, and how much is left for pixel noise.
   void check_outlines(const LogAbout& log);

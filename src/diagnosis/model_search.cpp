@@ -50,6 +50,12 @@ ModelSearch::ModelSearch(LogFit& fit, const std::vector<Belief>& beliefs, const 
       raster_(raster_of(fit.log(), options.most_pictures)), state_(fit.log().roles(), beliefs),
       noise_(fit.log().rig().cameras.size(), OutlineNoise(options.noise)) {}
 
+ModelSearch::ModelSearch(LogFit& fit, State state, std::shared_ptr<const LinearLog> pictures,
+                         std::vector<OutlineNoise> noise, const std::vector<Belief>& tolerances,
+                         const DiagnosisOptions& options)
+    : fit_(fit), tolerances_(tolerances), options_(options), given_(std::move(pictures)),
+      raster_(raster_of(fit.log(), options.most_pictures)), state_(std::move(state)), noise_(std::move(noise)) {}
+
 OutlineSearch ModelSearch::search() const {
   double robust_px = 0.0;
   for (const auto& noise : noise_) robust_px = std::max(robust_px, noise.robust_px());
@@ -127,7 +133,7 @@ void ModelSearch::take_over(State& to, const State& from) {
 bool ModelSearch::add(const FoundCause& cause, const Eigen::VectorXd& estimate, Eigen::Index base) {
   auto causes = causes_;
   causes.push_back(cause);
-  if (cause.generic()) {
+  if (!in_state(cause)) {
     causes_ = std::move(causes);
     return true;
   }
@@ -157,10 +163,10 @@ bool ModelSearch::add(const FoundCause& cause, const Eigen::VectorXd& estimate, 
 
 void ModelSearch::drop(std::size_t cause) {
   auto causes = causes_;
-  const bool generic = causes[cause].generic();
+  const bool beside = !in_state(causes[cause]);
   causes.erase(causes.begin() + static_cast<std::ptrdiff_t>(cause));
   causes_ = causes;
-  if (generic) return;
+  if (beside) return;
   State state = state_with(causes);
   take_over(state, state_);
   // A nuisance that was let loose is held by its belief again.
@@ -179,23 +185,23 @@ std::vector<Eigen::Index> ModelSearch::columns_of(const CauseName& name) const {
 
 std::vector<Eigen::Index> ModelSearch::columns_of(std::size_t cause) const {
   const auto& found = causes_[cause];
-  if (!found.generic()) return columns_of(found.name);
+  if (in_state(found)) return columns_of(found.name);
   std::vector<Eigen::Index> list;
   Eigen::Index first = state_.size();
   for (std::size_t c = 0; c < cause; ++c) {
-    if (causes_[c].generic()) first += static_cast<Eigen::Index>(causes_[c].amounts.size());
+    if (!in_state(causes_[c])) first += static_cast<Eigen::Index>(causes_[c].columns);
   }
-  for (std::size_t k = 0; k < found.amounts.size(); ++k) list.push_back(first + static_cast<Eigen::Index>(k));
+  for (std::size_t k = 0; k < found.columns; ++k) list.push_back(first + static_cast<Eigen::Index>(k));
   return list;
 }
 
 LogAbout ModelSearch::about(double block_s) {
   std::vector<std::uint32_t> all(static_cast<std::size_t>(fit_.coordinates().size()));
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint32_t>(i);
-  LogAbout log(state_);
-  log.at = fit_.linearise(state_.model(), all, search());
+  LogAbout log(state_,
+               given_ ? given_ : std::make_shared<const LinearLog>(fit_.linearise(state_.model(), all, search())));
   log.base = fit_.directions(log.at, state_.model(), refs_of(state_));
-  add_free_curves(log);
+  add_causes(log);
   add_considered(log);
   for (std::size_t p = 0; p < log.base.size(); ++p) {
     const auto camera = fit_.log().pictures()[p].camera;
@@ -208,13 +214,16 @@ LogAbout ModelSearch::about(double block_s) {
   return log;
 }
 
-void ModelSearch::add_free_curves(LogAbout& log) const {
+void ModelSearch::add_causes(LogAbout& log) const {
   for (const auto& cause : causes_) {
-    if (!cause.generic()) {
-      log.found.push_back(cause.name);
-      continue;
-    }
-    const auto more = along_joint(fit_, state_.model().roles().index(cause.name.joint), cause.amounts);
+    if (!cause.generic()) log.found.push_back(cause.name);
+    if (in_state(cause)) continue;
+    const auto more = directions_of(fit_, log,
+                                    {.cause = cause.name,
+                                     .variable = cause.variable,
+                                     .parameters = {},
+                                     .from = cause.from,
+                                     .amounts = cause.amounts});
     for (std::size_t p = 0; p < more.size(); ++p) log.base[p].insert(log.base[p].end(), more[p].begin(), more[p].end());
   }
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,17 +12,6 @@
 
 namespace bodyschema::diagnosis {
 
-/// A cause that was found.
-struct FoundCause {
-  CauseName name;
-  std::string variable;                        ///< of a free curve
-  Microseconds from = 0;                       ///< of a slip
-  double begin_s = 0.0, duration_s = 0.0;      ///< of a drift
-  std::vector<std::vector<double>> amounts{};  ///< of a free curve
-  bool small = false;                          ///< it moves less than what matters: not named, but in the model
-  [[nodiscard]] bool generic() const { return !variable.empty(); }
-};
-
 /// What a cause moves, root mean square over the log.
 struct Size {
   double hand_m = 0.0, outline_px = 0.0;
@@ -28,11 +19,29 @@ struct Size {
   [[nodiscard]] double metres() const { return std::max(hand_m, outline_m); }
 };
 
+/// A cause that was found.
+struct FoundCause {
+  CauseName name;
+  std::string variable;                        ///< of a free curve
+  Microseconds from = 0;                       ///< of a slip
+  double begin_s = 0.0, duration_s = 0.0;      ///< of a drift
+  std::vector<std::vector<double>> amounts{};  ///< of a free curve
+  std::size_t columns = 0;                     ///< how many parameters are fitted
+  Size size{};                                 ///< when it was found
+  bool small = false;                          ///< it moves less than what matters: not named, but in the model
+  [[nodiscard]] bool generic() const { return !variable.empty(); }
+};
+
 /// The model of a log as it grows: a state with beliefs, and the causes that were found.
 class ModelSearch {
  public:
   ModelSearch(LogFit& fit, const std::vector<Belief>& beliefs, const std::vector<Belief>& tolerances,
               const DiagnosisOptions& options);
+
+  /// About pictures that were linearised already, whose outlines may be gone: a cause that is added stands in the
+  /// regression alone, and nothing is fitted anew.
+  ModelSearch(LogFit& fit, State state, std::shared_ptr<const LinearLog> pictures, std::vector<OutlineNoise> noise,
+              const std::vector<Belief>& tolerances, const DiagnosisOptions& options);
 
   /// Fits the state from all starts.
   void start();
@@ -52,6 +61,10 @@ class ModelSearch {
 
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const std::vector<FoundCause>& causes() const { return causes_; }
+  /// Whether a cause that is added is fitted with all else.
+  [[nodiscard]] bool refits() const { return !given_; }
+  /// Whether a cause is in the state; others stand in the regression alone, at zero.
+  [[nodiscard]] bool in_state(const FoundCause& cause) const { return !given_ && !cause.generic(); }
   [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
   [[nodiscard]] double cost() const { return cost_; }
   /// Positions of a cause's parameters in the base.
@@ -68,7 +81,7 @@ class ModelSearch {
   [[nodiscard]] State state_with(const std::vector<FoundCause>& causes) const;
   /// Values of the parameters that two states share.
   static void take_over(State& to, const State& from);
-  void add_free_curves(LogAbout& log) const;
+  void add_causes(LogAbout& log) const;
   void add_considered(LogAbout& log) const;
   void group_blocks(LogAbout& log) const;
   double fit(State& state, double from_px);
@@ -77,7 +90,8 @@ class ModelSearch {
   LogFit& fit_;
   std::vector<Belief> beliefs_, tolerances_;
   const DiagnosisOptions& options_;
-  std::vector<std::size_t> raster_;  ///< pictures that a fit looks at
+  std::shared_ptr<const LinearLog> given_;  ///< null: linearised anew whenever the state has changed
+  std::vector<std::size_t> raster_;         ///< pictures that a fit looks at
   State state_;
   std::vector<FoundCause> causes_;
   std::vector<OutlineNoise> noise_;

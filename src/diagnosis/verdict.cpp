@@ -144,6 +144,7 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles, const std::v
     }
     return text;
   };
+  list_of(report.estimated, false);
   const auto& causes = report.causes;
   const auto why = why_not(report);
   const bool unexplained = !why.empty() || std::any_of(causes.begin(), causes.end(), is_unexplained);

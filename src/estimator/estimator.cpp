@@ -86,6 +86,19 @@ const char* to_string(FrameVerdict verdict) {
   return "unknown";
 }
 
+std::string Finding::text() const {
+  std::string text = effect;
+  if (effect == "unexplained") return fmt::format("something that follows the {} of {}", source, joint);
+  if (!joint.empty()) text += " of " + joint;
+  if (!source.empty()) text += (joint.empty() ? " " : " with ") + source;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const auto& p = parameters[i];
+    text += fmt::format("{} {:.3g} {}", i > 0 ? "," : "", p.value, p.unit);
+  }
+  for (std::size_t i = 0; i < alike.size(); ++i) text += (i == 0 ? ", or " : " or ") + alike[i];
+  return text;
+}
+
 bool Estimate::told(std::size_t joint) const {
   constexpr double kTold_rad = 0.5 * kPi / 180.0;
   const auto k = static_cast<Eigen::Index>(joint);

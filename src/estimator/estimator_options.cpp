@@ -35,6 +35,7 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
   o.temperature = best.number_or("temperature", o.temperature, 1e-6, 10.0);
   o.refine_outline = best.boolean_or("refine_outline", o.refine_outline);
   o.remember = best.boolean_or("remember", o.remember);
+  o.live_diagnosis = best.boolean_or("live_diagnosis", o.live_diagnosis);
   o.outline_spacing_px = best.number_or("outline_spacing_px", o.outline_spacing_px, 0.5, 100.0);
   o.noise.sd_px = best.number_or("outline_sd_px", o.noise.sd_px, 1e-3, 100.0);
   o.noise.floor_px = best.number_or("outline_floor_px", o.noise.floor_px, 0.0, 100.0);

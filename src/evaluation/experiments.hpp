@@ -15,7 +15,8 @@ using Json = nlohmann::ordered_json;
 /// What takes long is not run more often than this, whatever the options ask for.
 inline constexpr int kMostAdaptationTrials = 14;  ///< slip, hand leaves, camera dies
 inline constexpr int kMostAblationTrials = 10;
-inline constexpr int kOffsetLogs = 6;  ///< never more or fewer
+inline constexpr int kMostLiveRuns = 4;  ///< live, as a part of all: each takes a minute
+inline constexpr int kOffsetLogs = 6;    ///< never more or fewer
 
 /// What every experiment needs to know.
 struct ExperimentContext {
@@ -41,5 +42,6 @@ void run_reach(ExperimentContext& context);
 void run_recording(ExperimentContext& context);
 void run_real(ExperimentContext& context);
 void run_diagnosis(ExperimentContext& context);
+void run_live(ExperimentContext& context);
 
 }  // namespace bodyschema

@@ -46,6 +46,22 @@ void PictureLog::add(const Observation& observation) {
   }
 }
 
+void PictureLog::forget_before(Microseconds utime) {
+  std::erase_if(pictures_, [&](const Picture& picture) { return picture.joints.utime < utime; });
+  // What has a memory, and the motion about the first picture, need those shortly before.
+  constexpr Microseconds kBefore = 1'000'000;
+  const auto first = std::find_if(encoders_.begin(), encoders_.end(),
+                                  [&](const JointSample& sample) { return sample.utime >= utime - kBefore; });
+  encoders_.erase(encoders_.begin(), first);
+}
+
+void PictureLog::drop_outlines() {
+  for (auto& picture : pictures_) {
+    picture.mask = picture.valid = BinaryMask();
+    picture.coverage = {};
+  }
+}
+
 void PictureLog::replace_rig(std::shared_ptr<const RobotModel> robot, const StereoRig& rig) {
   robot_ = std::move(robot);
   rig_ = rig;

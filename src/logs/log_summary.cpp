@@ -160,6 +160,7 @@ class Summariser {
       case MessageKind::kImages: good = take_images(event); break;
       case MessageKind::kJointOffsets: good = decode(event.data, offsets_).ok(); break;
       case MessageKind::kOffsetsStatus: good = decode(event.data, status_).ok(); break;
+      case MessageKind::kFindings: good = decode(event.data, findings_).ok(); break;
       // Noise on a channel of ours is unreadable; a channel of others is none of our business.
       case MessageKind::kUnknown: good = channel.summary.type == name_of(MessageKind::kUnknown); break;
     }
@@ -242,6 +243,7 @@ class Summariser {
   ImagesView images_;
   joint_offsets_t offsets_;
   offsets_status_t status_;
+  findings_t findings_;
 };
 
 std::string date_text(Microseconds utime) {

@@ -176,6 +176,32 @@ Json json_of(const offsets_status_t& m, const std::set<std::string>&) {
           {"config_hash", m.config_hash}};
 }
 
+Json json_of(const findings_t& m, const std::set<std::string>&) {
+  Json list = Json::array();
+  for (const auto& f : m.finding) {
+    Json parameters = Json::array();
+    for (std::size_t i = 0; i < f.parameter_name.size(); ++i) {
+      parameters.push_back({{"name", f.parameter_name[i]},
+                            {"unit", f.parameter_unit[i]},
+                            {"value", number(f.parameter_value[i])},
+                            {"stddev", number(f.parameter_stddev[i])}});
+    }
+    list.push_back({{"effect", f.effect},
+                    {"joint", f.joint},
+                    {"source", f.source},
+                    {"sentence", f.sentence},
+                    {"parameters", parameters},
+                    {"z", number(f.z)},
+                    {"hand_m", number(f.hand_m)},
+                    {"outline_px", number(f.outline_px)},
+                    {"from", timestamp(f.from_utime)},
+                    {"estimated", f.estimated != 0},
+                    {"alike", f.alike}});
+  }
+  return {{"timestamp", timestamp(m.utime)},      {"span_s", number(m.span_s)}, {"blocks", m.blocks},
+          {"z_threshold", number(m.z_threshold)}, {"count", m.num_findings},    {"findings", list}};
+}
+
 class Exporter {
  public:
   explicit Exporter(const McapExportOptions& options) : options_(options), reader_(options.log), writer_(options.out) {}
@@ -202,6 +228,7 @@ class Exporter {
       case MessageKind::kJointState: write_decoded(event, joint_state_, "bodyschema.JointState"); break;
       case MessageKind::kJointOffsets: write_decoded(event, offsets_, "bodyschema.JointOffsets"); break;
       case MessageKind::kOffsetsStatus: write_decoded(event, status_, "bodyschema.OffsetsStatus"); break;
+      case MessageKind::kFindings: write_decoded(event, findings_, "bodyschema.Findings"); break;
       case MessageKind::kImages: take_images(event); break;
       case MessageKind::kUnknown: ++summary_.unknown; break;
     }
@@ -263,6 +290,7 @@ class Exporter {
   JointStateMessage joint_state_;
   joint_offsets_t offsets_;
   offsets_status_t status_;
+  findings_t findings_;
   ImagesView images_;
   Image image_;
 };

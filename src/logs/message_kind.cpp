@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "bodyschema/findings_t.hpp"
 #include "bodyschema/joint_offsets_t.hpp"
 #include "bodyschema/offsets_status_t.hpp"
 
@@ -16,6 +17,7 @@ MessageKind kind_of(Bytes message) {
   if (fingerprint == bot_core::images_t::getHash()) return MessageKind::kImages;
   if (fingerprint == joint_offsets_t::getHash()) return MessageKind::kJointOffsets;
   if (fingerprint == offsets_status_t::getHash()) return MessageKind::kOffsetsStatus;
+  if (fingerprint == findings_t::getHash()) return MessageKind::kFindings;
   return MessageKind::kUnknown;
 }
 
@@ -25,6 +27,7 @@ const char* name_of(MessageKind kind) {
     case MessageKind::kImages: return "bot_core.images_t";
     case MessageKind::kJointOffsets: return "bodyschema.joint_offsets_t";
     case MessageKind::kOffsetsStatus: return "bodyschema.offsets_status_t";
+    case MessageKind::kFindings: return "bodyschema.findings_t";
     case MessageKind::kUnknown: return "?";
   }
   return "?";

@@ -5,7 +5,7 @@
 namespace bodyschema {
 
 /// The types this project speaks, told by the fingerprint with which every LCM message begins.
-enum class MessageKind { kJointState, kImages, kJointOffsets, kOffsetsStatus, kUnknown };
+enum class MessageKind { kJointState, kImages, kJointOffsets, kOffsetsStatus, kFindings, kUnknown };
 
 MessageKind kind_of(Bytes message);
 /// "bot_core.joint_state_t"; "?" for unknown ones.

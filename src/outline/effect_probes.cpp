@@ -62,13 +62,15 @@ void EffectProbes::forget() {
 void EffectProbes::directions(const Instant& at, std::vector<Direction>& out) {
   out.resize(probes_.size());
   for (std::size_t i = 0; i < probes_.size(); ++i) {
-    low_.clear();
-    high_.clear();
-    std::as_const(*probes_[i].low).apply(at, low_);
-    std::as_const(*probes_[i].high).apply(at, high_);
+    const Effect &low = *probes_[i].low, &high = *probes_[i].high;
+    const auto is_nothing = [](const EffectParameter& p) { return !p.fitted || p.value == 0.0; };
+    // Of an effect that is at zero nothing is known but its own change: the usual case, of a whole catalogue.
+    if (!std::all_of(low.parameters().begin(), low.parameters().end(), is_nothing)) low.apply(at, low_);
+    high.apply(at, high_);
     out[i].clear();
     for (std::size_t c = 0; c < coordinates_.all().size(); ++c) {
-      const double d = coordinates_[c].in(std::as_const(high_)) - coordinates_[c].in(std::as_const(low_));
+      // Only what an effect has changed is put back.
+      const double d = std::exchange(coordinates_[c].in(high_), 0.0) - std::exchange(coordinates_[c].in(low_), 0.0);
       if (d != 0.0) out[i].push_back({static_cast<std::uint32_t>(c), d / probes_[i].step});
     }
   }

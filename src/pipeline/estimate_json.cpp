@@ -19,6 +19,23 @@ Json matrix_json(const Pose& X) {
   return rows;
 }
 
+Json finding_json(const Finding& f) {
+  Json json = {{"effect", f.effect}};
+  if (!f.joint.empty()) json["joint"] = f.joint;
+  if (!f.source.empty()) json["source"] = f.source;
+  json["sentence"] = f.sentence;
+  for (const auto& p : f.parameters) {
+    json["parameters"].push_back({{"parameter", p.name}, {"unit", p.unit}, {"value", p.value}, {"stddev", p.sd}});
+  }
+  json["z"] = f.z;
+  json["hand_mm"] = f.hand_mm;
+  json["outline_px"] = f.outline_px;
+  if (f.from > 0) json["from_utime"] = f.from;
+  if (!f.alike.empty()) json["alike"] = f.alike;
+  if (f.estimated) json["estimated"] = true;
+  return json;
+}
+
 }  // namespace
 
 nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
@@ -59,6 +76,7 @@ nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
   json["postures"] = e.postures;
   json["posture_sd_deg"] = degrees(e.posture_sd_rad);
   json["outline"] = {{"stddev_px", e.outline_sd_px}, {"points_alike", e.outline_alike}};
+  for (const auto& finding : e.findings.causes) json["findings"].push_back(finding_json(finding));
   if (!e.changed.empty()) json["changed"] = e.changed;
   if (!e.misfit.empty()) json["misfit"] = e.misfit;
   if (!e.stalled_joint.empty()) {

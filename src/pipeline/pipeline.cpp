@@ -23,12 +23,15 @@ StereoRig corrected(const StereoRig& rig, const std::optional<ErrorModel>& model
   return model ? model->corrected(rig) : rig;
 }
 
-/// What of an extended model is not in the rig already.
-ErrorModel without_intrinsics(const std::optional<ErrorModel>& model, const std::shared_ptr<const RobotModel>& robot,
-                              const RobotSetup& setup, const StereoRig& rig) {
+/// What of an extended model is not in the rig already, and not found anew.
+ErrorModel effects_beside(const std::optional<ErrorModel>& model, const std::shared_ptr<const RobotModel>& robot,
+                          const RobotSetup& setup, const StereoRig& rig) {
   ErrorModel rest(JointRoles::of(robot, setup, rig));
   for (std::size_t e = 0; model && e < model->size(); ++e) {
-    if (effect_kind((*model)[e].name()).home != EffectHome::kCameras) rest.add((*model)[e].clone());
+    const auto& effect = (*model)[e];
+    if (effect_kind(effect.name()).home != EffectHome::kCameras && effect.name() != "joint_offset") {
+      rest.add(effect.clone());
+    }
   }
   return rest;
 }
@@ -55,7 +58,7 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
       rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
       beliefs_(Beliefs::from(configuration, JointRoles::of(robot_, setup_, rig_), rig_, options_)),
       background_watch_(robot_, links_of(rig_)), background_turned_rad_(rig_.cameras.size(), 0.0),
-      estimator_(robot_, setup_, rig_, beliefs_, options_, without_intrinsics(error_model_, robot_, setup_, rig_)),
+      estimator_(robot_, setup_, rig_, beliefs_, options_, effects_beside(error_model_, robot_, setup_, rig_)),
       configuration_hash_(configuration.hash()), model_hash_(model_hash_of(setup_, *robot_, error_model_)) {
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
@@ -73,6 +76,10 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
     eyes_.push_back({std::move(segmenter), GivenMask(vision_), std::move(undistorter), std::move(seen)});
   }
   changes_.resize(eyes_.size());
+}
+
+ErrorModel Pipeline::known_effects() const {
+  return effects_beside(error_model_, robot_, setup_, rig_);
 }
 
 ObservationStream Pipeline::make_stream() const {

@@ -99,6 +99,7 @@ class Replay {
     }
     spdlog::info("silhouettes: {}", pipeline_.estimator().engine_description());
     if (pipeline_.error_model()) spdlog::info("extended model: {}", describe(*pipeline_.error_model()));
+    if (options_.watcher) watcher_ = options_.watcher(pipeline_);
     std::size_t expected = count_frames();
     for_each("replay", [&](Observation& o, const Observation* next) { take(o, next, expected); });
     if (frames_.empty()) throw DataError(options_.log.string() + ": " + why_nothing_was_seen());
@@ -185,7 +186,8 @@ class Replay {
   }
 
   void take(Observation& observation, const Observation* next, std::size_t expected) {
-    const Estimate estimate = pipeline_.process(observation, next);
+    Estimate estimate = pipeline_.process(observation, next);
+    if (watcher_) watcher_(observation, estimate);
     Json json = estimate_json(estimate, pipeline_.rig());
     SeenFrame frame;
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
@@ -397,6 +399,7 @@ class Replay {
 
   ReplayOptions options_;
   Pipeline pipeline_;
+  ReplayOptions::Watcher watcher_;
   std::optional<Truth> truth_;
   std::ofstream estimates_;
   std::vector<SeenFrame> frames_;

@@ -25,6 +25,7 @@
 #include "bodyschema/core/clock.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/write_file.hpp"
+#include "bodyschema/diagnosis/live_diagnosis.hpp"
 #include "bodyschema/pipeline/estimate_line.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/service/health.hpp"
@@ -121,9 +122,11 @@ struct Session {
         link(lcm_url, pipeline->bus().one_source_silence_s,
              pipeline->bus().longest_message_bytes(pipeline->rig().cameras.size())),
         receiver(link, pipeline->make_stream(), queue, recorder), picture_since_us(pipeline->rig().cameras.size(), -1) {
+    if (pipeline->options().live_diagnosis) diagnosis = std::make_unique<LiveDiagnosis>(*pipeline);
   }
 
   std::unique_ptr<Pipeline> pipeline;
+  std::unique_ptr<LiveDiagnosis> diagnosis;  ///< null: not asked for
   ObservationQueue queue;
   LcmLink link;
   Receiver receiver;
@@ -239,6 +242,7 @@ class Daemon {
       add_counts(earlier_bus_, facts.bus);
       earlier_refused_ += facts.refused.messages;
       earlier_shed_ += session_->queue.shed() + session_->waiting();
+      if (session_->diagnosis) earlier_diagnosis_s_ += session_->diagnosis->processor_s();
       fresh->pipeline->take_background_from(*session_->pipeline);
     }
     session_ = std::move(fresh);
@@ -342,7 +346,9 @@ class Daemon {
     Pipeline& pipeline = *session_->pipeline;
     session_->next = session_->queue.pop(milliseconds(0));
     estimate = pipeline.process(observation, session_->next ? &session_->next->observation : nullptr);
+    const bool news = session_->diagnosis && session_->diagnosis->watch(observation, estimate);
     const std::int64_t published = publish(estimate, arrived.arrival_us);
+    if (news) send(channels().findings, encode(to_message(estimate.findings)));
     if (estimates_.is_open()) write(estimate);
 
     const StageTimes& t = estimate.times;
@@ -358,6 +364,7 @@ class Daemon {
     if (options_.timings) all_stages_.add(stages);
     const std::lock_guard lock(progress_mutex_);
     progress_.estimate = estimate;
+    if (session_->diagnosis) progress_.diagnosis_s = earlier_diagnosis_s_ + session_->diagnosis->processor_s();
     progress_.latency.add(latency_ms);
     progress_.latency_last_second.add(latency_ms);
     progress_.stages.add(stages);
@@ -564,6 +571,7 @@ class Daemon {
   BusStatistics earlier_bus_;  ///< of sessions before a reload
   std::uint64_t earlier_refused_ = 0;
   std::uint64_t earlier_shed_ = 0;
+  double earlier_diagnosis_s_ = 0.0;  ///< processor time
 
   std::mutex progress_mutex_;  ///< taken after session_mutex_ where both are
   Progress progress_;

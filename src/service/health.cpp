@@ -282,6 +282,15 @@ Health assess(const HealthFacts& facts) {
       !turned.empty() && health.sentence != turned && health.level != HealthLevel::kStale) {
     health.sentence += "; " + turned;
   }
+  // What is wrong beside the offsets is said beside whatever is said of them.
+  std::string found;
+  for (const auto& cause : facts.estimate.findings.causes) {
+    if (!cause.estimated) found += (found.empty() ? "" : "; ") + cause.text();
+  }
+  if (!found.empty() && health.level != HealthLevel::kStale) {
+    health.sentence += "; the pictures ask for: " + found;
+    health.level = std::max(health.level, HealthLevel::kWarn);
+  }
   // A file that ends is said beside whatever else there is to say: it would not be missed otherwise until
   // it is needed.
   const auto add = [&](const char* what, const std::string& failure) {

@@ -58,6 +58,7 @@ struct Scene {
   std::deque<std::shared_ptr<const Moment>> history;
   std::uint64_t next_sequence = 1;  ///< of moments and pictures; never used twice
   std::vector<Shown> cameras;
+  LiveFindings findings;
   std::int64_t pictures_us = -kPictureDue_us;
   offsets_status_t status{};
   std::int64_t status_us = -1;
@@ -98,6 +99,23 @@ Json to_json(const offsets_status_t& status) {
           {"version", status.version},
           {"model_hash", status.model_hash},
           {"config_hash", status.config_hash}};
+}
+
+Json to_json(const LiveFindings& findings) {
+  Json causes = Json::array();
+  for (const auto& f : findings.causes) {
+    Json parameters = Json::array();
+    for (const auto& p : f.parameters) {
+      parameters.push_back({{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"stddev", p.sd}});
+    }
+    causes.push_back({{"sentence", f.sentence},
+                      {"parameters", parameters},
+                      {"z", f.z},
+                      {"hand_mm", f.hand_mm},
+                      {"estimated", f.estimated},
+                      {"alike", f.alike}});
+  }
+  return {{"blocks", findings.blocks}, {"span_s", findings.span_s}, {"causes", causes}};
 }
 
 /// The newest sequence that a viewer says he has; 0 for what is no number.
@@ -161,6 +179,7 @@ struct LivePage::Impl {
     const std::int64_t now = monotonic_us();
     Json json;
     json["joints"] = now_shown.joints;
+    json["findings"] = to_json(now_shown.findings);
     Json& moments = json["history"] = Json::array();
     for (const auto& moment : now_shown.history) {
       if (moment->sequence <= newest && newest < now_shown.next_sequence) continue;
@@ -216,6 +235,7 @@ void LivePage::start_anew(std::vector<std::string> camera_names) {
   const std::lock_guard lock(impl_->mutex);
   impl_->set_cameras(camera_names);
   impl_->scene.history.clear();
+  impl_->scene.findings = {};
 }
 
 void LivePage::add(const Estimate& estimate) {
@@ -223,6 +243,7 @@ void LivePage::add(const Estimate& estimate) {
   const std::unique_lock lock(impl_->mutex, std::try_to_lock);
   if (!lock) return;  // the next one is as good
   Scene& scene = impl_->scene;
+  scene.findings = estimate.findings;
   if (!scene.history.empty() && now - scene.history.back()->at_us < kHistoryPeriod_us) return;
   auto moment = std::make_shared<Moment>();
   moment->sequence = scene.next_sequence++;

@@ -65,4 +65,35 @@ joint_offsets_t to_message(const Estimate& estimate, const StereoRig& rig) {
   return m;
 }
 
+findings_t to_message(const LiveFindings& findings) {
+  findings_t m;
+  m.utime = findings.utime;
+  m.span_s = findings.span_s;
+  m.blocks = static_cast<std::int32_t>(findings.blocks);
+  m.z_threshold = findings.z_threshold;
+  m.num_findings = static_cast<std::int32_t>(findings.causes.size());
+  for (const auto& cause : findings.causes) {
+    auto& f = m.finding.emplace_back();
+    f.effect = cause.effect;
+    f.joint = cause.joint;
+    f.source = cause.source;
+    f.sentence = cause.sentence;
+    f.num_parameters = static_cast<std::int32_t>(cause.parameters.size());
+    for (const auto& p : cause.parameters) {
+      f.parameter_name.push_back(p.name);
+      f.parameter_unit.push_back(p.unit);
+      f.parameter_value.push_back(p.value);
+      f.parameter_stddev.push_back(p.sd);
+    }
+    f.z = cause.z;
+    f.hand_m = 1e-3 * cause.hand_mm;
+    f.outline_px = cause.outline_px;
+    f.from_utime = cause.from;
+    f.estimated = cause.estimated ? 1 : 0;
+    f.num_alike = static_cast<std::int32_t>(cause.alike.size());
+    f.alike = cause.alike;
+  }
+  return m;
+}
+
 }  // namespace bodyschema

@@ -1,5 +1,6 @@
 #include "status_reporter.hpp"
 
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,6 +22,13 @@ std::int64_t resident_bytes() {
   const int read = std::fscanf(file, "%lld %lld", &size, &resident);
   std::fclose(file);
   return read == 2 ? resident * sysconf(_SC_PAGESIZE) : 0;
+}
+
+/// Of all threads since the start.
+double processor_s() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 /// Instants of a rig that `pictures` pictures make at least.
@@ -143,6 +151,8 @@ offsets_status_t StatusReporter::report(const Receiver::Facts& received, const P
   count("publishing_failed", progress.publishing_failures);
   count("recording.written", recording.written);
   count("recording.lost", recording.lost);
+  count("processor_ms", static_cast<std::uint64_t>(1e3 * processor_s()));
+  count("processor_ms.diagnosis", static_cast<std::uint64_t>(1e3 * progress.diagnosis_s));
   m.num_counters = static_cast<std::int32_t>(m.counter_name.size());
 
   m.latency_bin_upper_ms.assign(DurationHistogram::kUpper_ms.begin(), DurationHistogram::kUpper_ms.end());

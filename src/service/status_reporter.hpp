@@ -35,6 +35,7 @@ struct Progress {
   std::uint64_t failed = 0;       ///< frames that could not be worked on
   std::string frame_failure;      ///< why, of the last
   std::string estimates_failure;  ///< as in HealthFacts
+  double diagnosis_s = 0.0;       ///< processor time of the live diagnosis
 };
 
 /// What does not change between two loads of a configuration.

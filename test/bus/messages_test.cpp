@@ -101,6 +101,32 @@ joint_offsets_t joint_offsets() {
   return m;
 }
 
+findings_t findings() {
+  findings_t m;
+  m.utime = 9;
+  m.span_s = 42.5;
+  m.blocks = 31;
+  m.z_threshold = 4.4;
+  m.num_findings = 1;
+  m.finding.resize(1);
+  auto& f = m.finding[0];
+  f.effect = "latency";
+  f.sentence = "pictures arrive 58 ms (57 to 59) late against the encoders";
+  f.num_parameters = 1;
+  f.parameter_name = {"delay"};
+  f.parameter_unit = {"ms"};
+  f.parameter_value = {58.0};
+  f.parameter_stddev = {0.5};
+  f.z = 14.0;
+  f.hand_m = 0.004;
+  f.outline_px = 2.5;
+  f.from_utime = 0;
+  f.estimated = 0;
+  f.num_alike = 1;
+  f.alike = {"backlash of r_elbow"};
+  return m;
+}
+
 offsets_status_t offsets_status() {
   offsets_status_t m;
   m.utime = 5;
@@ -208,6 +234,15 @@ TEST(Decode, StatusComesBack) {
   EXPECT_EQ(out.sentence, "encoders late by 140 ms");
 }
 
+TEST(Decode, FindingsComeBack) {
+  findings_t out;
+  const auto bytes = encode(findings());
+  const auto result = decode(bytes, out);
+  ASSERT_TRUE(result.ok()) << result.detail;
+  EXPECT_EQ(encode(out), bytes);
+  EXPECT_EQ(out.finding.at(0).alike, findings().finding[0].alike);
+}
+
 template <class Out>
 void expect_every_truncation_refused(const std::vector<std::uint8_t>& whole) {
   Out out;
@@ -227,6 +262,7 @@ TEST(Decode, RefusesEveryTruncation) {
   expect_every_truncation_refused<ImagesView>(encode(images()));
   expect_every_truncation_refused<joint_offsets_t>(encode(joint_offsets()));
   expect_every_truncation_refused<offsets_status_t>(encode(offsets_status()));
+  expect_every_truncation_refused<findings_t>(encode(findings()));
 }
 
 TEST(Decode, RefusesAnotherType) {
@@ -276,6 +312,7 @@ TEST(Decode, SurvivesDamagedBytes) {
   survive_damage<ImagesView>(encode(images()), random);
   survive_damage<joint_offsets_t>(encode(joint_offsets()), random);
   survive_damage<offsets_status_t>(encode(offsets_status()), random);
+  survive_damage<findings_t>(encode(findings()), random);
 }
 
 void put_int32(std::vector<std::uint8_t>& bytes, std::size_t at, std::uint32_t value) {

@@ -248,6 +248,33 @@ TEST(ChanceThreshold, OfNoCandidatesIsZeroAndOfOneThatOfTheNormalDistribution) {
   EXPECT_EQ(chance_threshold(one, 0.05, 1), chance_threshold(one, 0.05, 1));
 }
 
+/// Levels that a thousand draws do not tell: of one candidate the normal distribution's, of several more.
+TEST(ChanceThreshold, RareLevelsGoOnWhereDrawsEnd) {
+  std::mt19937_64 random(test::seed());
+  const auto rows = noise(random, 40, 2, 1, 0.0);
+  const std::vector<Scores> one = {rows.regression().score(rows.added())};
+  EXPECT_NEAR(chance_threshold(one, 1e-5, 1), 4.417, 0.35);
+  const auto many = noise(random, 40, 2, 30, 0.0);
+  const std::vector<Scores> several = {many.regression().score(many.added())};
+  double before = 0.0;
+  for (const double level : {0.1, 0.01, 0.0099, 1e-3, 1e-4}) {
+    const double z = chance_threshold(several, level, 1);
+    EXPECT_GE(z, before - 1e-3) << level;
+    before = z;
+  }
+  EXPECT_GT(before, chance_threshold(one, 1e-4, 1));
+}
+
+TEST(AddedColumns, SomeOfThem) {
+  std::mt19937_64 random(test::seed());
+  const auto rows = noise(random, 40, 2, 3, 0.0);
+  const auto some = rows.added().only({2, 0});
+  EXPECT_EQ(some.size(), 2);
+  const auto all = rows.regression().score(rows.added()), own = rows.regression().score(some);
+  EXPECT_NEAR(own.total[0], all.total[2], 1e-9);
+  EXPECT_NEAR(own.S(0, 1), all.S(2, 0), 1e-9);
+}
+
 TEST(Scores, AreAsUnlikelyAsANormalVariable) {
   // Two-sided 1 % of Student's t: 4.604 with 4 degrees of freedom, 3.250 with 9, 2.756 with 29; normal: 2.576.
   for (const auto& [t, dof] : {std::pair{4.604, 4.0}, {3.250, 9.0}, {2.756, 29.0}}) {

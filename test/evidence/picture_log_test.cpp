@@ -74,5 +74,31 @@ TEST_F(PictureLogOfOwnRobot, MotionComesFromTheEncoders) {
   EXPECT_EQ(log.pictures()[3].joints.qdot.cwiseAbs().maxCoeff(), 0.0) << "no readings near";
 }
 
+/// A window of pictures: what is old goes, with the readings that nobody needs any more; what is looked at keeps only
+/// its motion.
+TEST_F(PictureLogOfOwnRobot, ForgetsWhatIsOldAndLetsGoOfOutlines) {
+  PictureLog log(robot_, setup_, rig_);
+  for (int i = 0; i < 2; ++i) {
+    auto& seen = seen_[static_cast<std::size_t>(i)];
+    for (auto& camera : seen.cameras) camera->utime = 10'000'000 * (i + 1);
+    seen.encoders.clear();
+    for (Microseconds t = 10'000'000 * i; t < 10'000'000 * (i + 1); t += 500'000) {
+      seen.encoders.push_back(seen.cameras[0]->joints);
+      seen.encoders.back().utime = t;
+    }
+    log.add(seen);
+  }
+  log.forget_before(15'000'000);
+  ASSERT_EQ(log.pictures().size(), 2u);
+  EXPECT_EQ(log.pictures()[0].joints.utime, 20'000'000);
+  EXPECT_EQ(log.encoders().front().utime, 14'000'000) << "what has a memory begins before the first picture";
+  log.drop_outlines();
+  EXPECT_TRUE(log.pictures()[0].mask.empty());
+  EXPECT_TRUE(log.pictures()[0].coverage.empty());
+  log.forget_before(INT64_MAX);
+  EXPECT_TRUE(log.pictures().empty());
+  EXPECT_TRUE(log.encoders().empty());
+}
+
 }  // namespace
 }  // namespace bodyschema

@@ -24,11 +24,12 @@ void read_pictures(Bytes bytes) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   const Bytes bytes(data + 1, size - 1);
-  switch (data[0] % 4) {
+  switch (data[0] % 5) {
     case 0: read<JointStateMessage>(bytes); break;
     case 1: read_pictures(bytes); break;
     case 2: read<joint_offsets_t>(bytes); break;
     case 3: read<offsets_status_t>(bytes); break;
+    case 4: read<findings_t>(bytes); break;
   }
   return 0;
 }

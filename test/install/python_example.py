@@ -15,7 +15,13 @@ from python_packages import SKIPPED, python_with
 # For listen.py: sends, and what it must print.
 SEND = """
 import lcm, math, sys, time
-from bodyschema import joint_offsets_t
+from bodyschema import finding_t, findings_t, joint_offsets_t
+found = findings_t()
+found.num_findings = 1
+found.finding = [finding_t()]
+found.finding[0].sentence = "pictures arrive 58 ms late"
+found.finding[0].num_alike = 1
+found.finding[0].alike = ["backlash of r_elbow"]
 message = joint_offsets_t()
 message.num_joints = 2
 message.joint_name = ["r_elbow", "r_wrist_yaw"]
@@ -26,9 +32,11 @@ bus = lcm.LCM()
 while True:
     for message.state in ("converged", "diverged"):
         bus.publish("ICUB_JOINT_OFFSETS", message.encode())
+        bus.publish("ICUB_FINDINGS", found.encode())
         time.sleep(0.1)
 """
-HEARD = {"r_elbow -2.00 r_wrist_yaw +3.25", "diverged: not to be used"}
+HEARD = {"r_elbow -2.00 r_wrist_yaw +3.25", "diverged: not to be used",
+         "the pictures ask for: pictures arrive 58 ms late or backlash of r_elbow"}
 
 # For publish.py: prints what was received.
 RECEIVE = """

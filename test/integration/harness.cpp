@@ -189,6 +189,13 @@ Listener::Listener(const std::string& lcm_url) : link_(with_receive_buffer(lcm_u
     statuses_.push_back(std::move(decoded));
     arrived_.notify_all();
   });
+  link_.subscribe(channels.findings, 1000, [this](const std::string&, Bytes message, std::int64_t) {
+    findings_t decoded;
+    if (!decode(message, decoded).ok()) return;
+    const std::lock_guard lock(mutex_);
+    findings_.push_back(std::move(decoded));
+    arrived_.notify_all();
+  });
   thread_ = std::jthread([this](const std::stop_token& stop) {
     while (!stop.stop_requested()) link_.handle(20);
   });
@@ -204,6 +211,11 @@ std::vector<joint_offsets_t> Listener::offsets() const {
 std::vector<offsets_status_t> Listener::statuses() const {
   const std::lock_guard lock(mutex_);
   return statuses_;
+}
+
+std::vector<findings_t> Listener::findings() const {
+  const std::lock_guard lock(mutex_);
+  return findings_;
 }
 
 std::vector<joint_offsets_t> Listener::take_offsets() {

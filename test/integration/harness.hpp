@@ -88,7 +88,7 @@ class Scratch {
 /// Why LCM cannot be used here; empty when it can.
 std::string why_no_lcm();
 
-/// Everything that is published on the service's two channels, as it comes.
+/// Everything that is published on the service's channels, as it comes.
 class Listener {
  public:
   explicit Listener(const std::string& lcm_url);
@@ -98,6 +98,7 @@ class Listener {
 
   [[nodiscard]] std::vector<joint_offsets_t> offsets() const;
   [[nodiscard]] std::vector<offsets_status_t> statuses() const;
+  [[nodiscard]] std::vector<findings_t> findings() const;
   /// The estimates since the last call, for tests too long to keep them all.
   [[nodiscard]] std::vector<joint_offsets_t> take_offsets();
   /// The first status, among those that arrive from now on, that `wanted` accepts.
@@ -111,6 +112,7 @@ class Listener {
   std::condition_variable arrived_;
   std::vector<joint_offsets_t> offsets_;
   std::vector<offsets_status_t> statuses_;
+  std::vector<findings_t> findings_;
   std::jthread thread_;
 };
 

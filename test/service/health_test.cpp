@@ -300,5 +300,24 @@ TEST(Health, FramesThatCouldNotBeWorkedOn) {
   expect(facts, HealthLevel::kError, "2 frames of the last second could not be worked on: camera 'left'");
 }
 
+TEST(Health, WhatThePicturesAskForIsSaidBesideTheRest) {
+  HealthFacts facts = well();
+  facts.estimate.findings.causes.push_back(
+      {.effect = "latency", .joint = "", .source = "", .sentence = "", .parameters = {{"delay", "ms", 58.2, 0.4}}});
+  expect(facts, HealthLevel::kWarn, "hand known to 0.4 mm");
+  expect(facts, HealthLevel::kWarn, "; the pictures ask for: latency 58.2 ms");
+  facts.estimate.state = EstimatorState::kDiverged;
+  expect(facts, HealthLevel::kError, "latency 58.2 ms");
+  // What is estimated is taken into account: nothing to look at.
+  facts = well();
+  facts.estimate.findings.causes.push_back({.effect = "focal_length",
+                                            .joint = "",
+                                            .source = "",
+                                            .sentence = "",
+                                            .parameters = {{"scale", "%", 0.4, 0.01}},
+                                            .estimated = true});
+  EXPECT_EQ(assess(facts).level, HealthLevel::kOk);
+}
+
 }  // namespace
 }  // namespace bodyschema

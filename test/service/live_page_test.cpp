@@ -201,6 +201,13 @@ TEST_F(LivePageTest, ShowsEstimateStatusAndPictures) {
   estimate.offset_rad = Eigen::VectorXd::Constant(1, 0.1);
   estimate.covariance_rad2 = Eigen::MatrixXd::Constant(1, 1, 1e-4);
   estimate.contour_rms_px = 0.4;
+  estimate.findings.blocks = 12;
+  estimate.findings.causes.push_back({.effect = "latency",
+                                      .joint = "",
+                                      .source = "",
+                                      .sentence = "pictures arrive 58 ms late",
+                                      .parameters = {{"delay", "ms", 58.0, 0.5}},
+                                      .z = 14.0});
   page_->add(estimate);
   page_->add(estimate);  // too soon after the first
   offsets_status_t status{};
@@ -216,6 +223,10 @@ TEST_F(LivePageTest, ShowsEstimateStatusAndPictures) {
   EXPECT_EQ(json["history"][0]["state"], "hand_not_in_view");
   EXPECT_EQ(json["status"]["level"], "WARN");
   EXPECT_EQ(json["status"]["sentence"], "hand not in view <script>");
+  EXPECT_EQ(json["findings"]["blocks"], 12);
+  ASSERT_EQ(json["findings"]["causes"].size(), 1u);
+  EXPECT_EQ(json["findings"]["causes"][0]["sentence"], "pictures arrive 58 ms late");
+  EXPECT_EQ(json["findings"]["causes"][0]["parameters"][0]["unit"], "ms");
   EXPECT_EQ(json["cameras"][1]["name"], "right");
   EXPECT_LT(json["cameras"][1]["age_s"].get<double>(), 0.0) << "no picture yet";
   const auto newest = json["history"][0]["sequence"].get<int>();

@@ -84,5 +84,37 @@ TEST(OffsetsMessage, CarriesTheEstimate) {
   EXPECT_NEAR(seen.hand_pose_in_camera[0].quaternion_wxyz[3], std::sqrt(0.5), 1e-12);
 }
 
+TEST(FindingsMessage, CarriesWhatIsAskedFor) {
+  LiveFindings findings{.utime = 77, .span_s = 30.0, .blocks = 21, .z_threshold = 4.5, .causes = {}};
+  findings.causes.push_back({.effect = "slip",
+                             .joint = "elbow",
+                             .source = "",
+                             .sentence = "elbow slipped by 4.9 deg",
+                             .parameters = {{"step", "deg", -4.9, 0.1}},
+                             .z = 11.0,
+                             .hand_mm = 25.0,
+                             .outline_px = 12.0,
+                             .alike = {"drift of elbow"},
+                             .from = 55,
+                             .estimated = true});
+  EXPECT_EQ(findings.causes[0].text(), "slip of elbow -4.9 deg, or drift of elbow");
+  findings_t seen;
+  ASSERT_TRUE(decode(encode(to_message(findings)), seen).ok());
+  EXPECT_EQ(seen.utime, 77);
+  EXPECT_DOUBLE_EQ(seen.span_s, 30.0);
+  EXPECT_EQ(seen.blocks, 21);
+  ASSERT_EQ(seen.finding.size(), 1u);
+  const auto& f = seen.finding[0];
+  EXPECT_EQ(f.effect, "slip");
+  EXPECT_EQ(f.joint, "elbow");
+  EXPECT_EQ(f.parameter_unit, std::vector<std::string>{"deg"});
+  EXPECT_EQ(f.parameter_value, std::vector<double>{-4.9});
+  EXPECT_EQ(f.parameter_stddev, std::vector<double>{0.1});
+  EXPECT_DOUBLE_EQ(f.hand_m, 0.025) << "metres on the wire";
+  EXPECT_EQ(f.from_utime, 55);
+  EXPECT_EQ(f.estimated, 1);
+  EXPECT_EQ(f.alike, findings.causes[0].alike);
+}
+
 }  // namespace
 }  // namespace bodyschema

@@ -16,6 +16,7 @@ struct Channels {
   std::string cameras;         ///< bot_core::images_t, in
   std::string joint_offsets;   ///< bodyschema::joint_offsets_t, out
   std::string offsets_status;  ///< bodyschema::offsets_status_t, out
+  std::string findings;        ///< bodyschema::findings_t, out
   std::string masks;           ///< bot_core::images_t, in: silhouettes that others found in the pictures
   static Channels with_prefix(const std::string& prefix);
 };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bodyschema/core/time.hpp"
+#include "bodyschema/findings_t.hpp"
 #include "bodyschema/geometry/image.hpp"
 #include "bodyschema/joint_offsets_t.hpp"
 #include "bodyschema/offsets_status_t.hpp"
@@ -93,6 +94,7 @@ struct ImagesView {
 /// Checks the message but not the pictures in it: each may be good or bad by itself, see unpack().
 [[nodiscard]] DecodeResult decode(Bytes message, ImagesView& out, const DecodeLimits& limits = {});
 [[nodiscard]] DecodeResult decode(Bytes message, joint_offsets_t& out, const DecodeLimits& limits = {});
+[[nodiscard]] DecodeResult decode(Bytes message, findings_t& out, const DecodeLimits& limits = {});
 [[nodiscard]] DecodeResult decode(Bytes message, offsets_status_t& out, const DecodeLimits& limits = {});
 
 /// A received picture as 8-bit gray or RGB. A JPEG's own size is read and compared with the

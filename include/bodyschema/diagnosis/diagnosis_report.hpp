@@ -25,6 +25,7 @@ struct DiagnosedParameter {
   std::string unit;
   double estimate = 0.0;
   std::array<double, 2> ci95{};
+  double sd = 0.0;
   /// Of a slip: when it happened; of a drift: when it begins, the first picture in which the arm is seen; us
   /// since the Unix epoch.
   std::optional<Microseconds> from{};
@@ -42,6 +43,7 @@ struct DiagnosedCause {
   std::vector<CauseName> same;
   std::string advice;  ///< the motion that would tell them apart; empty for a class of one
   double z = 0.0;
+  double hand_mm = 0.0, outline_px = 0.0;  ///< what it moves (rms over the log), the offsets fitted anew; when found
   /// Larger than any robot is wrong by (more than twenty times the effect's typical size): it fits, and stands in for
   /// something else.
   bool implausible = false;
@@ -123,6 +125,8 @@ struct DiagnosisReport {
   std::string not_in_model;
   /// Causes that are there, and in the extended model, and move hand and outlines by less than what matters.
   std::vector<DiagnosedCause> small_causes;
+  /// Effects of the state, estimated anyway, that stand out of this log; only where nothing is fitted (look).
+  std::vector<DiagnosedCause> estimated;
   double matters_mm = 0.5;  ///< what matters
   bool crowded = false;     ///< nothing else was found, and of those several
   /// Before: offsets and those nuisances that are not themselves found to be causes.

@@ -46,6 +46,35 @@ struct EstimatedParameter {
   double prior_sd = 0.0;      ///< SI, what was believed of it before any picture
 };
 
+/// Something outside the state that recent pictures ask for.
+struct Finding {
+  std::string effect;         ///< of the catalogue; "unexplained": something follows `source` that no effect explains
+  std::string joint, source;  ///< its target
+  std::string sentence;       ///< "pictures arrive 58 ms (57 to 59) late against the encoders"
+  struct Parameter {
+    std::string name, unit;
+    double value = 0.0, sd = 0.0;  ///< in `unit`
+  };
+  std::vector<Parameter> parameters;
+  double z = 0.0;                    ///< by how many standard deviations blocks of pictures agree that it is there
+  double hand_mm = 0.0;              ///< what it moves, root mean square: the hand, the joints' offsets fitted anew ...
+  double outline_px = 0.0;           ///< ... and the outlines
+  std::vector<std::string> alike{};  ///< what these pictures cannot tell from it: "backlash of r_elbow"
+  Microseconds from = 0;             ///< of a slip: when it happened
+  bool estimated = false;            ///< the state holds it: it is taken into account
+  /// "latency 58 ms", "slip of r_elbow -4.9 deg, or drift of r_elbow".
+  [[nodiscard]] std::string text() const;
+};
+
+/// What was found beside the state, as of the last look at it; a look every few seconds.
+struct LiveFindings {
+  Microseconds utime = 0;    ///< of the newest picture that was looked at; 0: none yet
+  double span_s = 0.0;       ///< of the pictures
+  std::size_t blocks = 0;    ///< in which they are compared
+  double z_threshold = 0.0;  ///< that chance alone does not reach
+  std::vector<Finding> causes;
+};
+
 /// What the pictures say about the memory of earlier ones.
 enum class FrameVerdict {
   kNothingKnown,  ///< there is no memory to compare with
@@ -88,6 +117,7 @@ struct Estimate {
   std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected; in one that is absent for the
                                     ///< encoders of another
   std::vector<Pose> X_CP_nominal;   ///< the same with encoders and model as they are
+  LiveFindings findings;            ///< by LiveDiagnosis, where one watches
   StageTimes times;
 
   /// Whether the pictures tell a joint's offset: its standard deviation is below 0.5 deg and below a third of what was

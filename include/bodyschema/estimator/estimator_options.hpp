@@ -33,6 +33,7 @@ struct EstimatorOptions {
   MemoryOptions memory;
   std::size_t least_postures = 3;    ///< distinct ones that must agree before `converged`
   double converged_hand_sd_m = 0.0;  ///< best: `converged` below this; 0: by tolerances and the camera's distance
+  bool live_diagnosis = true;        ///< best: the service looks for what is wrong beside the state
   double min_mask_share = 0.001;     ///< of the picture; less observed robot than this: hand not in view
 
   /// Reads the sections `estimator`, `filter` and `silhouette`; what they leave out is as above. Throws

@@ -55,6 +55,9 @@ class LogFit {
 
   /// After PictureLog::replace_rig.
   void refresh();
+  /// After pictures were added or forgotten: parts that no posture of the log moves in the pictures, a robot's base
+  /// before a still camera, show the same in all, and count as seen once.
+  void weigh_parts();
 
   [[nodiscard]] const Coordinates& coordinates() const;
   [[nodiscard]] PictureLog& log() { return log_; }
@@ -92,9 +95,6 @@ class LogFit {
   }
 
  private:
-  /// Parts that no posture of the log moves in the pictures, a robot's base before a still camera: they show the same
-  /// in all, and count as seen once.
-  void weigh_parts();
   [[nodiscard]] double mean_cost(const LinearLog& at, double usual_points, double OutlineEvidence::*cost) const;
 
   PictureLog& log_;

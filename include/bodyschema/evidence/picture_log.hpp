@@ -35,6 +35,10 @@ class PictureLog {
   void add(const Observation& observation);
   /// Encoder samples from elsewhere instead, in order of time.
   void set_encoders(std::vector<JointSample> encoders) { encoders_ = std::move(encoders); }
+  /// Forgets pictures before a time, and the encoder samples before the first one left.
+  void forget_before(Microseconds utime);
+  /// Lets go of the pictures' outlines, whose evidence somebody keeps; the rest stays.
+  void drop_outlines();
   /// Of the same pictures, a robot whose cameras sit elsewhere.
   void replace_rig(std::shared_ptr<const RobotModel> robot, const StereoRig& rig);
   /// The masks come of a background that was learned from these pictures: what never left its place is part of it.

@@ -46,7 +46,7 @@ class EffectProbes {
   const Coordinates& coordinates_;
   std::vector<ParameterRef> parameters_;
   std::vector<Probe> probes_;
-  Corrections low_, high_;
+  Corrections low_, high_;  ///< zero between two effects
 };
 
 }  // namespace bodyschema

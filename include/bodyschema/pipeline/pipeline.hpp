@@ -70,6 +70,8 @@ class Pipeline {
   [[nodiscard]] const StereoRig& rig() const { return rig_; }
   /// The extended model (robot.extended_model), if any.
   [[nodiscard]] const std::optional<ErrorModel>& error_model() const { return error_model_; }
+  /// What of it is not in the rig, and not found anew as joints' offsets are.
+  [[nodiscard]] ErrorModel known_effects() const;
   [[nodiscard]] const BusOptions& bus() const { return bus_; }
   [[nodiscard]] const EstimatorOptions& options() const { return options_; }
   [[nodiscard]] const Beliefs& beliefs() const { return beliefs_; }

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 
 #include "bodyschema/core/configuration.hpp"
+#include "bodyschema/pipeline/pipeline.hpp"
 
 namespace bodyschema {
 
@@ -18,6 +20,10 @@ struct ReplayOptions {
   /// does, which cannot look ahead: with the arm in them it would be learned as background. Otherwise it
   /// is learned from all pictures of the log before the first estimate.
   bool learn_background_online = false;
+  /// Who watches beside the estimator, as LiveDiagnosis does beside the service's: made for the pipeline, called after
+  /// each step, may add to the estimate.
+  using Watcher = std::function<void(const Observation& observation, Estimate& estimate)>;
+  std::function<Watcher(const Pipeline& pipeline)> watcher{};
 };
 
 /// Runs a recorded log through the same code as the daemon, as fast as it can, and writes

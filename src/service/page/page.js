@@ -119,6 +119,35 @@ function setOffsets() {
   show('hand', last.hand_sd_mm.toFixed(1) + ' mm');
 }
 
+// What recent pictures ask for outside what is estimated.
+function setFindings(findings) {
+  const causes = findings.causes;
+  byId('asked').classList.toggle('found', causes.some((cause) => !cause.estimated));
+  byId('findings').hidden = causes.length === 0;
+  show('asked-none', causes.length > 0 ? '' : findings.blocks > 0 ? 'the pictures ask for nothing else'
+    : 'not enough motion seen yet');
+  show('asked-from', findings.blocks > 0 ? findings.blocks + ' pieces of motion in ' + length(findings.span_s) : '');
+  const cell = (row, text) => { row.insertCell().textContent = text; };
+  byId('findings').tBodies[0].replaceChildren(...causes.map((cause) => {
+    const row = document.createElement('tr');
+    const first = row.insertCell();
+    first.append(cause.sentence);
+    const note = (text) => {
+      const small = document.createElement('small');
+      small.textContent = text;
+      first.append(small);
+    };
+    if (cause.alike.length > 0) note('or ' + cause.alike.join(' or ') + ', which these pictures cannot tell from it');
+    if (cause.estimated) note('estimated, and so taken into account');
+    const each = (value) => cause.parameters.map((p) => value(p) + ' ' + p.unit).join(', ');
+    cell(row, each((p) => String(Number(p.value.toPrecision(3)))));
+    cell(row, each((p) => '\u00b1 ' + Number(p.stddev.toPrecision(2))));
+    cell(row, cause.z.toFixed(1));
+    cell(row, cause.hand_mm.toFixed(1) + ' mm');
+    return row;
+  }));
+}
+
 function draw(now) {
   if (!window.Chart) return;
   const x = (m) => m.at - now;
@@ -168,6 +197,7 @@ function take(state) {
   document.body.classList.toggle('empty', moments.length === 0);
   setCameras(state.cameras);
   setOffsets();
+  setFindings(state.findings);
   draw(now);
   if (!s) return;
   uptime = s.uptime_s;

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "bodyschema/diagnosis/diagnoser.hpp"
+
+namespace bodyschema::diagnosis {
+
+/// What pictures ask for beside a model, from their linearisation alone: the search of `diagnose` without its fits, in
+/// the time of a few frames. Verdict, sentence and causes of the report are filled in.
+/// @param state  the model, about which they were linearised
+/// @param pictures  over all coordinates
+/// @param noise  per camera
+DiagnosisReport look(LogFit& fit, State state, std::shared_ptr<const LinearLog> pictures,
+                     std::vector<OutlineNoise> noise, const std::vector<Belief>& tolerances,
+                     const DiagnosisOptions& options);
+
+}  // namespace bodyschema::diagnosis

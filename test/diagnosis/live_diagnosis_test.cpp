@@ -1,0 +1,103 @@
+#include "bodyschema/diagnosis/live_diagnosis.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "bodyschema/simulator/simulator.hpp"
+
+namespace bodyschema {
+namespace {
+
+/// What was said while a simulated robot moved in silhouettes, frame by frame.
+struct Said {
+  std::vector<LiveFindings> news;
+  std::vector<std::string> per_frame;
+  double span_s = 0.0;
+};
+
+Configuration configuration() {
+  return Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml",
+                             {"silhouette.engine=contour", "filter.particles=40"});
+}
+
+Said listen(const std::string& fault, double seconds_long, std::uint64_t seed = 3) {
+  const auto c = configuration();
+  const auto setup = RobotSetup::from(c.section("robot"));
+  const auto rig = StereoRig::from(c.section("cameras"));
+  const auto robot = load_robot(setup, rig);
+  auto settings = simulator::SimulatorSettings::from(c.section("simulator"));
+  settings.camera_rate_hz = 5.0;
+  settings.supersampling = 2;
+  settings.outline_noise.sd_px = 0.3;
+  settings.background_frames = settings.entry_frames = 0;
+  simulator::SimulationPlan plan;
+  plan.seed = seed;
+  plan.motion = simulator::Motion::kBabble;
+  plan.seconds = seconds_long;
+  plan.offsets_deg = {{"r_shoulder_pitch", 3.0}, {"r_elbow", -4.0}};
+  plan.output = simulator::Output::kSilhouettes;
+  if (!fault.empty()) plan.faults.push_back(simulator::FaultSpec::parse(fault));
+  simulator::Simulator simulator(robot, setup, rig, settings, plan);
+
+  Pipeline pipeline(c);
+  LiveDiagnosis live(pipeline, {.waits = true});
+  Said said;
+  std::vector<JointSample> encoders;
+  Microseconds first = 0;
+  while (const auto frame = simulator.next()) {
+    encoders.insert(encoders.end(), frame->encoders.begin(), frame->encoders.end());
+    auto observation = simulator::to_observation(*frame, encoders);
+    observation.encoders = frame->encoders;
+    auto estimate = pipeline.estimate(observation);
+    if (live.watch(observation, estimate)) said.news.push_back(estimate.findings);
+    std::string all;
+    for (const auto& cause : estimate.findings.causes) all += cause.text() + ";";
+    said.per_frame.push_back(all);
+    if (first == 0) first = observation.utime;
+    said.span_s = seconds(observation.utime - first);
+  }
+  return said;
+}
+
+bool named(const LiveFindings& findings, const std::string& effect) {
+  return std::any_of(findings.causes.begin(), findings.causes.end(), [&](const Finding& f) {
+    return f.effect == effect ||
+           std::any_of(f.alike.begin(), f.alike.end(), [&](const auto& a) { return a.starts_with(effect); });
+  });
+}
+
+TEST(LiveDiagnosis, NamesWhatIsWrongWhileTheRobotRuns) {
+  const auto said = listen("latency:value=80", 32.0);
+  ASSERT_FALSE(said.news.empty());
+  const auto& last = said.news.back();
+  ASSERT_TRUE(named(last, "latency")) << said.per_frame.back();
+  EXPECT_GT(last.blocks, 8u);
+  EXPECT_GT(last.z_threshold, 3.0);
+  const auto& finding = last.causes.front();
+  EXPECT_GT(finding.z, last.z_threshold);
+  EXPECT_GT(finding.hand_mm, 0.5) << "what does not matter is not named";
+  ASSERT_EQ(finding.effect, "latency");
+  ASSERT_EQ(finding.parameters.size(), 1u);
+  EXPECT_EQ(finding.parameters[0].unit, "ms");
+  EXPECT_NEAR(finding.parameters[0].value, 80.0, 8.0);
+  // Only what two looks agree about is said.
+  EXPECT_TRUE(said.news.front().causes.empty());
+}
+
+TEST(LiveDiagnosis, IsSilentAboutAHealthyRobotAndTheSameEveryTime) {
+  const auto said = listen("", 32.0), again = listen("", 32.0);
+  ASSERT_GE(said.news.size(), 3u);
+  for (const auto& news : said.news) EXPECT_TRUE(news.causes.empty()) << news.causes.front().text();
+  EXPECT_GT(said.news.back().blocks, 8u) << "it has looked";
+  ASSERT_EQ(said.per_frame, again.per_frame);
+  ASSERT_EQ(said.news.size(), again.news.size());
+  for (std::size_t i = 0; i < said.news.size(); ++i) {
+    EXPECT_EQ(said.news[i].utime, again.news[i].utime);
+    EXPECT_EQ(said.news[i].z_threshold, again.news[i].z_threshold);
+  }
+}
+
+}  // namespace
+}  // namespace bodyschema
