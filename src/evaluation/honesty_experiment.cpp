@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <random>
 
+#include "bodyschema/evaluation/statistics.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/simulator/outline_noise.hpp"
 #include "experiments.hpp"
@@ -173,6 +175,26 @@ void add_line(ExperimentContext& context, const std::string& title, const Honest
                                100.0 * f.hand_sd_published_rate, f.sd_to_error_median);
 }
 
+/// What one log came to, for those who want to look at it.
+Json log_json(const char* row, const TrialRecord& trial, const HonestyLog& log, bool twice = false) {
+  std::map<std::string, int> states;
+  std::vector<double> error_mm, sd_mm, offset_z;
+  for (const auto& frame : trial.contestants[0].frames) ++states[to_string(frame.state)];
+  for (const auto& frame : log) {
+    if (frame.hand_error_mm) error_mm.push_back(*frame.hand_error_mm);
+    sd_mm.push_back(frame.hand_sd_mm);
+    offset_z.push_back(frame.offset_error_deg.cwiseQuotient(frame.offset_sd_deg).cwiseAbs().maxCoeff());
+  }
+  const auto figures = honesty_figures({&log});
+  Json json = {{"row", row}, {"seed", trial.seed}, {"twice", twice}};
+  for (const auto& [state, count] : states) json["frames"][state] = count;
+  json["dishonest_frame_rate"] = figures.dishonest_frame_rate;
+  json["hand_error_median_mm"] = Statistics::of(error_mm).median;
+  json["hand_sd_median_mm"] = Statistics::of(sd_mm).median;
+  json["worst_offset_median_sd"] = Statistics::of(offset_z).median;
+  return json;
+}
+
 void add_healthy(ExperimentContext& context, const Configuration& estimator, int count, Json& summary,
                  std::vector<HonestyLog>& all) {
   std::vector<Contestant> contestants = {{"tolerances", options_for(context, "best")},
@@ -188,6 +210,7 @@ void add_healthy(ExperimentContext& context, const Configuration& estimator, int
   std::vector<HonestyLog> with, without;
   for (const auto& record : records) {
     with.push_back(honesty_log(record, 0));
+    summary["each_log"].push_back(log_json("healthy", record, with.back()));
     without.push_back(honesty_log(record, 1));
   }
   const auto figures = honesty_figures(pointers(with)), exact = honesty_figures(pointers(without));
@@ -231,7 +254,10 @@ void run_honesty(ExperimentContext& context, int most_logs) {
                                   },
                                   {{"tolerances", options_for(context, "best")}});
   std::vector<HonestyLog> logs_of;
-  for (const auto& record : records) logs_of.push_back(honesty_log(record, 0));
+  for (std::size_t t = 0; t < records.size(); ++t) {
+    logs_of.push_back(honesty_log(records[t], 0));
+    summary["each_log"].push_back(log_json(kRows[row_of(t)].key, records[t], logs_of.back(), is_twice(t)));
+  }
 
   double worst_ratio = summary["healthy"]["sd_to_error_median"];
   for (std::size_t r = 0; r < kRows.size(); ++r) {
