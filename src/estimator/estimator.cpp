@@ -2,6 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -337,8 +338,10 @@ struct Estimator::Impl {
     }
     fitter.learn_noise(fit);
     if (const auto block =
-            memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.quadratic, fit.x))
+            memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.quadratic, fit.x)) {
+      fitter.learn_shape(fit);
       keep_frame(*block);
+    }
     look_again();
     settle_on(fit);
   }
@@ -379,6 +382,7 @@ struct Estimator::Impl {
     state = memory.empty() ? fit.x : memory.estimate().x;
     in_frame = (contradicted || memory.empty() ? memory.beliefs() : memory).in_posture(fit.quadratic);
     rms_px = fit.evidence.rms_px();
+    frame_information = fit.quadratic.A.topLeftCorner(state.size(), state.size());
     near = fitter.fits(fit.evidence);
     best_likelihood = hammoude_likelihood(scorer.distance(in_frame.x));
     current = EstimatorState::kConverging;
@@ -492,6 +496,7 @@ struct Estimator::Impl {
   /// What a few pictures taught is contradicted by all that follow: it was theirs, the next frame is searched.
   void begin_anew() {
     memory.forget_all();
+    fitter.forget_shape();
     keyframes.clear();
     doubted_since_s = -1.0;
     usual_sum = 1.0;
@@ -600,6 +605,7 @@ struct Estimator::Impl {
   void report_memory(Estimate& estimate) {
     const Eigen::MatrixXd covariance = contradicted ? in_frame.covariance : memory.estimate().covariance;
     estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
+    if (frame.exposed()) estimate.covariance_rad2 += joint_shape_covariance_rad2(frame.exposures[0]);
     for (Eigen::Index k = joints; k < state.size(); ++k) {
       const auto& p = model.state().parameters()[static_cast<std::size_t>(k)];
       const Effect& effect = model.state().model()[p.ref.effect];
@@ -630,7 +636,7 @@ struct Estimator::Impl {
     if (!estimate.misfit.empty()) {
       current = EstimatorState::kModelMisfit;
     } else if (!contradicted && near && verdict == FrameVerdict::kAgrees && !stalled.suspected() &&
-               estimate.hand_sd_m < estimate.hand_sd_limit_m) {
+               fitter.knows_shape() && estimate.hand_sd_m < estimate.hand_sd_limit_m) {
       current = EstimatorState::kConverged;
     }
   }
@@ -642,7 +648,22 @@ struct Estimator::Impl {
     constexpr double kMore = 1.5;
     const double tolerated =
         std::sqrt(std::max(0.0, (hand_covariance_m2(frame.exposures[0]) - own_hand_covariance_m2()).trace()));
-    return std::hypot(limits::kHandPerDistance * estimate.X_CP.front().translation().norm(), kMore * tolerated);
+    const double near_m = limits::kHandPerDistance * estimate.X_CP.front().translation().norm();
+    const double own_m =
+        std::min(limits::kMostPerDistance * near_m, std::hypot(near_m, limits::kOfDescription * described_hand_sd_m()));
+    return std::hypot(own_m, kMore * tolerated);
+  }
+
+  /// How well the robot's description puts the hand before any picture, offsets left out: what may be wrong with links
+  /// and cameras, and is estimated. Of the last `hand_covariance_m2`.
+  [[nodiscard]] double described_hand_sd_m() const {
+    double square = 0.0;
+    for (Eigen::Index k = joints; k < state.size(); ++k) {
+      const auto& p = model.state().parameters()[static_cast<std::size_t>(k)];
+      if (model.state().model()[p.ref.effect].name() == "head_offset") continue;
+      square += (hand_J.col(k) * p.prior_sd).squaredNorm();
+    }
+    return std::sqrt(square);
   }
 
   /// What is wrong by more than is believed possible; empty: nothing.
@@ -692,13 +713,32 @@ struct Estimator::Impl {
 
   /// How well the hand is known in a camera, by this frame's covariance.
   Eigen::Matrix3d hand_covariance_m2(const Exposure& exposure) {
-    const Eigen::MatrixXd J = model.hand_jacobian(exposure, in_frame.x);
+    hand_J = model.hand_jacobian(exposure, in_frame.x);
+    const Eigen::MatrixXd& J = hand_J;
     const auto n = state.size();
     hand_own = J.leftCols(n) * in_frame.own * J.leftCols(n).transpose();
+    hand_own += shape_covariance_m2(J.leftCols(n));
     if (J.cols() == n) return hand_own;
     const Eigen::MatrixXd T =
         (J.leftCols(n) * in_frame.sensitivity + J.rightCols(J.cols() - n)) * memory.layout().considered_sd.asDiagonal();
     return hand_own + T * T.transpose();
+  }
+  /// What outlines that are wrong alike in all postures do to the hand's place: as much as in this frame alone, for
+  /// other postures err with it.
+  /// @param J  of the hand's place by the state
+  [[nodiscard]] Eigen::Matrix3d shape_covariance_m2(const Eigen::MatrixXd& J) const {
+    const double share = particles_only() ? 0.0 : fitter.shape_variance_share();
+    if (share <= 0.0 || frame_information.size() == 0) return Eigen::Matrix3d::Zero();
+    Eigen::MatrixXd precision = frame_information / share;
+    precision.diagonal() += memory.layout().prior_sd.array().square().inverse().matrix();
+    return J * precision.ldlt().solve(J.transpose());
+  }
+  /// The same as angles of the joints: the smallest that move the hand so.
+  [[nodiscard]] Eigen::MatrixXd joint_shape_covariance_rad2(const Exposure& exposure) {
+    if (fitter.shape_variance_share() <= 0.0) return Eigen::MatrixXd::Zero(joints, joints);
+    const Eigen::MatrixXd J = model.hand_jacobian(exposure, in_frame.x).leftCols(state.size());
+    const Eigen::MatrixXd inverse = J.leftCols(joints).completeOrthogonalDecomposition().pseudoInverse();
+    return inverse * shape_covariance_m2(J) * inverse.transpose();
   }
   /// Of the last `hand_covariance_m2`, the share that tolerances have no part in.
   [[nodiscard]] Eigen::Matrix3d own_hand_covariance_m2() const { return hand_own; }
@@ -719,6 +759,7 @@ struct Estimator::Impl {
   void begin_again() {
     filter.reset(Eigen::VectorXd::Zero(joints));
     memory.forget_all();
+    fitter.forget_shape();
     keyframes.clear();
     alternative.reset();
     state = model.state().prior_mean();
@@ -749,6 +790,8 @@ struct Estimator::Impl {
   Eigen::VectorXd state;    ///< fused over postures
   MemoryEstimate in_frame;  ///< the same with this frame's own error
   Eigen::Matrix3d hand_own = Eigen::Matrix3d::Zero();
+  Eigen::MatrixXd frame_information;  ///< of the last frame that was looked at, over the state
+  Eigen::MatrixXd hand_J;             ///< of the last covariance of the hand
   EstimatorState current = EstimatorState::kHandNotInView;
   FrameVerdict verdict = FrameVerdict::kNothingKnown;
   Innovation innovation;
