@@ -38,6 +38,8 @@ const std::vector<std::pair<std::string, std::string>>& experiment_names() {
       {"recording",
        "the public recording, exact and nominal robot; always one log, paper with ten seeds (needs BODYSCHEMA_DATA)"},
       {"real", "photographs of physical robots with offsets hidden in them, where the data is there; up to 10 trials"},
+      {"everyday", fmt::format("everyday pictures, a row a condition (--rows); within `all` at most {} trials a row",
+                               kMostEverydayTrials)},
       {"diagnosis", "rates of the diagnosis on logs with hidden faults; --trials sets the single-cause logs"},
       {"all", "everything but paper and diagnosis"}};
   return names;
@@ -83,6 +85,7 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   if (wanted("reach")) run_reach(context);
   if (wanted("recording")) run_recording(context);
   if (wanted("real")) run_real(context);
+  if (wanted("everyday")) run_everyday(context);
   if (options.experiment == "diagnosis") run_diagnosis(context);
   summary["trials_asked_for"] = options.trials;
   summary["seed"] = options.seed;

@@ -15,6 +15,7 @@ using Json = nlohmann::ordered_json;
 /// What takes long is not run more often than this, whatever the options ask for.
 inline constexpr int kMostAdaptationTrials = 14;  ///< slip, hand leaves, camera dies
 inline constexpr int kMostAblationTrials = 10;
+inline constexpr int kMostEverydayTrials = 2;   ///< within `all`: the rows are many
 inline constexpr int kOffsetLogs = 6;  ///< never more or fewer
 
 /// What every experiment needs to know.
@@ -40,6 +41,8 @@ void run_ablations(ExperimentContext& context);
 void run_reach(ExperimentContext& context);
 void run_recording(ExperimentContext& context);
 void run_real(ExperimentContext& context);
+/// Throws ConfigurationError for a row that does not exist.
+void run_everyday(ExperimentContext& context);
 void run_diagnosis(ExperimentContext& context);
 
 }  // namespace bodyschema
