@@ -43,6 +43,8 @@ const std::vector<std::pair<std::string, std::string>>& experiment_names() {
                    "trial, within all at most {}",
                    kHonestyLogsInAll)},
       {"real", "photographs of physical robots with offsets hidden in them, where the data is there; up to 10 trials"},
+      {"everyday", fmt::format("everyday pictures, a row a condition (--rows); within `all` at most {} trials a row",
+                               kMostEverydayTrials)},
       {"diagnosis", "rates of the diagnosis on logs with hidden faults; --trials sets the single-cause logs"},
       {"live", fmt::format("rates of the running service's diagnosis, half of the robots healthy; --trials runs of "
                            "60 s in real time, in all at most {}",
@@ -97,6 +99,7 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
     run_recording(context, true);
   }
   if (options.experiment == "all") run_honesty(context, kHonestyLogsInAll);
+  if (wanted("everyday")) run_everyday(context);
   if (options.experiment == "diagnosis") run_diagnosis(context);
   summary["trials_asked_for"] = options.trials;
   summary["seed"] = options.seed;

@@ -15,8 +15,9 @@ using Json = nlohmann::ordered_json;
 /// What takes long is not run more often than this, whatever the options ask for.
 inline constexpr int kMostAdaptationTrials = 14;  ///< slip, hand leaves, camera dies
 inline constexpr int kMostAblationTrials = 10;
-inline constexpr int kMostLiveRuns = 4;  ///< live, as a part of all: each takes a minute
-inline constexpr int kOffsetLogs = 6;    ///< never more or fewer
+inline constexpr int kMostLiveRuns = 4;        ///< live, as a part of all: each takes a minute
+inline constexpr int kMostEverydayTrials = 2;  ///< within `all`: the rows are many
+inline constexpr int kOffsetLogs = 6;          ///< never more or fewer
 /// Of logs that `honesty` runs: two a trial, within `all` no more than this.
 inline constexpr int kHonestyLogsInAll = 14;
 
@@ -46,6 +47,8 @@ void run_recording(ExperimentContext& context, bool only_honesty);
 void run_real(ExperimentContext& context);
 /// @param most_logs  however many trials are asked for
 void run_honesty(ExperimentContext& context, int most_logs);
+/// Throws ConfigurationError for a row that does not exist.
+void run_everyday(ExperimentContext& context);
 void run_diagnosis(ExperimentContext& context);
 void run_live(ExperimentContext& context);
 

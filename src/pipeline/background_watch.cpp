@@ -16,13 +16,16 @@ namespace {
 constexpr int kArmReach = 6;
 /// Where the background is as it was learned, next to nothing far from the arm differs from it.
 constexpr double kChangedShare = 0.05;
+/// rad; encoders of four joints between neck and eye, each rounded to a 4096th of a turn, differ by so much while the
+/// head stands.
+constexpr double kStands_rad = 0.25 * kPi / 180.0;
 
 }  // namespace
 
 BackgroundWatch::BackgroundWatch(const std::shared_ptr<const RobotModel>& robot,
                                  const std::vector<std::string>& camera_links)
     : eyes_(robot, camera_links), X_WC_(camera_links.size(), Pose::Identity()), X_WC_learned_(X_WC_),
-      known_(camera_links.size(), false) {}
+      X_WC_stood_(X_WC_), known_(camera_links.size(), false), stood_(camera_links.size(), false) {}
 
 Pose BackgroundWatch::pose(std::size_t camera, const Eigen::VectorXd& q) {
   eyes_.compute(q, X_WC_);
@@ -40,6 +43,15 @@ double BackgroundWatch::turned(std::size_t camera, const Eigen::VectorXd& q) {
   const Eigen::Matrix3d R = X_WC_learned_[camera].linear().transpose() * pose(camera, q).linear();
   const double angle = Eigen::AngleAxisd(R).angle();
   return angle > kTurn_rad ? angle : 0.0;
+}
+
+bool BackgroundWatch::moved_since_last(std::size_t camera, const Eigen::VectorXd& q) {
+  const Pose& X_WC = pose(camera, q);
+  const double angle = Eigen::AngleAxisd(Eigen::Matrix3d(X_WC_stood_[camera].linear().transpose() * X_WC.linear())).angle();
+  if (stood_[camera] && angle < kStands_rad) return false;
+  stood_[camera] = true;
+  X_WC_stood_[camera] = X_WC;
+  return true;
 }
 
 bool BackgroundWatch::count(double turned_rad, const BinaryMask& mask, const BinaryMask& valid,

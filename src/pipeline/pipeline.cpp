@@ -1,13 +1,17 @@
 #include "bodyschema/pipeline/pipeline.hpp"
 
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <exception>
 #include <stdexcept>
 
 #include "bodyschema/imports/joint_mapping.hpp"
 #include "bodyschema/imports/yarp_import.hpp"
+#include "bodyschema/outline/outline_measurement.hpp"
 #include "model_hash.hpp"
 
 namespace bodyschema {
@@ -68,6 +72,12 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
         !vision_.background_pictures.contains(camera.name)) {
       configuration.section("vision").section("background_pictures").fail(camera.name, "a file for each camera");
     }
+    if (!camera.distortion_given) {
+      spdlog::warn(
+          "camera '{}' has no distortion in the configuration and is taken to have none: most lenses bend by more than "
+          "offsets are worth; set cameras.{}.distortion, to zeros where pictures come straightened",
+          camera.name, camera.name);
+    }
     std::optional<Undistorter> undistorter;
     if (camera.has_distortion()) undistorter.emplace(camera);
     Segmenter segmenter(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height,
@@ -126,7 +136,7 @@ void Pipeline::finish_learning() {
 
 Estimate Pipeline::process(Observation& observation, const Observation* next) {
   segment(observation);
-  if (next == nullptr || vision_.method == SegmentationMethod::kStatistics) return estimate(observation);
+  if (next == nullptr || masks_need_estimates()) return estimate(observation);
   ahead_ = worker_->begin([this, next] { return look(*next, false); });
   struct Wait {
     const std::future<Looks>& ahead;
@@ -169,15 +179,17 @@ void Pipeline::for_each_eye(const OfCamera& of_camera) {
 }
 
 /// All that can be done before the estimate of the observation before is known; asks nothing of the
-/// estimator but for `statistics`.
+/// estimator but where masks need estimates.
 Pipeline::Looks Pipeline::look(const Observation& observation, bool alone) {
   Looks looks{observation.utime, std::vector<std::optional<Look>>(eyes_.size())};
   std::vector<std::optional<BinaryMask>> predicted(eyes_.size());
-  for (std::size_t c = 0; vision_.method == SegmentationMethod::kStatistics && c < eyes_.size(); ++c) {
-    if (observation.cameras[c]) predicted[c] = estimator_.predicted_silhouette(observation, c, true);
+  for (std::size_t c = 0; masks_need_estimates() && c < eyes_.size(); ++c) {
+    if (!observation.cameras[c]) continue;
+    predicted[c] = estimator_.predicted_silhouette(observation, c, true);
+    if (background_watch_.moved_since_last(c, observation.cameras[c]->joints.q)) eyes_[c].segmenter.camera_turned();
   }
   const auto of_camera = [&](std::size_t c) {
-    if (observation.cameras[c]) looks.of[c] = look_with(eyes_[c], *observation.cameras[c], predicted[c]);
+    if (observation.cameras[c]) looks.of[c] = look_with(c, *observation.cameras[c], std::move(predicted[c]));
   };
   if (alone) {
     for_each_eye(of_camera);
@@ -187,9 +199,26 @@ Pipeline::Looks Pipeline::look(const Observation& observation, bool alone) {
   return looks;
 }
 
-Pipeline::Look Pipeline::look_with(Eye& eye, const CameraObservation& seen,
-                                   const std::optional<BinaryMask>& predicted) const {
+/// How far off the predicted outline may be in a picture, px: by how well hand and outline were known. Where nobody
+/// knows, half a metre away a hand is as far off as three standard deviations of all offsets together put it.
+double Pipeline::reach_px(std::size_t camera) const {
+  constexpr double kLeast_px = 6.0, kMost_px = 40.0, kYoung_px = 16.0;
+  const double unit = picture_unit(rig_.cameras[camera].intrinsics);
+  if (outline_sd_px_ < 0.0) return kMost_px * unit;
+  return std::clamp(3.0 * outline_sd_px_ + 3.0, young_ ? kYoung_px : kLeast_px, kMost_px) * unit;
+}
+
+PredictedRobot Pipeline::prediction(std::size_t camera, const std::optional<BinaryMask>& silhouette) const {
+  if (!silhouette) return {};
+  if (vision_.method != SegmentationMethod::kAuto) return {&*silhouette};
+  return {&*silhouette, reach_px(camera), tracking_};
+}
+
+Pipeline::Look Pipeline::look_with(std::size_t camera, const CameraObservation& seen,
+                                   std::optional<BinaryMask> predicted) {
+  Eye& eye = eyes_[camera];
   Look look;
+  look.predicted = std::move(predicted);
   look.change = eye.picture.look(seen.image, seen.joints.q);
   if (frozen(look.change)) return look;
   if (eye.undistorter) look.straightened = eye.undistorter->apply(seen.image);
@@ -201,7 +230,7 @@ Pipeline::Look Pipeline::look_with(Eye& eye, const CameraObservation& seen,
     return look;
   }
   eye.segmenter.segment(look.straightened ? *look.straightened : seen.image, look.mask, look.valid, look.coverage,
-                        predicted ? &*predicted : nullptr);
+                        prediction(camera, look.predicted));
   if (!eye.seen.empty()) look.leave_out_all_but(eye.seen);
   look.learning = !eye.segmenter.ready();
   return look;
@@ -235,14 +264,13 @@ bool Pipeline::segment(Observation& observation) {
     if (frozen(look.change)) continue;
     watch_background(observation, c, look.learning);
     adapts[c] = true;
-    if (tracking_ && vision_.method == SegmentationMethod::kLearnedBackground) {
-      predicted[c] = estimator_.predicted_silhouette(observation, c, true);
-    }
+    if (tracking_ && needs_background()) predicted[c] = estimator_.predicted_silhouette(observation, c, true);
+    if (vision_.method == SegmentationMethod::kAuto) predicted[c] = std::move(look.predicted);
   }
   for_each_eye([&](std::size_t c) {
     if (!adapts[c]) return;
     const CameraObservation& seen = *observation.cameras[c];
-    eyes_[c].segmenter.adapt(seen.image, seen.mask, predicted[c] ? &*predicted[c] : nullptr);
+    eyes_[c].segmenter.adapt(seen.image, seen.mask, prediction(c, predicted[c]));
   });
   if (learning_) {
     for (auto& seen : observation.cameras) {
@@ -253,7 +281,7 @@ bool Pipeline::segment(Observation& observation) {
   return !learning_;
 }
 
-/// Only methods that compare with a background that was known before.
+/// Only methods that compare with a background that was known before; `auto` finds out by itself.
 void Pipeline::watch_background(const Observation& observation, std::size_t camera, bool learning) {
   if (vision_.method != SegmentationMethod::kLearnedBackground &&
       vision_.method != SegmentationMethod::kBackgroundPicture) {
@@ -272,6 +300,14 @@ Estimate Pipeline::estimate(const Observation& observation) {
   Estimate estimate = estimator_.step(observation);
   if (learning_) estimate.state = EstimatorState::kLearningBackground;
   tracking_ = estimate.state == EstimatorState::kConverged;
+  outline_sd_px_ = -1.0;
+  young_ = estimate.postures < options_.least_postures;
+  if (estimate.verdict == FrameVerdict::kAgrees && !estimate.X_CP.empty()) {
+    const auto& k = rig_.cameras[0].intrinsics;
+    const double hand_px =
+        k.fx * estimate.hand_sd_m / std::max(estimate.X_CP[0].translation().z(), 0.1) / picture_unit(k);
+    outline_sd_px_ = std::hypot(hand_px, estimate.contour_rms_px);
+  }
   return estimate;
 }
 

@@ -145,64 +145,6 @@ void RegionStatistics::decide(const Image& image, int reach, BinaryMask& robot) 
   }
 }
 
-void RegionStatistics::average_background(const Image& image, const BinaryMask& robot, BackgroundModel& local) {
-  const auto channels = static_cast<std::size_t>(image.channels);
-  const auto columns = static_cast<std::size_t>(box_.width());
-  const auto rows = static_cast<std::size_t>(box_.height());
-  const std::size_t planes = channels + 2;  // colours, their squares, the number of pixels
-  work_ = robot;
-  morphology_.dilate(work_, 2);
-  for (std::size_t c = 0; c < planes; ++c) sums_[c].resize(columns * rows);
-  for (int v = box_.v0; v <= box_.v1; ++v) {
-    std::array<int, 5> running{};
-    const auto accumulate = [&](int u, int sign) {
-      if (u < box_.u0 || u > box_.u1 || work_.at(u, v)) return;
-      const auto* pixel = image.pixel(u, v);
-      for (std::size_t c = 0; c < channels; ++c) {
-        running[c] += sign * pixel[c];
-        running[channels] += sign * pixel[c] * pixel[c];
-      }
-      running[channels + 1] += sign;
-    };
-    auto index = static_cast<std::size_t>(v - box_.v0) * columns;
-    for (int u = box_.u0; u < box_.u0 + kLocalRadius; ++u) accumulate(u, 1);
-    for (int u = box_.u0; u <= box_.u1; ++u, ++index) {
-      accumulate(u + kLocalRadius, 1);
-      for (std::size_t c = 0; c < planes; ++c) sums_[c][index] = running[c];
-      accumulate(u - kLocalRadius, -1);
-    }
-  }
-  columns_.assign(planes * columns, 0);
-  const auto add_row = [&](int v, int sign) {
-    if (v < box_.v0 || v > box_.v1) return;
-    for (std::size_t c = 0; c < planes; ++c) {
-      const int* row = sums_[c].data() + static_cast<std::size_t>(v - box_.v0) * columns;
-      int* column = columns_.data() + c * columns;
-      for (std::size_t u = 0; u < columns; ++u) column[u] += sign * row[u];
-    }
-  };
-  for (int v = box_.v0; v < box_.v0 + kLocalRadius; ++v) add_row(v, 1);
-  for (int v = box_.v0; v <= box_.v1; ++v) {
-    add_row(v + kLocalRadius, 1);
-    for (std::size_t u = 0; u < columns; ++u) {
-      const auto i =
-          static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(box_.u0) + u;
-      const auto weight = static_cast<float>(columns_[(channels + 1) * columns + u]);
-      if (weight < 1.0f) continue;
-      float squares = static_cast<float>(columns_[channels * columns + u]) / weight;
-      for (std::size_t c = 0; c < channels; ++c) {
-        const float mean = static_cast<float>(columns_[c * columns + u]) / weight;
-        local.mean[i * channels + c] = mean;
-        squares -= mean * mean;
-      }
-      // A varied background is no more certain than it is varied.
-      local.precision[i] =
-          1.0f / (std::max(squares, 0.0f) / static_cast<float>(channels) + local.noise_sd * local.noise_sd);
-    }
-    add_row(v - kLocalRadius, -1);
-  }
-}
-
 void RegionStatistics::separate(const Image& image, const BinaryMask& predicted, const VisionSetup& setup,
                                 BinaryMask& robot, BackgroundModel& local) {
   if (local.width != image.width || local.height != image.height || local.channels != image.channels) {
@@ -274,7 +216,7 @@ void RegionStatistics::separate(const Image& image, const BinaryMask& predicted,
       }
     }
   }
-  average_background(image, robot, local);
+  average_.around(image, robot, box_, kLocalRadius, local);
 }
 
 }  // namespace bodyschema

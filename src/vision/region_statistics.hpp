@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -9,6 +8,7 @@
 #include "bodyschema/vision/background_model.hpp"
 #include "bodyschema/vision/mask_operations.hpp"
 #include "bodyschema/vision/vision_setup.hpp"
+#include "local_average.hpp"
 
 namespace bodyschema {
 
@@ -35,7 +35,6 @@ class RegionStatistics {
   static float collect(const Image& image, const BinaryMask& where, const PixelBox& box, Histogram& histogram);
   void measure_depth(const BinaryMask& predicted, int reach);
   void decide(const Image& image, int reach, BinaryMask& robot);
-  void average_background(const Image& image, const BinaryMask& robot, BackgroundModel& local);
 
   PixelBox box_;
   MaskMorphology morphology_;
@@ -44,8 +43,7 @@ class RegionStatistics {
   std::vector<float> evidence_;     ///< log odds by colour
   std::vector<std::int8_t> depth_;  ///< steps inside (positive) or outside the prediction
   std::vector<float> row_sums_, odds_;
-  std::array<std::vector<int>, 5> sums_;
-  std::vector<int> columns_;
+  LocalAverage average_;
 };
 
 /// Noise of one channel from a single picture, levels: the median response to a mask that is blind

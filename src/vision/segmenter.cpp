@@ -11,8 +11,10 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/vision/mask_operations.hpp"
 #include "bodyschema/vision/mask_picture.hpp"
+#include "colour_evidence.hpp"
 #include "coverage.hpp"
 #include "learned_background.hpp"
+#include "local_average.hpp"
 #include "region_statistics.hpp"
 #include "single_colour_background.hpp"
 
@@ -62,6 +64,29 @@ void pack_bits(const std::uint8_t* bytes, std::size_t count, std::uint64_t* word
   }
 }
 
+/// What is in both.
+void intersect(BinaryMask& mask, const BinaryMask& other) {
+  for (int v = 0; v < mask.height(); ++v) {
+    for (int w = 0; w < mask.words_per_row(); ++w) mask.row(v)[w] &= other.row(v)[w];
+  }
+}
+
+// Of `auto`. Lengths are those of a 320x240 picture.
+// Light and background are compared at every so many pixels along each axis.
+constexpr int kLightGrid = 3;
+// A gain nearer to one than this is none: rounding to whole levels costs as much.
+constexpr float kSameLight = 0.004f;
+// A pixel shows its background within so many standard deviations of each channel.
+constexpr float kSameSigma = 3.0f;
+// Where the camera stands still, robot, people and things that are moved cover less than half of what lies away from
+// the predicted robot; where it has turned, all but a plain wall changes.
+constexpr double kHolds = 0.6, kSameThoughTurned = 0.97;
+constexpr int kMostMisfits = 10;
+// The background nobody knows is averaged over squares of this half side, px; twice that where there is none so near.
+constexpr double kAverage_px = 3.0;
+// Share that one picture has in what is known of the robot's colours.
+constexpr float kLookShare = 0.05f;
+
 BackgroundModel load_background(const VisionSetup& setup, const std::string& camera, int width, int height,
                                 const Undistorter* lens) {
   const auto found = setup.background_pictures.find(camera);
@@ -105,8 +130,12 @@ struct Segmenter::Impl {
         hits((static_cast<std::size_t>(w) + 63) / 64 * 64, 0) {}
 
   void check(const Image& image);
-  [[nodiscard]] bool fits(const BinaryMask* predicted) const {
-    return predicted != nullptr && predicted->width() == width && predicted->height() == height;
+  [[nodiscard]] bool fits(const PredictedRobot& predicted) const {
+    return predicted.silhouette != nullptr && predicted.silhouette->width() == width &&
+           predicted.silhouette->height() == height;
+  }
+  [[nodiscard]] bool learns() const {
+    return setup.method == SegmentationMethod::kLearnedBackground || setup.method == SegmentationMethod::kAuto;
   }
   [[nodiscard]] const BackgroundModel& background() const;
   void detect(const Image& image, const BackgroundModel& model);
@@ -116,6 +145,19 @@ struct Segmenter::Impl {
               std::vector<std::uint8_t>& coverage);
   void soften(BinaryMask& mask, std::vector<std::uint8_t>& coverage) const;
   void mark_valid(const BackgroundModel& model, BinaryMask& valid);
+  /// The whole picture against a background that is known.
+  void compare(const Image& image, const BackgroundModel& model, BinaryMask& mask, BinaryMask& valid,
+               std::vector<std::uint8_t>& coverage);
+
+  // --- auto ---
+  void segment_auto(const Image& image, BinaryMask& mask, BinaryMask& valid, std::vector<std::uint8_t>& coverage,
+                    const PredictedRobot& predicted);
+  void adapt_auto(const Image& image, const BinaryMask& mask, const PredictedRobot& predicted);
+  /// The picture in the light in which the background was learned; the picture itself where that has not changed.
+  const Image& in_known_light(const Image& image);
+  /// Whether the learned background is what this picture shows away from the robot.
+  [[nodiscard]] bool background_holds(const Image& image);
+  void forget_background();
 
   VisionSetup setup;
   std::string camera;
@@ -129,6 +171,14 @@ struct Segmenter::Impl {
   bool given_noise_known = false;
   RegionStatistics statistics;
   BackgroundModel local;  // statistics: of the last frame, next to the robot
+  ColourEvidence evidence;        // auto
+  RobotLooks looks;               // auto
+  LocalAverage average;           // auto
+  BinaryMask known, beside;       // auto: pixels with a known background; the robot and all around it
+  Image relit;                    // auto: the last picture in the light of the learned background
+  std::array<float, 3> light{1.0f, 1.0f, 1.0f};  // auto: gain of this picture, by channel
+  bool turned = false;            // auto: the camera, since the background was learned
+  int misfits = 0;                // auto: pictures in a row that the background does not fit
   FrameSelection selection;
   bool learned_offline = false;
   bool just_learned = false;  // the last frame was learned from whole and gave no mask
@@ -161,6 +211,7 @@ const BackgroundModel& Segmenter::Impl::background() const {
   switch (setup.method) {
     case SegmentationMethod::kSingleColour: return single_colour.model();
     case SegmentationMethod::kBackgroundPicture: return given;
+    case SegmentationMethod::kAuto:
     case SegmentationMethod::kStatistics: return local;
     case SegmentationMethod::kGiven:
     case SegmentationMethod::kLearnedBackground: break;
@@ -267,8 +318,10 @@ void Segmenter::Impl::mark_valid(const BackgroundModel& model, BinaryMask& valid
 
 void Segmenter::Impl::refine(const Image& image, const BackgroundModel& model, BinaryMask& mask, BinaryMask& valid,
                              std::vector<std::uint8_t>& coverage) {
-  coverage_estimator.estimate(image, model, detected, sure, static_cast<float>(setup.least_contrast_sigma), mask,
-                              uncertain, coverage);
+  // Beside a background that nobody knows, its own variety counts as noise: half as much contrast puts outlines half a
+  // pixel off at most.
+  const double least = (setup.method == SegmentationMethod::kAuto ? 0.5 : 1.0) * setup.least_contrast_sigma;
+  coverage_estimator.estimate(image, model, detected, sure, static_cast<float>(least), mask, uncertain, coverage);
   if (setup.method == SegmentationMethod::kStatistics) {
     soften(mask, coverage);
   } else {
@@ -343,13 +396,13 @@ void Segmenter::admit(const Image& image) {
 
 void Segmenter::learn_from(const Image& frame) {
   admit(frame);
-  if (impl_->setup.method == SegmentationMethod::kLearnedBackground) impl_->selection.add(frame);
+  if (impl_->learns()) impl_->selection.add(frame);
   if (impl_->setup.method == SegmentationMethod::kSingleColour) impl_->single_colour.update(frame);
 }
 
 void Segmenter::finish_learning() {
   auto& self = *impl_;
-  if (self.setup.method != SegmentationMethod::kLearnedBackground) return;
+  if (!self.learns()) return;
   self.learned.learn(self.selection.frames(), self.selection.noise_sd());
   self.learned_offline = !self.selection.frames().empty();
   self.selection.clear();
@@ -370,24 +423,27 @@ const BackgroundModel& Segmenter::background() const {
 }
 
 void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid, std::vector<std::uint8_t>& coverage,
-                        const BinaryMask* predicted) {
+                        const PredictedRobot& predicted) {
   admit(image);
   auto& self = *impl_;
   self.just_learned = false;
-  if (!self.fits(predicted)) predicted = nullptr;
   const auto fit = [&](BinaryMask& m) {
     if (m.width() != self.width || m.height() != self.height) m = BinaryMask(self.width, self.height);
   };
   fit(mask);
   fit(valid);
+  if (self.setup.method == SegmentationMethod::kAuto) {
+    self.segment_auto(image, mask, valid, coverage, self.fits(predicted) ? predicted : PredictedRobot());
+    return;
+  }
   if (self.setup.method == SegmentationMethod::kStatistics) {
-    valid.fill(predicted != nullptr);
-    if (predicted == nullptr) {
+    valid.fill(self.fits(predicted));
+    if (!self.fits(predicted)) {
       mask.fill(false);
       coverage.assign(image.data.size() / static_cast<std::size_t>(self.channels), 0);
       return;
     }
-    self.statistics.separate(image, *predicted, self.setup, self.sure, self.local);
+    self.statistics.separate(image, *predicted.silhouette, self.setup, self.sure, self.local);
     self.components.remove_small(self.sure, self.setup.min_component_px);
     self.components.fill_small_holes(self.sure, self.setup.max_hole_px);
     self.detected = self.sure;
@@ -411,41 +467,231 @@ void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
     }
     self.given_noise_known = true;
   }
-  const auto& model = self.background();
-  self.mark_valid(model, valid);
-
-  if (self.setup.edges == EdgeKind::kHard) {
-    self.detect_hard(image, model);
-    self.components.remove_small(self.detected, self.setup.min_component_px);
-    self.components.fill_small_holes(self.detected, self.setup.max_hole_px);
-    mask = self.detected;
-    coverage.resize(image.data.size() / static_cast<std::size_t>(self.channels));
-    std::size_t i = 0;
-    for (int v = 0; v < self.height; ++v) {
-      for (int u = 0; u < self.width; ++u, ++i) coverage[i] = mask.at(u, v) ? 255 : 0;
-    }
-  } else {
-    self.detect(image, model);
-    self.components.remove_small(self.detected, self.setup.min_component_px);
-    self.components.fill_small_holes(self.detected, self.setup.max_hole_px);
-    for (int v = 0; v < self.height; ++v) {
-      for (int w = 0; w < self.detected.words_per_row(); ++w) {
-        self.sure.row(v)[w] &= self.detected.row(v)[w];
-      }
-    }
-    self.components.fill_small_holes(self.sure, std::max(self.setup.max_hole_px, 4));
-    self.refine(image, model, mask, valid, coverage);
-  }
+  self.compare(image, self.background(), mask, valid, coverage);
 }
 
-void Segmenter::adapt(const Image& image, const BinaryMask& mask, const BinaryMask* predicted) {
+void Segmenter::Impl::compare(const Image& image, const BackgroundModel& model, BinaryMask& mask, BinaryMask& valid,
+                              std::vector<std::uint8_t>& coverage) {
+  mark_valid(model, valid);
+  if (setup.edges == EdgeKind::kHard) {
+    detect_hard(image, model);
+    components.remove_small(detected, setup.min_component_px);
+    components.fill_small_holes(detected, setup.max_hole_px);
+    mask = detected;
+    coverage.resize(image.data.size() / static_cast<std::size_t>(channels));
+    std::size_t i = 0;
+    for (int v = 0; v < height; ++v) {
+      for (int u = 0; u < width; ++u, ++i) coverage[i] = mask.at(u, v) ? 255 : 0;
+    }
+    return;
+  }
+  detect(image, model);
+  components.remove_small(detected, setup.min_component_px);
+  components.fill_small_holes(detected, setup.max_hole_px);
+  intersect(sure, detected);
+  components.fill_small_holes(sure, std::max(setup.max_hole_px, 4));
+  refine(image, model, mask, valid, coverage);
+}
+
+void Segmenter::adapt(const Image& image, const BinaryMask& mask, const PredictedRobot& predicted) {
   auto& self = *impl_;
+  if (self.setup.method == SegmentationMethod::kAuto) {
+    self.adapt_auto(image, mask, self.fits(predicted) ? predicted : PredictedRobot());
+    return;
+  }
   if (self.setup.method != SegmentationMethod::kLearnedBackground || self.just_learned) return;
   // Where the robot is, nothing is learned: as predicted, or else as seen.
   const bool foreseen = self.fits(predicted);
-  self.robot = foreseen ? *predicted : mask;
+  self.robot = foreseen ? *predicted.silhouette : mask;
   self.morphology.dilate(self.robot, foreseen ? 6 : 3);
   self.learned.update(image, &self.robot, false);
+}
+
+void Segmenter::camera_turned() {
+  impl_->turned = true;
+}
+
+// --- auto -----------------------------------------------------------------------------------------
+
+/// One gain a channel: the median of what the picture has over what the background had. Found anew in every picture, so
+/// that no bad one is remembered.
+const Image& Segmenter::Impl::in_known_light(const Image& image) {
+  const BackgroundModel& model = learned.model();
+  light.fill(1.0f);
+  if (model.channels != image.channels) return image;
+  constexpr int kSteps = 200;  // of half a percent, from a third to nearly three times
+  constexpr float kPerStep = 1.005f;
+  constexpr std::size_t kFewest = 300;
+  std::array<std::array<std::size_t, 2 * kSteps + 1>, 3> counts{};
+  std::size_t all = 0;
+  for (int v = 1; v < height; v += kLightGrid) {
+    for (int u = 1; u < width; u += kLightGrid) {
+      const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
+      if (model.precision[i] <= 0.0f || beside.at(u, v)) continue;
+      ++all;
+      for (std::size_t c = 0; c < static_cast<std::size_t>(channels); ++c) {
+        const float had = std::max(model.mean[i * static_cast<std::size_t>(channels) + c], 1.0f);
+        const float has = std::max(static_cast<float>(image.pixel(u, v)[c]), 1.0f);
+        const float step = std::log(has / had) / std::log(kPerStep);
+        ++counts[c][static_cast<std::size_t>(
+            std::clamp(static_cast<int>(std::lround(step)), -kSteps, kSteps) + kSteps)];
+      }
+    }
+  }
+  if (all < kFewest) return image;
+  bool changed = false;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(channels); ++c) {
+    std::size_t below = 0, k = 0;
+    while (2 * (below + counts[c][k]) < all) below += counts[c][k++];
+    // Within the step: as many lie below the median as above.
+    const float within = (0.5f * static_cast<float>(all) - static_cast<float>(below)) /
+                             std::max(static_cast<float>(counts[c][k]), 1.0f) - 0.5f;
+    light[c] = std::pow(kPerStep, static_cast<float>(k) - kSteps + within);
+    changed = changed || std::abs(light[c] - 1.0f) > kSameLight;
+  }
+  if (!changed) {
+    light.fill(1.0f);
+    return image;
+  }
+  relit = image;
+  std::array<std::array<std::uint8_t, 256>, 3> table{};
+  for (std::size_t c = 0; c < static_cast<std::size_t>(channels); ++c) {
+    for (std::size_t level = 0; level < 256; ++level) {
+      table[c][level] =
+          static_cast<std::uint8_t>(std::min(static_cast<float>(level) / light[c] + 0.5f, 255.0f));
+    }
+  }
+  const auto n = static_cast<std::size_t>(channels);
+  for (std::size_t i = 0; i < relit.data.size(); i += n) {
+    for (std::size_t c = 0; c < n; ++c) relit.data[i + c] = table[c][relit.data[i + c]];
+  }
+  return relit;
+}
+
+bool Segmenter::Impl::background_holds(const Image& image) {
+  const BackgroundModel& model = learned.model();
+  if (model.channels != image.channels) return false;
+  std::size_t all = 0, same = 0;
+  const auto n = static_cast<std::size_t>(channels);
+  for (int v = 1; v < height; v += kLightGrid) {
+    for (int u = 1; u < width; u += kLightGrid) {
+      const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
+      if (model.precision[i] <= 0.0f || beside.at(u, v)) continue;
+      float square = 0.0f;
+      for (std::size_t c = 0; c < n; ++c) {
+        const float d = static_cast<float>(image.pixel(u, v)[c]) - model.mean[i * n + c];
+        square += d * d;
+      }
+      ++all;
+      same += square * model.precision[i] < kSameSigma * kSameSigma * static_cast<float>(n);
+    }
+  }
+  const double share = all == 0 ? 0.0 : static_cast<double>(same) / static_cast<double>(all);
+  if (all > 0 && turned && share < kSameThoughTurned) {
+    forget_background();
+    return false;
+  }
+  turned = turned && share < kSameThoughTurned;
+  const bool holds = share >= kHolds;
+  misfits = holds || all == 0 ? 0 : misfits + 1;
+  if (misfits >= kMostMisfits) forget_background();
+  return holds;
+}
+
+void Segmenter::Impl::forget_background() {
+  learned = LearnedBackground(setup, width, height);
+  learned_offline = false;
+  turned = false;
+  misfits = 0;
+}
+
+void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryMask& valid,
+                                   std::vector<std::uint8_t>& coverage, const PredictedRobot& predicted) {
+  const double unit = std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0));
+  const double reach_px = predicted.reach_px > 0.0 ? predicted.reach_px : setup.search_px * unit;
+  if (beside.width() != width || beside.height() != height) {
+    beside = BinaryMask(width, height);
+    known = BinaryMask(width, height);
+  }
+  beside.fill(false);
+  if (predicted.silhouette != nullptr) {
+    beside = *predicted.silhouette;
+    morphology.dilate(beside, static_cast<int>(std::ceil(reach_px)));
+  }
+  const Image& seen = in_known_light(image);
+  const bool holds = background_holds(seen);
+  if (predicted.silhouette == nullptr) {
+    if (holds) {
+      compare(seen, learned.model(), mask, valid, coverage);
+    } else {
+      mask.fill(false);
+      valid.fill(false);
+      coverage.assign(image.data.size() / static_cast<std::size_t>(channels), 0);
+    }
+    return;
+  }
+  known.fill(false);
+  if (holds) {
+    mark_valid(learned.model(), known);
+    detect(seen, learned.model());
+    components.remove_small(detected, setup.min_component_px);
+    components.fill_small_holes(detected, setup.max_hole_px);
+    intersect(sure, detected);
+    components.fill_small_holes(sure, std::max(setup.max_hole_px, 4));
+  } else {
+    detected.fill(false);
+    sure.fill(false);
+  }
+  const BackgroundModel* background = holds ? &learned.model() : nullptr;
+  evidence.separate(seen, *predicted.silhouette, reach_px, looks, background, sure, robot);
+  components.remove_small(robot, setup.min_component_px);
+  components.fill_small_holes(robot, setup.max_hole_px);
+  // A pixel beyond what is sure may be robot in part: as the background says, or beside what colours say.
+  sure = robot;
+  morphology.dilate(robot);
+  for (int v = 0; v < height; ++v) {
+    for (int w = 0; w < known.words_per_row(); ++w) {
+      const auto k = known.row(v)[w];
+      detected.row(v)[w] = (detected.row(v)[w] & k & beside.row(v)[w]) | (robot.row(v)[w] & ~k) | sure.row(v)[w];
+    }
+  }
+  if (local.width != width || local.height != height || local.channels != channels) {
+    local = BackgroundModel(width, height, channels);
+  }
+  std::fill(local.precision.begin(), local.precision.end(), 0.0f);
+  local.noise_sd = setup.noise_levels > 0.0 ? static_cast<float>(setup.noise_levels) : noise_of(seen);
+  average.around(seen, sure, evidence.box(), static_cast<int>(2.0 * kAverage_px * unit), local);
+  average.around(seen, sure, evidence.box(), static_cast<int>(kAverage_px * unit), local);
+  if (holds) {
+    const BackgroundModel& model = learned.model();
+    const auto n = static_cast<std::size_t>(channels);
+    for (std::size_t i = 0; i < model.precision.size(); ++i) {
+      if (model.precision[i] <= 0.0f) continue;
+      local.precision[i] = model.precision[i];
+      for (std::size_t c = 0; c < n; ++c) local.mean[i * n + c] = model.mean[i * n + c];
+    }
+  }
+  valid.fill(true);
+  refine(seen, local, mask, valid, coverage);
+  evidence.mark_weak(robot);
+  for (int v = 0; v < height; ++v) {
+    for (int w = 0; w < known.words_per_row(); ++w) valid.row(v)[w] &= ~(robot.row(v)[w] & ~known.row(v)[w]);
+  }
+}
+
+void Segmenter::Impl::adapt_auto(const Image& image, const BinaryMask& mask, const PredictedRobot& predicted) {
+  const bool relit_is_this = light != std::array<float, 3>{1.0f, 1.0f, 1.0f};
+  const Image& seen = relit_is_this ? relit : image;
+  robot = mask;
+  morphology.dilate(robot, 3);
+  for (int v = 0; v < height; ++v) {
+    for (int w = 0; w < robot.words_per_row(); ++w) robot.row(v)[w] |= beside.row(v)[w];
+  }
+  constexpr int kEager = 20;
+  learned.update(seen, &robot, learned.frames_seen() < kEager);
+  if (predicted.silhouette != nullptr && predicted.trusted) {
+    evidence.learn(seen, *predicted.silhouette, kLookShare, looks);
+  }
 }
 
 }  // namespace bodyschema

@@ -8,7 +8,8 @@ VisionSetup VisionSetup::from(const Configuration& vision) {
   VisionSetup setup;
   const auto method =
       vision.choice_or("method", "learned_background",
-                       {"single_colour", "background_picture", "learned_background", "statistics", "given"});
+                       {"auto", "single_colour", "background_picture", "learned_background", "statistics", "given"});
+  if (method == "auto") setup.method = SegmentationMethod::kAuto;
   if (method == "single_colour") setup.method = SegmentationMethod::kSingleColour;
   if (method == "background_picture") setup.method = SegmentationMethod::kBackgroundPicture;
   if (method == "learned_background") setup.method = SegmentationMethod::kLearnedBackground;

@@ -37,6 +37,8 @@ class BackgroundWatch {
   }
   /// How far the camera has turned since; 0 below kTurn_rad.
   [[nodiscard]] double turned(std::size_t camera, const Eigen::VectorXd& q);
+  /// Whether the camera has turned by more than noise and rounding of encoders since this was last true; true at first.
+  [[nodiscard]] bool moved_since_last(std::size_t camera, const Eigen::VectorXd& q);
   /// Counts a picture. @return whether the background has changed with the turn
   /// @param turned_rad  what turned() said
   /// @param robot  where the robot is thought to be; looked at only where the camera has turned
@@ -48,8 +50,8 @@ class BackgroundWatch {
   Pose pose(std::size_t camera, const Eigen::VectorXd& q);
 
   ForwardKinematics eyes_;
-  std::vector<Pose> X_WC_, X_WC_learned_;
-  std::vector<bool> known_;
+  std::vector<Pose> X_WC_, X_WC_learned_, X_WC_stood_;
+  std::vector<bool> known_, stood_;
   BackgroundTurn total_;
 };
 

@@ -38,7 +38,7 @@ class Pipeline {
   /// @param next  the observation that will come next, where it has come already; null: unknown. Its
   ///   masks are found by another thread while the estimator is at work, which changes no result. It
   ///   is only read, and until this returns; std::logic_error when another one comes after all. No
-  ///   effect with `vision.method: statistics`, which goes by the estimate before.
+  ///   effect where masks need estimates, which go by the estimate before.
   Estimate process(Observation& observation, const Observation* next = nullptr);
   /// Straightens the pictures and fills in the masks. A camera that repeats its last picture while
   /// the arm moves gets none: it is frozen; nor does one whose mask did not come (`vision.method: given`). False while
@@ -58,10 +58,16 @@ class Pipeline {
   /// `finish_learning`.
   void learn_from(const Observation& observation);
   void finish_learning();
-  /// Whether masks are looked for near where the robot is estimated to be (`vision.method: statistics`).
-  [[nodiscard]] bool masks_need_estimates() const { return vision_.method == SegmentationMethod::kStatistics; }
-  /// Whether the background is learned from pictures (`vision.method: learned_background`).
-  [[nodiscard]] bool learns_background() const { return vision_.method == SegmentationMethod::kLearnedBackground; }
+  /// Whether masks are looked for near where the robot is estimated to be (`vision.method: auto`, `statistics`).
+  [[nodiscard]] bool masks_need_estimates() const {
+    return vision_.method == SegmentationMethod::kAuto || vision_.method == SegmentationMethod::kStatistics;
+  }
+  /// Whether a background is learned from pictures, offline from all of a log (`auto`, `learned_background`).
+  [[nodiscard]] bool learns_background() const {
+    return vision_.method == SegmentationMethod::kAuto || needs_background();
+  }
+  /// Whether no mask is to be had before a background was learned (`learned_background`).
+  [[nodiscard]] bool needs_background() const { return vision_.method == SegmentationMethod::kLearnedBackground; }
 
   [[nodiscard]] const RobotModel& robot() const { return *robot_; }
   [[nodiscard]] std::shared_ptr<const RobotModel> shared_robot() const { return robot_; }
@@ -103,6 +109,7 @@ class Pipeline {
     std::optional<Image> straightened;  ///< absent: the picture was straight
     BinaryMask mask, valid;
     std::vector<std::uint8_t> coverage;
+    std::optional<BinaryMask> predicted;  ///< where the robot was looked for
     bool learning = false;
     /// What the lens never saw is neither robot nor background.
     void leave_out_all_but(const BinaryMask& seen);
@@ -115,7 +122,9 @@ class Pipeline {
   [[nodiscard]] static bool frozen(const PictureChange& change);
   /// @param alone  whether the other thread is free to help
   Looks look(const Observation& observation, bool alone);
-  Look look_with(Eye& eye, const CameraObservation& seen, const std::optional<BinaryMask>& predicted) const;
+  Look look_with(std::size_t camera, const CameraObservation& seen, std::optional<BinaryMask> predicted);
+  [[nodiscard]] PredictedRobot prediction(std::size_t camera, const std::optional<BinaryMask>& silhouette) const;
+  [[nodiscard]] double reach_px(std::size_t camera) const;
   template <class OfCamera>
   void for_each_eye(const OfCamera& of_camera);
   Looks looks_at(const Observation& observation);
@@ -138,6 +147,9 @@ class Pipeline {
   std::string model_hash_;
   bool learning_ = false;
   bool tracking_ = false;  ///< the estimate is good enough to predict where the robot is
+  /// How far off the last estimate may have put outlines, px of a 320x240 picture; negative: nobody knows.
+  double outline_sd_px_ = -1.0;
+  bool young_ = true;  ///< few postures were seen: the estimate may be a wrong one's
   double segmentation_ms_ = 0.0;
   std::future<Looks> ahead_;  ///< at the next observation, where it was known
   /// Looks ahead, or at the second camera's picture.

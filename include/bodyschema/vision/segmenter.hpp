@@ -15,6 +15,17 @@ namespace bodyschema {
 
 class Undistorter;
 
+/// Where the robot is thought to be in a picture, and how well that is known.
+struct PredictedRobot {
+  const BinaryMask* silhouette = nullptr;  ///< of the picture's size, or it does not count; null: unknown
+  double reach_px = 0.0;                   ///< how far off its outline may be, px; 0: as configured
+  bool trusted = false;                    ///< the estimate has converged: what lies inside is robot
+
+  PredictedRobot() = default;
+  PredictedRobot(const BinaryMask* robot, double reach = 0.0, bool is_trusted = false)
+      : silhouette(robot), reach_px(reach), trusted(is_trusted) {}
+};
+
 /// Tells the robot from the background in the pictures of one camera.
 ///
 /// For every picture it gives
@@ -31,7 +42,9 @@ class Undistorter;
 /// `learned_background` needs either `learn` (offline, all frames of a log) or, live, its first
 /// `learning_frames` frames (better without the robot in view; while learning nothing is valid)
 /// and keeps adapting where the robot is not: `adapt`. `statistics` needs a prediction with every
-/// picture.
+/// picture. `auto` works from the first frame on with a prediction, and learns: the background as
+/// `learned_background`, as long as the camera stands still before it; the robot's colours while the prediction is
+/// trusted; how the light has changed since, from picture to picture.
 ///
 /// A picture of another number of channels than before starts all learning anew.
 ///
@@ -61,16 +74,18 @@ class Segmenter {
   /// Whether masks are to be had; false while a live background is still being learned.
   [[nodiscard]] bool ready() const;
 
-  /// @param predicted  where the robot is thought to be: `statistics` needs it, others do not look
+  /// @param predicted  where the robot is thought to be: `statistics` and `auto` need it, others do not look
   void segment(const Image& image, BinaryMask& mask, BinaryMask& valid, std::vector<std::uint8_t>& coverage,
-               const BinaryMask* predicted = nullptr);
+               const PredictedRobot& predicted = {});
 
-  /// `learned_background`: follows slow changes of the background, once `segment` has found `mask` in
+  /// `learned_background`, `auto`: follows slow changes of the background, once `segment` has found `mask` in
   /// this picture and before the next one is segmented. No effect with other methods and while still
   /// learning.
   /// @param predicted  where the robot is thought to be, which protects a resting robot from being
   ///   learned as background; null: where the mask is
-  void adapt(const Image& image, const BinaryMask& mask, const BinaryMask* predicted = nullptr);
+  void adapt(const Image& image, const BinaryMask& mask, const PredictedRobot& predicted = {});
+  /// `auto`: the camera has turned since the background was learned; that is forgotten unless it looks the same.
+  void camera_turned();
 
   /// The background as now known; empty before anything is.
   [[nodiscard]] const BackgroundModel& background() const;

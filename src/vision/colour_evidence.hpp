@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "bodyschema/geometry/binary_mask.hpp"
+#include "bodyschema/geometry/image.hpp"
+#include "bodyschema/vision/background_model.hpp"
+#include "bodyschema/vision/mask_operations.hpp"
+
+namespace bodyschema {
+
+/// The robot's colours, as learned while its outline fitted: shares of coarse colour cells, whatever the link.
+struct RobotLooks {
+  static constexpr int kBits = 4;  ///< per channel
+  static constexpr std::size_t kCells = std::size_t{1} << (3 * kBits);
+  std::vector<float> share;  ///< kCells entries that sum to one; empty: nothing is known
+  [[nodiscard]] bool known() const { return !share.empty(); }
+  /// The cell of a pixel; gray pictures use one channel's levels in full.
+  static std::size_t cell(const std::uint8_t* pixel, int channels);
+};
+
+/// Tells robot from background near a predicted outline by colours: of each side as they are near that piece of the
+/// outline in this picture, and of the robot as they were. Evidence is the log of the likelihood ratio of a pixel's
+/// colour, and what the prediction says for itself. Allocates nothing once warm. One per camera and thread.
+class ColourEvidence {
+ public:
+  /// @param predicted  where the robot is thought to be
+  /// @param reach_px   how far off that may be
+  /// @param looks      the robot's colours as known before
+  /// @param background pixels whose background is known say themselves whether they differ, in `differs`; null: none is
+  /// @param robot      out: pixels taken for robot
+  void separate(const Image& image, const BinaryMask& predicted, double reach_px, const RobotLooks& looks,
+                const BackgroundModel* background, const BinaryMask& differs, BinaryMask& robot);
+  /// Pixels near the outline whose colour, with those around, told nothing in the last `separate`: what was decided
+  /// there is the prediction, not the picture.
+  void mark_weak(BinaryMask& weak);
+  /// The robot's colours where it was predicted in the last `separate`.
+  /// @param share  of the new ones in `looks`
+  void learn(const Image& image, const BinaryMask& predicted, float share, RobotLooks& looks);
+
+  /// Where the last `separate` looked.
+  [[nodiscard]] const PixelBox& box() const { return box_; }
+
+ private:
+  struct Side {
+    std::vector<float> tiles;  ///< counts by tile and cell
+    std::vector<float> near;   ///< the same, summed over a tile and its neighbours
+    std::vector<float> total;  ///< pixels by tile, of `near`
+    std::vector<float> all;    ///< of the whole box
+    float count = 0.0f;
+  };
+  void measure_depth(const BinaryMask& predicted);
+  [[nodiscard]] float core_depth(double reach_px) const;
+  void find_cells(const Image& image);
+  void collect(Side& robot, Side& rest) const;
+  void spread(Side& side) const;
+  void weigh(const RobotLooks& looks, double reach_px);
+  void decide(double reach_px, int smoothing, const BackgroundModel* background, const BinaryMask& differs,
+              BinaryMask& robot);
+
+  PixelBox box_;
+  bool rough_ = false;  ///< the prediction may be far off
+  int tile_px_ = 32, columns_ = 0, rows_ = 0;
+  std::vector<float> depth_;            ///< px inside (positive) or outside the prediction
+  std::vector<std::int8_t> side_;       ///< 1: robot for certain, -1: background for certain, 0: to be found
+  std::vector<std::uint16_t> cell_;     ///< of each pixel of the box: its number in `palette_`
+  std::vector<std::uint16_t> palette_;  ///< cells that the box shows
+  std::vector<std::uint16_t> number_;   ///< of every cell, in `palette_`
+  std::vector<float> evidence_, sums_, smooth_;
+  Side robot_, rest_;
+  MaskMorphology morphology_;
+};
+
+}  // namespace bodyschema

@@ -1,0 +1,215 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <random>
+
+#include "bodyschema/vision/segmenter.hpp"
+#include "scene.hpp"
+
+namespace bodyschema {
+namespace {
+
+using test::Scene;
+using test::Texture;
+
+VisionSetup automatic() {
+  VisionSetup setup;
+  setup.method = SegmentationMethod::kAuto;
+  return setup;
+}
+
+struct Output {
+  BinaryMask mask, valid;
+  std::vector<std::uint8_t> coverage;
+};
+
+double iou(const BinaryMask& a, const BinaryMask& b) {
+  std::size_t in = 0, all = 0;
+  for (int v = 0; v < a.height(); ++v) {
+    for (int u = 0; u < a.width(); ++u) {
+      in += a.at(u, v) && b.at(u, v);
+      all += a.at(u, v) || b.at(u, v);
+    }
+  }
+  return all == 0 ? 1.0 : static_cast<double>(in) / static_cast<double>(all);
+}
+
+test::EdgeStatistics edges_of(const Scene& scene, const Output& out) {
+  const auto edge = test::edge_statistics(scene.outline(), scene.width, scene.height, out.coverage, out.valid);
+  std::printf("    outline: bias %+.3f px, sd %.3f px, worst %.2f px, found %.1f %%\n", edge.bias, edge.sd, edge.worst,
+              100.0 * edge.found);
+  return edge;
+}
+
+/// Of the size at which a robot's camera shows its hand at 0.35 m.
+Scene large(Texture texture) {
+  Scene scene;
+  scene.width = 320;
+  scene.height = 240;
+  scene.texture = texture;
+  scene.ambient = 0.7;
+  scene.supersampling = 3;
+  return scene;
+}
+std::vector<test::Capsule> large_hand(double u, double v) {
+  auto shapes = test::hand(0.0, 0.0);
+  for (auto& shape : shapes) {
+    shape = {u + 2 * shape.u0, v + 2 * shape.v0, u + 2 * shape.u1, v + 2 * shape.v1, 2 * shape.radius};
+  }
+  return shapes;
+}
+
+/// A prediction that is off by this much.
+BinaryMask prediction(const Scene& scene, double du, double dv) {
+  Scene believed = scene;
+  for (auto& shape : believed.shapes) {
+    shape.u0 += du;
+    shape.u1 += du;
+    shape.v0 += dv;
+    shape.v1 += dv;
+  }
+  return believed.true_mask();
+}
+
+Image times(Image image, double gain) {
+  for (auto& level : image.data) level = static_cast<std::uint8_t>(std::min(255.0, gain * level + 0.5));
+  return image;
+}
+
+TEST(AutomaticMasks, ACameraThatTurnsBeforeARoomNeedsNoBackground) {
+  std::mt19937 random(14);
+  Scene scene = large(Texture::kClutter);
+  Segmenter segmenter(automatic(), "left", scene.width, scene.height);
+  Output out;
+  double worst_iou = 1.0, sd = 0.0, found = 0.0;
+  constexpr int kFrames = 6;
+  for (int i = 0; i < kFrames; ++i) {
+    scene.shift_u = 37.0 * i;
+    scene.shapes = large_hand(150.0 + 4.0 * i, 120.0);
+    const auto predicted = prediction(scene, 2.0, -2.0);
+    const auto picture = scene.picture(random);
+    segmenter.camera_turned();
+    segmenter.segment(picture, out.mask, out.valid, out.coverage, {&predicted, 6.0, i > 0});
+    segmenter.adapt(picture, out.mask, {&predicted, 6.0, i > 0});
+    worst_iou = std::min(worst_iou, iou(out.mask, scene.true_mask()));
+    const auto edge = edges_of(scene, out);
+    sd += edge.sd / kFrames;
+    found += edge.found / kFrames;
+  }
+  std::printf("    seed 14: worst IoU %.3f, outline sd %.2f px, found %.0f %%\n", worst_iou, sd, 100.0 * found);
+  EXPECT_GT(worst_iou, 0.9);
+  EXPECT_LT(sd, 0.6);
+  EXPECT_GT(found, 0.6);
+}
+
+TEST(AutomaticMasks, APredictionThatIsFarOffIsPutRight) {
+  for (const auto texture : {Texture::kPlain, Texture::kGradient, Texture::kClutter}) {
+    std::mt19937 random(21);
+    Scene scene = large(texture);
+    scene.shapes = large_hand(150.0, 120.0);
+    const auto predicted = prediction(scene, 20.0, -16.0);
+    Segmenter segmenter(automatic(), "left", scene.width, scene.height);
+    Output out;
+    segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage, {&predicted, 40.0});
+    const double before = iou(predicted, scene.true_mask()), after = iou(out.mask, scene.true_mask());
+    std::printf("    seed 21, texture %d: IoU of the prediction %.3f, of the mask %.3f\n", static_cast<int>(texture),
+                before, after);
+    EXPECT_LT(before, 0.6);
+    EXPECT_GT(after, texture == Texture::kClutter ? 0.75 : 0.9);
+  }
+}
+
+TEST(AutomaticMasks, ABackgroundThatHoldsIsUsedAsIfItHadBeenLearnedAlone) {
+  std::mt19937 random(3);
+  Scene scene;
+  scene.texture = Texture::kClutter;
+  Segmenter segmenter(automatic(), "left", scene.width, scene.height);
+  std::vector<Image> empty;
+  for (int i = 0; i < 20; ++i) empty.push_back(scene.without_robot().picture(random));
+  segmenter.learn(empty);
+  scene.shapes = test::hand(78.0, 62.0);
+  Output out;
+  const auto predicted = prediction(scene, 8.0, 3.0);
+  segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage, {&predicted, 20.0});
+  const auto edge = edges_of(scene, out);
+  EXPECT_LT(std::abs(edge.bias), 0.1);
+  EXPECT_LT(edge.sd, 0.3);
+  EXPECT_GT(edge.found, 0.75);
+  // ... and without any prediction.
+  segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
+  EXPECT_GT(iou(out.mask, scene.true_mask()), 0.97);
+}
+
+TEST(AutomaticMasks, LightThatDriftsAndWasLostComesBack) {
+  std::mt19937 random(5);
+  Scene scene;
+  scene.texture = Texture::kClutter;
+  Segmenter segmenter(automatic(), "left", scene.width, scene.height);
+  std::vector<Image> empty;
+  for (int i = 0; i < 20; ++i) empty.push_back(scene.without_robot().picture(random));
+  segmenter.learn(empty);
+  scene.shapes = test::hand(78.0, 62.0);
+  const auto predicted = prediction(scene, 2.0, 1.0);
+  Output out;
+  // Fainter by half at once, dark, and as it was: each picture for itself.
+  for (const double gain : {1.0, 1.2, 0.8, 0.5, 0.02, 1.0}) {
+    const auto picture = times(scene.picture(random), gain);
+    segmenter.segment(picture, out.mask, out.valid, out.coverage, {&predicted, 8.0});
+    segmenter.adapt(picture, out.mask, {&predicted, 8.0});
+    if (gain < 0.1) continue;
+    const auto edge = edges_of(scene, out);
+    std::printf("    seed 5, gain %.2f\n", gain);
+    EXPECT_LT(std::abs(edge.bias), 0.15) << gain;
+    EXPECT_LT(edge.sd, 0.4) << gain;
+  }
+}
+
+TEST(AutomaticMasks, WhereColoursDoNotDifferNothingIsSaid) {
+  std::mt19937 random(9);
+  Scene scene;
+  for (int c = 0; c < 3; ++c) scene.robot[c] = scene.base[c];
+  scene.shapes = test::hand(78.0, 62.0);
+  Segmenter segmenter(automatic(), "left", scene.width, scene.height);
+  Output out;
+  const auto predicted = scene.true_mask();
+  segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage, {&predicted, 6.0});
+  const auto edge = edges_of(scene, out);
+  EXPECT_LT(edge.found, 0.1);
+}
+
+TEST(AutomaticMasks, ABackgroundOfAnotherLineOfSightIsForgotten) {
+  std::mt19937 random(31);
+  Scene scene;
+  scene.texture = Texture::kClutter;
+  scene.shapes = test::hand(78.0, 62.0);
+  const auto predicted = scene.true_mask();
+  Segmenter segmenter(automatic(), "left", scene.width, scene.height);
+  Output out;
+  const auto look = [&](bool turned) {
+    const auto picture = scene.picture(random);
+    if (turned) segmenter.camera_turned();
+    segmenter.segment(picture, out.mask, out.valid, out.coverage, {&predicted, 6.0});
+    segmenter.adapt(picture, out.mask, {&predicted, 6.0});
+    return iou(out.mask, scene.true_mask());
+  };
+  for (int i = 0; i < 10; ++i) look(false);
+  scene.shift_u = 23.0;
+  EXPECT_GT(look(true), 0.85);
+  for (int i = 0; i < 10; ++i) look(false);
+  EXPECT_GT(look(false), 0.85);
+}
+
+TEST(AutomaticMasks, WithoutPredictionAndBackgroundThereIsNothingToGoBy) {
+  std::mt19937 random(1);
+  Scene scene;
+  scene.shapes = test::hand(78.0, 62.0);
+  Segmenter segmenter(automatic(), "left", scene.width, scene.height);
+  Output out;
+  segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage);
+  EXPECT_EQ(out.mask.count(), 0u);
+  EXPECT_EQ(out.valid.count(), 0u);
+}
+
+}  // namespace
+}  // namespace bodyschema
