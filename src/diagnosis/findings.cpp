@@ -412,10 +412,16 @@ void Findings::check_outlines(const LogAbout& log) {
 
 void Findings::check_surplus(const LogAbout& log) {
   const auto found = surplus(fit_, log, search_.raster());
-  if (found.blocks < limits::kMostOfTheLog) return;
+  if (found.blocks <= 0.0) return;
   constexpr double kCm2 = 1e-4;
-  report_.not_in_model =
+  const auto text =
       fmt::format("{:.0f} cm2 beside the robot, in {:.0f} % of the log", found.area_m2 / kCm2, 100.0 * found.blocks);
+  if (found.blocks >= limits::kMostOfTheLog) {
+    report_.not_in_model = text;
+  } else {
+    report_.warnings.push_back("masks show something that the model lacks: " + text +
+                               "; a passer-by, or a tool that is seen now and then");
+  }
 }
 
 void Findings::exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates) {

@@ -15,7 +15,8 @@ constexpr double kImplausible = 20.0;  ///< of an effect's typical size: no robo
 constexpr double kLeastFound = 0.6;    ///< share of the outline that must be found where the robot is seen at all
 constexpr double kMostOfTheLog = 0.5;  ///< of the blocks: what is seen there beside the robot is no passer-by
 constexpr double kFlankFloors = 3.0;   ///< times kFloor_px: so far off a whole flank is not where a picture may put it
-constexpr double kNoiseRatio = 1.3;    ///< what is left over what of it differs between blocks: more is no noise of pixels
+constexpr double kNoiseRatio =
+    1.3;  ///< what is left over what of it differs between blocks: more is no noise of pixels
 constexpr double kLostContrast = 0.5;  ///< between the shares of two parts of the log that are seen
 
 // Statistical.

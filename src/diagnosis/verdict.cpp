@@ -18,7 +18,7 @@ namespace {
 std::string amount_text(const DiagnosedParameter& p) {
   const std::string unit = p.unit == "1" ? "" : p.unit == "%" ? " %" : " " + p.unit;
   double low = p.ci95[0], high = p.ci95[1];
-  if (!std::isfinite(low)) return fmt::format("about {:.3g}{}", std::abs(p.estimate), unit);
+  if (!std::isfinite(low)) return fmt::format("roughly {:.3g}{}", std::abs(p.estimate), unit);
   if (p.estimate < 0.0) std::tie(low, high) = std::pair(-high, -low);
   if (low < 0.0) return fmt::format("{:.3g}{} (at most {:.3g})", std::abs(p.estimate), unit, high);
   return fmt::format("{:.3g}{} ({:.3g} to {:.3g})", std::abs(p.estimate), unit, low, high);
@@ -149,8 +149,8 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles, const std::v
   const auto why = why_not(report);
   const bool unexplained = !why.empty() || std::any_of(causes.begin(), causes.end(), is_unexplained);
   if (unexplained) forget_intervals(report);
-  // Of what matters to nobody nobody asks which of several it is.
-  const auto list = list_of(report.causes, true), small = list_of(report.small_causes, false);
+  // Of what matters to nobody, or only stands in for something, nobody asks which of several it is.
+  const auto list = list_of(report.causes, why.empty()), small = list_of(report.small_causes, false);
   if (!why.empty()) {
     report.verdict = "unexplained";
     report.sentence = why;

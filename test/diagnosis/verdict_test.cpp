@@ -106,7 +106,7 @@ TEST(Verdict, TrustsNoNameOfASizeThatNoRobotHas) {
   const auto report = worded(report_of({cause}));
   EXPECT_EQ(report.verdict, "unexplained");
   EXPECT_THAT(report.sentence, HasSubstr("larger than on any robot"));
-  EXPECT_THAT(report.sentence, HasSubstr("may only stand in for it: elbow turns about 4 % further"));
+  EXPECT_THAT(report.sentence, HasSubstr("may only stand in for it: elbow turns roughly 4 % further"));
   EXPECT_THAT(report.exclusion_limits, IsEmpty());
 }
 
