@@ -2,7 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <Eigen/QR>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -126,6 +126,7 @@ struct Estimator::Impl {
     for (Eigen::Index k = 0; k < joints; ++k) {
       joint_names.push_back(model.state().parameters()[static_cast<std::size_t>(k)].name);
     }
+    shape = Eigen::MatrixXd::Zero(state.size(), state.size());
   }
 
   // --- one step -------------------------------------------------------------------------------
@@ -382,7 +383,6 @@ struct Estimator::Impl {
     state = memory.empty() ? fit.x : memory.estimate().x;
     in_frame = (contradicted || memory.empty() ? memory.beliefs() : memory).in_posture(fit.quadratic);
     rms_px = fit.evidence.rms_px();
-    frame_information = fit.quadratic.A.topLeftCorner(state.size(), state.size());
     near = fitter.fits(fit.evidence);
     best_likelihood = hammoude_likelihood(scorer.distance(in_frame.x));
     current = EstimatorState::kConverging;
@@ -578,6 +578,7 @@ struct Estimator::Impl {
 
   Estimate report() {
     Estimate estimate;
+    shape = shape_covariance();
     estimate.joint_names = joint_names;
     estimate.offset_rad = state.head(joints);
     estimate.prior_sd_rad = model.state().prior_sd().head(joints);
@@ -603,9 +604,8 @@ struct Estimator::Impl {
   }
 
   void report_memory(Estimate& estimate) {
-    const Eigen::MatrixXd covariance = contradicted ? in_frame.covariance : memory.estimate().covariance;
+    const Eigen::MatrixXd covariance = (contradicted ? in_frame.covariance : memory.estimate().covariance) + shape;
     estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
-    if (frame.exposed()) estimate.covariance_rad2 += joint_shape_covariance_rad2(frame.exposures[0]);
     for (Eigen::Index k = joints; k < state.size(); ++k) {
       const auto& p = model.state().parameters()[static_cast<std::size_t>(k)];
       const Effect& effect = model.state().model()[p.ref.effect];
@@ -717,28 +717,25 @@ struct Estimator::Impl {
     const Eigen::MatrixXd& J = hand_J;
     const auto n = state.size();
     hand_own = J.leftCols(n) * in_frame.own * J.leftCols(n).transpose();
-    hand_own += shape_covariance_m2(J.leftCols(n));
+    hand_own += J.leftCols(n) * shape * J.leftCols(n).transpose();
     if (J.cols() == n) return hand_own;
     const Eigen::MatrixXd T =
         (J.leftCols(n) * in_frame.sensitivity + J.rightCols(J.cols() - n)) * memory.layout().considered_sd.asDiagonal();
     return hand_own + T * T.transpose();
   }
-  /// What outlines that are wrong alike in all postures do to the hand's place: as much as in this frame alone, for
-  /// other postures err with it.
-  /// @param J  of the hand's place by the state
-  [[nodiscard]] Eigen::Matrix3d shape_covariance_m2(const Eigen::MatrixXd& J) const {
+  /// What outlines that are wrong alike in all postures do to the state: as if one average posture alone were known,
+  /// for the others err with it. No more than what was believed before any.
+  [[nodiscard]] Eigen::MatrixXd shape_covariance() const {
     const double share = particles_only() ? 0.0 : fitter.shape_variance_share();
-    if (share <= 0.0 || frame_information.size() == 0) return Eigen::Matrix3d::Zero();
-    Eigen::MatrixXd precision = frame_information / share;
-    precision.diagonal() += memory.layout().prior_sd.array().square().inverse().matrix();
-    return J * precision.ldlt().solve(J.transpose());
-  }
-  /// The same as angles of the joints: the smallest that move the hand so.
-  [[nodiscard]] Eigen::MatrixXd joint_shape_covariance_rad2(const Exposure& exposure) {
-    if (fitter.shape_variance_share() <= 0.0) return Eigen::MatrixXd::Zero(joints, joints);
-    const Eigen::MatrixXd J = model.hand_jacobian(exposure, in_frame.x).leftCols(state.size());
-    const Eigen::MatrixXd inverse = J.leftCols(joints).completeOrthogonalDecomposition().pseudoInverse();
-    return inverse * shape_covariance_m2(J) * inverse.transpose();
+    if (share <= 0.0 || memory.empty()) return Eigen::MatrixXd::Zero(state.size(), state.size());
+    const auto& own = memory.estimate().own;
+    const Eigen::VectorXd prior = memory.layout().prior_sd.array().square().inverse();
+    const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(state.size(), state.size());
+    Eigen::MatrixXd precision = own.ldlt().solve(identity);
+    precision.diagonal() -= prior;
+    precision /= share * static_cast<double>(memory.postures());
+    precision.diagonal() += prior;
+    return precision.ldlt().solve(identity);
   }
   /// Of the last `hand_covariance_m2`, the share that tolerances have no part in.
   [[nodiscard]] Eigen::Matrix3d own_hand_covariance_m2() const { return hand_own; }
@@ -790,8 +787,8 @@ struct Estimator::Impl {
   Eigen::VectorXd state;    ///< fused over postures
   MemoryEstimate in_frame;  ///< the same with this frame's own error
   Eigen::Matrix3d hand_own = Eigen::Matrix3d::Zero();
-  Eigen::MatrixXd frame_information;  ///< of the last frame that was looked at, over the state
-  Eigen::MatrixXd hand_J;             ///< of the last covariance of the hand
+  Eigen::MatrixXd shape;   ///< covariance of the state by what outlines get wrong alike in all postures
+  Eigen::MatrixXd hand_J;  ///< of the last covariance of the hand
   EstimatorState current = EstimatorState::kHandNotInView;
   FrameVerdict verdict = FrameVerdict::kNothingKnown;
   Innovation innovation;

@@ -31,7 +31,9 @@ inline constexpr double kPerParameter = 9.0;
 /// Physical. Points of a part in a picture; of fewer the mean is a point's own error.
 inline constexpr double kFewestOfPart = 4.0;
 /// Statistical. Postures; of fewer the variance between them is not known.
-inline constexpr double kPosturesOfShape = 3.0;
+inline constexpr int kPosturesOfShape = 3;
+/// Statistical. Postures after which one has faded to 1/e: the estimate that left its residuals is no longer held.
+inline constexpr double kRecentPostures = 12.0;
 
 /// Statistical. A parameter further from what was believed than this many of its standard deviations contradicts it.
 inline constexpr double kBeyondBelief_sd = 4.0;

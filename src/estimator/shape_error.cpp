@@ -22,6 +22,10 @@ void ShapeError::add(std::span<const OutlinePoint> points, std::size_t camera, d
     if (mean.points < limits::kFewestOfPart || mean.weight <= 0.0) continue;
     auto& known = parts_[{camera, part}];
     const double residual = mean.sum / mean.weight;
+    // What earlier postures left was left by an earlier estimate.
+    const double kept = std::exp(-1.0 / limits::kRecentPostures);
+    for (double* sum : {&known.postures, &known.points, &known.sum, &known.square}) *sum *= kept;
+    ++known.seen;
     known.postures += 1.0;
     known.points += mean.points;
     known.sum += residual;
@@ -31,15 +35,16 @@ void ShapeError::add(std::span<const OutlinePoint> points, std::size_t camera, d
 
 bool ShapeError::known() const {
   return std::any_of(parts_.begin(), parts_.end(),
-                     [](const auto& item) { return item.second.postures >= limits::kPosturesOfShape; });
+                     [](const auto& item) { return item.second.seen >= limits::kPosturesOfShape; });
 }
 
 double ShapeError::variance_px2(double floor_px) const {
   double square = 0.0, weight = 0.0, alike = 0.0;
   for (const auto& [place, part] : parts_) {
-    if (part.postures < limits::kPosturesOfShape) continue;
     const double n = part.postures, mean = part.sum / n;
-    const double of_mean = std::max(0.0, part.square / n - mean * mean) / (n - 1.0);
+    // Chance cannot be told from shape in the first few.
+    const double of_mean =
+        part.seen < limits::kPosturesOfShape ? 0.0 : std::max(0.0, part.square / n - mean * mean) / (n - 1.0);
     square += part.points * (mean * mean - of_mean);
     alike += part.points * part.points / n;
     weight += part.points;

@@ -30,7 +30,8 @@ class ShapeError {
 
  private:
   struct Part {
-    double postures = 0.0, points = 0.0, sum = 0.0, square = 0.0;  ///< of the posture's mean residuals
+    int seen = 0;                                                  ///< postures
+    double postures = 0.0, points = 0.0, sum = 0.0, square = 0.0;  ///< of mean residuals; fading
   };
   std::map<std::pair<std::size_t, std::size_t>, Part> parts_;  ///< by camera and part
 };

@@ -108,6 +108,21 @@ TEST_F(EffectsOnline, ALinkAndWhereTheCamerasSitAreEstimatedWithTheOffsets) {
   EXPECT_LT((estimate.X_CP[0].translation() - reach.true_hand(motion(23), 0).translation()).norm(), 1e-3);
 }
 
+/// What no state holds and no tolerance names still shows in what fits leave, alike in all postures.
+TEST_F(EffectsOnline, AHandOfAnotherShapeWidensWhatIsPublished) {
+  ErrorModel others(roles_);
+  others.add("mesh_scale", {"", "r_hand"}).parameters()[0].value = 0.1;
+  SyntheticReach exact_reach(robot_, setup_, rig_, paper_offsets_rad());
+  SyntheticReach other_reach(robot_, setup_, rig_, paper_offsets_rad());
+  other_reach.befall(others);
+  Estimator on_exact(robot_, setup_, rig_, beliefs(), options_), on_other(robot_, setup_, rig_, beliefs(), options_);
+  const Estimate exact = follow(on_exact, exact_reach, 0, 16), other = follow(on_other, other_reach, 0, 16);
+  EXPECT_GT(other.hand_sd_m, 3.0 * exact.hand_sd_m);
+  EXPECT_LT((other.X_CP[0].translation() - other_reach.true_hand(motion(15), 0).translation()).norm(),
+            3.0 * other.hand_sd_m);
+  for (Eigen::Index k = 0; k < 7; ++k) EXPECT_GT(other.covariance_rad2(k, k), exact.covariance_rad2(k, k)) << k;
+}
+
 /// What was never moved keeps what was believed, and is said not to be told.
 TEST_F(EffectsOnline, JointsAreToldByPicturesThatTellThem) {
   SyntheticReach reach(robot_, setup_, rig_, paper_offsets_rad());
