@@ -204,7 +204,9 @@ class Diagnoser {
     for (const auto& candidate : field.candidates) {
       const double z = candidate.z();
       if (first) add_bar(candidate, z);
-      if (z < (candidate.generic() ? field.threshold : limits::kWorthATrial_z)) continue;
+      // One that is fitted anew may stand out then.
+      const bool may_grow = search_.refits() && !candidate.generic();
+      if (z < (may_grow ? limits::kWorthATrial_z : field.threshold)) continue;
       if (candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
       if (std::find(refused_.begin(), refused_.end(), candidate.cause) != refused_.end()) continue;
       Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0, true};

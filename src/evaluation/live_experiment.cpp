@@ -99,14 +99,18 @@ struct Run {
   double processor_ms = 0.0, diagnosis_ms = 0.0;
 };
 
-bool names(const simulator::FaultSpec& fault, const finding_t& finding) {
-  const auto argument = [&](const char* key) {
-    const auto at = fault.arguments.find(key);
-    return at == fault.arguments.end() ? std::string() : at->second;
-  };
-  const CauseName truth{fault.name, argument("joint"), ""};
-  return CauseName{finding.effect, finding.joint, finding.source} == truth ||
-         std::find(finding.alike.begin(), finding.alike.end(), truth.text()) != finding.alike.end();
+/// @param joints  of the arm, from the root outwards
+bool names(const simulator::FaultSpec& fault, const finding_t& finding, const std::vector<std::string>& joints) {
+  const auto at = fault.arguments.find("joint");
+  std::vector<std::string> places = {at == fault.arguments.end() ? std::string() : at->second};
+  // The simulator names a link by the joint that turns it about its long axis, the catalogue by the one at its far end.
+  const auto turns = std::find(joints.begin(), joints.end(), places.front());
+  if (fault.name == "link_length" && turns != joints.end() && turns + 1 != joints.end()) places.push_back(turns[1]);
+  return std::any_of(places.begin(), places.end(), [&](const std::string& joint) {
+    const CauseName truth{fault.name, joint, ""};
+    return CauseName{finding.effect, finding.joint, finding.source} == truth ||
+           std::find(finding.alike.begin(), finding.alike.end(), truth.text()) != finding.alike.end();
+  });
 }
 
 class Runs {
@@ -240,6 +244,7 @@ void run_live(ExperimentContext& context) {
   const int asked = context.options.trials;
   const int count = std::max(2, context.options.experiment == "all" ? std::min(asked, kMostLiveRuns) : asked);
   const auto runs = Runs(context).run(count);
+  const auto joints = RobotSetup::from(context.simulated.section("robot")).estimated_joints;
   double healthy = 0.0, alarms = 0.0, faulty = 0.0, right = 0.0, processor = 0.0, diagnosis = 0.0;
   std::int64_t dropped = 0;
   std::string lines;
@@ -254,7 +259,7 @@ void run_live(ExperimentContext& context) {
       continue;
     }
     faulty += 1.0;
-    right += run.last && !run.last->finding.empty() && names(*run.fault, run.last->finding.front()) ? 1.0 : 0.0;
+    right += run.last && !run.last->finding.empty() && names(*run.fault, run.last->finding.front(), joints) ? 1.0 : 0.0;
   }
   replace_file(context.options.out / "live_runs.jsonl", lines);
   context.table +=
