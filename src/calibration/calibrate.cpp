@@ -35,6 +35,8 @@ constexpr double kAlone = 1e9;          ///< no other place was found at all
 constexpr double kSameAnswer_m = 0.02;  ///< physical, of the hand in the camera's frame, mean over the pictures
 /// Physical. Less of the outline found than this, and it is somebody else's.
 constexpr double kLeastFound = 0.6;
+/// Physical. A link of which less is found is hidden in the pictures, and what is left must be most of the robot.
+constexpr double kHardlyFound = 0.3, kLeastSeen = 0.6;
 constexpr double kNear_px = 2.5;  ///< physical, px of a 320x240 picture: residuals of outlines that belong together
 constexpr double kBeyondBelief_sd = 4.0;    ///< statistical
 constexpr double kDisagreement = 4.0;       ///< statistical: mean NIS per direction
@@ -65,14 +67,14 @@ class Calibrator {
     if (!options_.quiet) bar_.emplace("calibration", 100);
     find_cameras();
     LogFit fit(*log_, threads_of(options_));
-    std::optional<BatchFit> best(fitted(fit, starts_, {}));
+    std::optional<BatchFit> best(fitted(fit, starts_));
     progress(0.6);
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
     describe(fit, *best);
     hold_out(fit, *best);
     progress(0.9);
-    conclude(*best);
+    conclude(fit, *best);
     suggest(fit, *best);
     write_calibration(result_, *best, *log_, watched.kept, pipeline_, configuration_, options_);
     progress(1.0);
@@ -141,15 +143,16 @@ class Calibrator {
     return batch;
   }
 
-  /// The best fit from all starts; the rig is that of the best one then.
-  BatchFit fitted(LogFit& fit, const std::vector<StereoRig>& starts, const std::vector<std::size_t>& pictures) {
+  /// The best fit from all starts; the rig is that of the best one then. Which start that is, some pictures tell.
+  BatchFit fitted(LogFit& fit, const std::vector<StereoRig>& starts) {
+    const auto some = starts.size() > 1 ? spread_pictures() : std::vector<std::size_t>{};
     std::optional<BatchFit> best;
     StereoRig best_rig;
     std::vector<std::pair<double, std::vector<CalibratedView>>> answers;
     std::size_t best_answer = 0;
     for (const auto& rig : starts) {
       use(fit, rig);
-      BatchFit batch = from(fit, pictures, kFrom_px);
+      BatchFit batch = from(fit, some, kFrom_px);
       answers.emplace_back(batch.misfit(), views(fit, batch));
       if (best && batch.misfit() >= best->misfit()) continue;
       best.emplace(std::move(batch));
@@ -163,7 +166,18 @@ class Calibrator {
       if (apart(places, answers[best_answer].second) < kSameAnswer_m) continue;
       only_ = std::min(only_, misfit / std::max(1e-9, best->misfit()));
     }
+    if (!some.empty()) best->run(0.0, {});
     return std::move(*best);
+  }
+
+  /// So many pictures, all over the log, that any start's fit of them tells how good it is; empty: all.
+  [[nodiscard]] std::vector<std::size_t> spread_pictures() const {
+    constexpr std::size_t kEnough = 24;
+    const auto count = log_->pictures().size();
+    std::vector<std::size_t> list;
+    if (count <= kEnough) return list;
+    for (std::size_t i = 0; i < kEnough; ++i) list.push_back(i * (count - 1) / (kEnough - 1));
+    return list;
   }
 
   /// Where the answer has the hand in each picture: all that is seen of an answer, whatever it is made of.
@@ -426,7 +440,50 @@ class Calibrator {
     if (n > 0.0) result_.outline_px.heldout = sum / n;
   }
 
-  void conclude(const BatchFit& batch) {
+  /// What of the robot's predicted outline lies near an edge in the pictures.
+  struct Found {
+    double share = 0.0;             ///< of the outlines of parts that are seen at all
+    double seen = 0.0;              ///< share of the whole outline that these parts make
+    std::vector<std::string> lost;  ///< links of which next to nothing is found
+  };
+
+  [[nodiscard]] Found found(LogFit& fit, const BatchFit& batch) const {
+    const auto& links = log_->setup().model.rendered_links;
+    const auto shown = log_->parts_shown();
+    auto pictures = spread_pictures();
+    if (pictures.empty()) {
+      for (std::size_t p = 0; p < log_->pictures().size(); ++p) pictures.push_back(p);
+    }
+    Found result;
+    double all = 0.0, seen = 0.0, matched = 0.0;
+    OutlineEvidence evidence;
+    for (std::size_t part = 0; part < links.size(); ++part) {
+      if (!shown[part]) continue;
+      double own = 0.0, own_matched = 0.0;
+      for (const auto p : pictures) {
+        const auto& picture = log_->pictures()[p];
+        auto search = batch.searches()[picture.camera];
+        search.part_weight.assign(links.size(), 0.0);
+        search.part_weight[part] = 1.0;
+        fit.measurement().linearise(log_->edges(p), picture.joints.q, batch.at().corrections[p], picture.camera, {},
+                                    search, evidence);
+        own += evidence.sampled;
+        own_matched += evidence.matched;
+      }
+      all += own;
+      if (own_matched < kHardlyFound * own) {
+        result.lost.push_back(links[part]);
+        continue;
+      }
+      seen += own;
+      matched += own_matched;
+    }
+    result.share = matched / std::max(1.0, seen);
+    result.seen = seen / std::max(1.0, all);
+    return result;
+  }
+
+  void conclude(LogFit& fit, const BatchFit& batch) {
     const double rms = batch.noise().front().sd_px();
     const auto told = static_cast<std::size_t>(
         std::count_if(result_.joints.begin(), result_.joints.end(), [](const auto& j) { return j.told; }));
@@ -437,11 +494,15 @@ class Calibrator {
       result_.state = state;
       result_.sentence = std::move(sentence);
     };
-    if (batch.at().matched_share() < kLeastFound || rms > kNear_px) {
+    const Found found = this->found(fit, batch);
+    for (const auto& link : found.lost) {
+      result_.remarks.push_back(link + ": next to nothing of its outline is found; hidden, or part of the background");
+    }
+    if (found.share < kLeastFound || found.seen < kLeastSeen || rms > kNear_px) {
       return say(CalibrationState::kNotConverged,
                  fmt::format("Not converged: {:.0f} % of the predicted outline lies near an edge of the robot in the "
                              "pictures, expected at least {:.0f} %; check masks, robot and cameras' intrinsics.",
-                             100.0 * batch.at().matched_share(), 100.0 * kLeastFound));
+                             100.0 * found.share * found.seen, 100.0 * kLeastFound));
     }
     if (only_ < kOnly) {
       return say(CalibrationState::kNotConverged,

@@ -156,8 +156,8 @@ std::vector<RosCamera> ros_cameras_of(const Calibration& c, const StereoRig& rig
     const auto& camera = c.cameras[i];
     const bool as_in_urdf =
         camera.link == rig.cameras[i].link && camera.X_link_optical.isApprox(Pose::Identity(), 1e-12);
-    cameras.push_back({camera.name, camera.intrinsics, camera.distortion, as_in_urdf ? "" : camera.link,
-                       camera.X_link_optical});
+    cameras.push_back(
+        {camera.name, camera.intrinsics, camera.distortion, as_in_urdf ? "" : camera.link, camera.X_link_optical});
   }
   return cameras;
 }

@@ -167,8 +167,8 @@ BoardWitness board_witness(const std::vector<BoardView>& views, const PinholeInt
   const Lens lens{k, distortion};
   Eigen::Index rows = 0;
   for (const auto& view : views) rows += 2 * static_cast<Eigen::Index>(view.corners->board.size());
-  const Pose X_HB = views.front().X_camera_hand.inverse(Eigen::Isometry) *
-                    by_homography(*views.front().corners, lens, kGuess_m);
+  const Pose X_HB =
+      views.front().X_camera_hand.inverse(Eigen::Isometry) * by_homography(*views.front().corners, lens, kGuess_m);
   Eigen::VectorXd x = Eigen::VectorXd::Zero(7);
   x[6] = kGuess_m;
   const double square = minimise(x, [&](const Eigen::VectorXd& at) {

@@ -19,6 +19,7 @@
 #include "checkerboard.hpp"
 #include "depth_witness.hpp"
 #include "experiments.hpp"
+#include "outline_figure.hpp"
 #include "real_trial.hpp"
 
 /// Photographs of physical robots, calibrated from pictures and intrinsics alone.
@@ -167,8 +168,7 @@ Json figures_json(const SetFigures& f) {
 class RealExperiment {
  public:
   explicit RealExperiment(ExperimentContext& context)
-      : context_(context), data_(context.options.data / "real"),
-        lbr_(data_ / "robots" / "lbr_med7" / "lbr_med7.urdf"),
+      : context_(context), data_(context.options.data / "real"), lbr_(data_ / "robots" / "lbr_med7" / "lbr_med7.urdf"),
         trials_(std::clamp(context.options.trials, 1,
                            context.options.experiment == "all" ? kTrialsAmongAll : kMostTrials)) {}
 
@@ -177,15 +177,15 @@ class RealExperiment {
       context_.table += "\nreal robots: skipped, no recordings in " + data_.string() + "\n";
       return;
     }
-    context_.table += fmt::format("\n{:<34} {:>6} {:>7} {:>7} {:>7} {:>6} {:>5} {:>8} {:>8} {:>6}\n",
-                                  "real robots, camera unknown", "seeds", "rms deg", "repeat", "worst z", "rms z",
-                                  "told", "cam mm", "cam deg", "good");
+    context_.table +=
+        fmt::format("\n{:<34} {:>6} {:>7} {:>7} {:>7} {:>6} {:>5} {:>8} {:>8} {:>6}\n", "real robots, camera unknown",
+                    "seeds", "rms deg", "repeat", "worst z", "rms z", "told", "cam mm", "cam deg", "good");
     for (const auto& demand : kSets) offsets_found(demand);
     context_.table +=
         "truth: offsets hidden in the encoders; the robots' own are taken to be right to 0.1 deg. witness: the "
         "published pose\nleft_dr, the turn about the first joint's axis taken out. rms z without the first joint.\n";
-    context_.table += fmt::format("\n{:<34} {:>10} {:>10} {:>10}\n", "the same pictures, by others' poses", "outline px",
-                                  "left out", "depth mm");
+    context_.table += fmt::format("\n{:<34} {:>10} {:>10} {:>10}\n", "the same pictures, by others' poses",
+                                  "outline px", "left out", "depth mm");
     for (const auto& demand : kSets) others(demand);
     context_.table +=
         "witness: masks and depth; medians. Others' poses with the encoders as they are; ours with offsets hidden, "
@@ -270,8 +270,8 @@ class RealExperiment {
       const auto configuration = Configuration::load(starter.out / "estimator.yaml");
       import_stills(set, ImportTarget::from(configuration), {}, work.path() / "log");
       Pipeline pipeline(configuration);
-      WatchedLog watched = watch_log(
-          pipeline, {.log = work.path() / "log", .picture_rate_hz = 5.0, .kept = 0, .quiet = true}, false);
+      WatchedLog watched =
+          watch_log(pipeline, {.log = work.path() / "log", .picture_rate_hz = 5.0, .kept = 0, .quiet = true}, false);
       LogFit fit(watched.pictures, threads());
       const double px = median_outline_distance_px(fit, ErrorModel(watched.pictures.roles()));
       const auto published = CameraPoses::read(set / "camera_pose.json", method);
@@ -290,13 +290,14 @@ class RealExperiment {
     const auto& c = trial.calibration;
     std::map<std::string, double> found_deg;
     for (const auto& joint : c.joints) found_deg[joint.name] = degrees(joint.offset_rad);
+    figure(demand, pipeline, found_deg);
     const auto& camera = c.cameras.front().X_link_optical;
     const auto before = depth_mm(demand, pipeline, camera, trial.hidden.offsets_deg, {});
     const auto after = depth_mm(demand, pipeline, camera, trial.hidden.offsets_deg, found_deg);
-    context_.table += fmt::format(
-        "{:<34} {:>10} {:>10.2f} {:>10}\n", fmt::format("{}, this calibration", demand.name),
-        fmt::format("{:.2f} {:.2f}", c.outline_px.before, c.outline_px.after), c.outline_px.heldout.value_or(0.0),
-        after ? fmt::format("{:.1f} {:.1f}", *before, *after) : "");
+    context_.table +=
+        fmt::format("{:<34} {:>10} {:>10.2f} {:>10}\n", fmt::format("{}, this calibration", demand.name),
+                    fmt::format("{:.2f} {:.2f}", c.outline_px.before, c.outline_px.after),
+                    c.outline_px.heldout.value_or(0.0), after ? fmt::format("{:.1f} {:.1f}", *before, *after) : "");
     auto& entry = context_.summary["real"]["others"][demand.set]["this calibration"];
     entry = {{"outline_before_px", c.outline_px.before},
              {"outline_px", c.outline_px.after},
@@ -305,7 +306,8 @@ class RealExperiment {
   }
 
   /// Of the first camera, where a depth camera took part.
-  [[nodiscard]] std::optional<double> depth_mm(const Demand& demand, const Pipeline& pipeline, const Pose& X_root_optical,
+  [[nodiscard]] std::optional<double> depth_mm(const Demand& demand, const Pipeline& pipeline,
+                                               const Pose& X_root_optical,
                                                const std::map<std::string, double>& hidden_deg,
                                                const std::map<std::string, double>& found_deg) const {
     const fs::path set = data_ / demand.set;
@@ -315,18 +317,38 @@ class RealExperiment {
     std::vector<DepthView> views;
     for (std::size_t i = 0; i < table.rows.size(); ++i) {
       const auto file = fmt::format("{:02d}.png", static_cast<int>(table.rows[i].front()));
-      DepthView view{set / "depth" / camera.name / file, set / "masks" / camera.name / file,
-                     pipeline.setup().default_joints(pipeline.robot())};
-      const auto row = table.row(i);
-      for (const auto& [joint, angle] : row) {
-        const auto index = pipeline.robot().joint_index(joint);
-        if (index < 0) continue;
-        const auto amount = [&](const auto& map) { return map.contains(joint) ? map.at(joint) : 0.0; };
-        view.q[index] = angle + radians(amount(hidden_deg) - amount(found_deg));
-      }
-      views.push_back(std::move(view));
+      views.push_back({set / "depth" / camera.name / file, set / "masks" / camera.name / file,
+                       joints_of(pipeline, table.row(i), hidden_deg, found_deg)});
     }
     return median_depth_distance_mm(pipeline, camera.intrinsics, X_root_optical, views);
+  }
+
+  /// Joint angles of one row with what was hidden in them, and what was found taken out.
+  static Eigen::VectorXd joints_of(const Pipeline& pipeline, const std::map<std::string, double>& row,
+                                   const std::map<std::string, double>& hidden_deg,
+                                   const std::map<std::string, double>& found_deg) {
+    Eigen::VectorXd q = pipeline.setup().default_joints(pipeline.robot());
+    for (const auto& [joint, angle] : row) {
+      const auto index = pipeline.robot().joint_index(joint);
+      if (index < 0) continue;
+      const auto amount = [&](const auto& map) { return map.contains(joint) ? map.at(joint) : 0.0; };
+      q[index] = angle + radians(amount(hidden_deg) - amount(found_deg));
+    }
+    return q;
+  }
+
+  /// Outlines of one posture: no photograph.
+  void figure(const Demand& demand, const Pipeline& pipeline, const std::map<std::string, double>& found_deg) {
+    const auto& trial = ours_.at(demand.set);
+    const auto& camera = pipeline.rig().cameras.front();
+    const auto row = JointTable::read(data_ / demand.set).row(1);
+    const fs::path png = context_.options.out / fmt::format("{}_outlines.png", demand.set);
+    write_outline_figure(
+        pipeline, camera.intrinsics,
+        {data_ / demand.set / "masks" / camera.name / "01.png", joints_of(pipeline, row, trial.hidden.offsets_deg, {}),
+         joints_of(pipeline, row, trial.hidden.offsets_deg, found_deg),
+         trial.calibration.cameras.front().X_link_optical},
+        png);
   }
 
   // --- witness: a board in the hand ---------------------------------------------------------------
@@ -351,30 +373,25 @@ class RealExperiment {
     const auto witness = board_witness(views, c.cameras.front().intrinsics, c.cameras.front().distortion);
     double lag_ms = 0.0, lag_sd_ms = 0.0;
     for (const auto& p : c.parameters) {
-      if (p.name != "latency delay" && p.name != "latency") continue;
+      if (p.name != "latency") continue;
       lag_ms = p.value;
       lag_sd_ms = p.sd;
     }
-    context_.table += fmt::format("\n{:<34} {:>8} {:>9} {:>9} {:>10} {:>14} {:>12}\n", "Panda, mono, no masks", "pictures",
-                                  "board px", "board mm", "board deg", "lag ms", "");
+    context_.table += fmt::format("\n{:<34} {:>8} {:>9} {:>9} {:>10} {:>14} {:>12}\n", "Panda, mono, no masks",
+                                  "pictures", "board px", "board mm", "board deg", "lag ms", "");
     context_.table += fmt::format("{:<34} {:>8} {:>9.2f} {:>9.1f} {:>10.2f} {:>8.0f} +- {:<3.0f} {:>12}\n",
                                   "  camera unknown, outlines alone", witness.pictures, witness.rms_px,
                                   witness.scatter_mm, witness.scatter_deg, lag_ms, lag_sd_ms, to_string(c.state));
     context_.table += fmt::format("{:<34} {:>8} {:>9.2f} {:>9.1f}\n", "  demanded", "", 1.2, 6.0);
-    context_.table += fmt::format("  {}\nwitness: one rigid board in the hand, never fitted to; it can refute, not confirm.\n", c.sentence);
-    context_.summary["real"]["panda_1"] = {{"pictures", witness.pictures},
-                                           {"board_px", witness.rms_px},
-                                           {"board_mm", witness.scatter_mm},
-                                           {"board_deg", witness.scatter_deg},
-                                           {"square_mm", witness.square_mm},
-                                           {"lag_ms", lag_ms},
-                                           {"lag_sd_ms", lag_sd_ms},
-                                           {"state", to_string(c.state)}};
+    context_.table += fmt::format(
+        "  {}\nwitness: one rigid board in the hand, never fitted to; it can refute, not confirm.\n", c.sentence);
+    context_.summary["real"]["panda_1"] = {{"pictures", witness.pictures},   {"board_px", witness.rms_px},
+                                           {"board_mm", witness.scatter_mm}, {"board_deg", witness.scatter_deg},
+                                           {"square_mm", witness.square_mm}, {"lag_ms", lag_ms},
+                                           {"lag_sd_ms", lag_sd_ms},         {"state", to_string(c.state)}};
   }
 
-  [[nodiscard]] static int threads() {
-    return static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  }
+  [[nodiscard]] static int threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
 
   ExperimentContext& context_;
   fs::path data_, lbr_;

@@ -539,8 +539,8 @@ class Starter {
   std::vector<std::string> base_;       ///< links without motion against the cameras that may be seen
   std::vector<std::string> strangers_;  ///< columns of joints.csv that are no joints
   bool masks_ = false, in_degrees_ = false;
-  bool moving_ = false;   ///< the stills are a recording of a moving arm
-  bool learned_ = false;  ///< masks come of a learned background
+  bool moving_ = false;             ///< the stills are a recording of a moving arm
+  bool learned_ = false;            ///< masks come of a learned background
   std::vector<std::string> notes_;  ///< what was guessed
   std::vector<std::string> wrong_;  ///< what must be put right
 };

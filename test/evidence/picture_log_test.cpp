@@ -43,6 +43,28 @@ TEST_F(PictureLogOfOwnRobot, LeavesOutWhatRepeatsTheLast) {
   EXPECT_EQ(log.pictures().size(), 6u);
 }
 
+/// Of a background learned from the pictures themselves, a part that never moved out of the way is one with it.
+TEST_F(PictureLogOfOwnRobot, WhatStandsStillIsPartOfALearnedBackground) {
+  for (auto& camera : seen_[1].cameras) {
+    camera->joints.q = seen_[0].cameras[0]->joints.q;
+    camera->joints.q[roles_.index("r_wrist_yaw")] += 0.6;
+  }
+  auto log = log_of(seen_);
+  const auto all = log->parts_shown();
+  EXPECT_EQ(std::count(all.begin(), all.end(), false), 0) << "masks of others show the whole robot";
+  log->learned_background();
+  const auto shown = log->parts_shown();
+  const auto& links = setup_.model.rendered_links;
+  ASSERT_EQ(shown.size(), links.size());
+  EXPECT_FALSE(shown.front()) << links.front() << " did not move";
+  EXPECT_TRUE(shown[static_cast<std::size_t>(std::find(links.begin(), links.end(), setup_.hand_link) - links.begin())]);
+  LogFit fit(*log, 1);
+  const auto some = fit.linearise(ErrorModel(roles_), {}, {}).sampled();
+  log = log_of(seen_);
+  LogFit whole(*log, 1);
+  EXPECT_LT(some, 0.95 * whole.linearise(ErrorModel(roles_), {}, {}).sampled()) << "it is not asked for";
+}
+
 TEST_F(PictureLogOfOwnRobot, ACameraWithoutAMaskHasNoPicture) {
   seen_[0].cameras[0]->mask = BinaryMask();
   seen_[1].cameras[1].reset();

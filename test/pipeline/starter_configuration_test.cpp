@@ -365,6 +365,30 @@ TEST_F(StarterConfiguration, FromStillsNothingElseIsAsked) {
   EXPECT_FALSE(Pipeline(Configuration::load(o.out / "estimator.yaml")).make_stream().expects_masks());
 }
 
+/// Before a camera that stands still, the moving arm uncovers its background; its base never does.
+TEST_F(StarterConfiguration, AMovingRecordingWithoutMasksLearnsItsBackground) {
+  const SmallStills stills;
+  fs::remove_all(stills.path() / "images/right");
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.stills = stills.path();
+  o.out = folder_ / "still";
+  EXPECT_TRUE(write_starter_configuration(o).usable);
+  const auto still = Configuration::load(o.out / "estimator.yaml");
+  EXPECT_EQ(still.section("vision").text("method"), "statistics");
+  EXPECT_FALSE(still.section("estimator").section("state").has("latency"));
+
+  stills.write("joints.csv",
+               "posture,time_s,joint1,joint2,joint3,joint4,joint5,joint6,joint7\n0,10,0,0,0,0,0,0,0\n");
+  o.out = folder_ / "moving";
+  EXPECT_TRUE(write_starter_configuration(o).usable);
+  const auto moving = Configuration::load(o.out / "estimator.yaml");
+  EXPECT_EQ(moving.section("vision").text("method"), "learned_background");
+  EXPECT_TRUE(moving.section("estimator").section("state").has("latency"));
+  const auto links = Pipeline(moving).setup().model.rendered_links;
+  EXPECT_EQ(std::count(links.begin(), links.end(), "base"), 0) << "what never moves is learned as background";
+}
+
 TEST_F(StarterConfiguration, StillsOfACameraOfAnyNameOnALinkOfTheRobot) {
   const SmallStills stills;
   fs::rename(stills.path() / "images/left", stills.path() / "images/cam_high");

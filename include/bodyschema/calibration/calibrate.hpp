@@ -93,7 +93,7 @@ struct Calibration {
   std::vector<CalibratedEffect>
       effects;  ///< what else was found; estimated with the rest where they do not depend on time
   OutlineDistances outline_px;
-  double hand_sd_m = 0.0;  ///< of the hand's place in the first camera's picture, mean over postures
+  double hand_sd_m = 0.0;             ///< of the hand's place in the first camera's picture, mean over postures
   std::vector<CalibratedView> views;  ///< of all pictures, in order of time
   std::size_t postures = 0, pictures = 0;
   double dispersion = 1.0;      ///< how postures disagree, by what is claimed; 1: as claimed
