@@ -121,18 +121,14 @@ std::string offsets_yaml(const Calibration& c, bool all) {
 
 std::string cameras_yaml(const Calibration& c) {
   std::string text =
-      "# Cameras as found: to be included behind robot.yaml, or put in place of its section of the same "
-      "name.
-cameras:
-";
+      "# Cameras as found: to be included behind robot.yaml, or put in place of its section.\ncameras:\n";
   for (const auto& camera : c.cameras) {
     const auto& k = camera.intrinsics;
     const auto& d = camera.distortion;
     const Eigen::Matrix4d X = camera.X_link_optical.matrix();
-    text += fmt::format(
-        "  {}:\n    link: {}\n    beside: ~  # instead of a place beside the first camera\n    X_beside_optical: ~\n   "
-        " X_link_optical:\n",
-        camera.name, camera.link);
+    text += fmt::format("  {}:\n    link: {}\n", camera.name, camera.link);
+    text += "    beside: ~  # instead of a place beside the first camera\n    X_beside_optical: ~\n";
+    text += "    X_link_optical:\n";
     for (int r = 0; r < 4; ++r) {
       text += fmt::format("      - [{:.9f}, {:.9f}, {:.9f}, {:.9f}]\n", X(r, 0), X(r, 1), X(r, 2), X(r, 3));
     }
@@ -140,6 +136,8 @@ cameras:
       text += fmt::format("    pose: roughly\n    pose_sd_deg: {:.4f}\n    pose_sd_mm: {:.3f}\n",
                           std::max(1e-3, degrees(camera.sd_rad) / std::sqrt(3.0)),
                           std::max(1e-2, 1e3 * camera.sd_m / std::sqrt(3.0)));
+    } else {
+      text += "    pose: known\n";
     }
     text += fmt::format(
         "    width: {}\n    height: {}\n    fx: {:.4f}\n    fy: {:.4f}\n    cx: {:.4f}\n    cy: {:.4f}\n"

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bodyschema/camera/require_places.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/diagnosis/diagnosis_page.hpp"
@@ -48,6 +49,13 @@ class LogDiagnosis {
     };
     LogFit fit(watched_.pictures, options_.threads);
     auto report = diagnosed(fit, diagnosis);
+    // Nothing that was seen is explained then, nor is anything excluded: no answer is better than "none".
+    if (!(report.before.rms_px > 0.0)) {
+      throw DataError(
+          options_.log.string() +
+          ": in no picture does the arm's outline lie near where the model has it; is a camera's place or the "
+          "direction of its axes wrong, or are the masks? Look at overlay_final.png of 'bodyschema replay'");
+    }
     add_remarks(report);
     if (other_masks) {
       report.warnings.insert(
@@ -69,6 +77,7 @@ class LogDiagnosis {
  private:
   WatchedLog watch(const Configuration& configuration) {
     configuration.reject_unknown_keys();
+    require_places(pipeline_.rig(), "a diagnosis");
     if (pipeline_.error_model()) {
       throw ConfigurationError(configuration.section("robot").place("extended_model") + ": '" +
                                pipeline_.setup().extended_model.string() +

@@ -23,6 +23,14 @@ TEST(LogDiagnosis, RefusesSwappedPictures) {
               ::testing::ThrowsMessage<DataError>(HasSubstr("the left and right pictures are swapped")));
 }
 
+/// The answer was that nothing is wrong, held out 0.000 px.
+TEST(LogDiagnosis, RefusesALogInWhichTheArmIsNowhereNearWhereTheModelHasIt) {
+  const test::RenderedLog log([](Settings&, Plan& plan) { plan.seconds = 12.0; });
+  const std::vector<std::string> elsewhere = {"cameras.left.link=root_link", "cameras.right.link=root_link"};
+  EXPECT_THAT([&] { (void)log.diagnosis("learned_background", elsewhere); },
+              ::testing::ThrowsMessage<DataError>(HasSubstr("in no picture does the arm's outline lie near")));
+}
+
 /// No outline that the model predicts has a counterpart on the stick, so that no residual shows it: the answer was
 /// none.
 TEST(LogDiagnosis, AStickInTheHandIsSeen) {

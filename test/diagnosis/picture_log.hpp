@@ -52,14 +52,18 @@ class RenderedLog {
   /// When the motion begins, s from the first picture.
   [[nodiscard]] double begin_s() const { return begin_s_; }
 
-  [[nodiscard]] DiagnosisReport diagnosis(const std::string& method = "learned_background") const {
+  [[nodiscard]] DiagnosisReport diagnosis(const std::string& method = "learned_background",
+                                          const std::vector<std::string>& more = {}) const {
     LogDiagnosisOptions options;
     options.log = file_;
     options.quiet = true;
+    std::vector<std::string> overrides = {"silhouette.engine=contour", "filter.particles=50",
+                                          "bus.max_image_gap_ms=1000", "bus.max_encoder_gap_ms=1000",
+                                          "vision.method=" + method};
+    overrides.insert(overrides.end(), more.begin(), more.end());
     return diagnose_log(
         Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/estimator.yaml",
-                            {"silhouette.engine=contour", "filter.particles=50", "bus.max_image_gap_ms=1000",
-                             "bus.max_encoder_gap_ms=1000", "vision.method=" + method}),
+                            overrides),
         options);
   }
 
