@@ -105,9 +105,13 @@ Beliefs Beliefs::from(const Configuration& configuration, const JointRoles& role
   }
   if (options.mode == EstimatorMode::kPaper) beliefs.state.clear();
   beliefs.state.insert(beliefs.state.begin(), offsets.begin(), offsets.end());
+  // What is estimated is believed to be as far off as both say.
   std::erase_if(beliefs.tolerances, [&](const Belief& t) {
-    return std::any_of(beliefs.state.begin(), beliefs.state.end(),
-                       [&](const Belief& b) { return b.effect == t.effect && b.target == t.target; });
+    const auto same = std::find_if(beliefs.state.begin(), beliefs.state.end(),
+                                   [&](const Belief& b) { return b.effect == t.effect && b.target == t.target; });
+    if (same == beliefs.state.end()) return false;
+    for (std::size_t i = 0; i < same->sd.size(); ++i) same->sd[i] = std::hypot(same->sd[i], t.sd[i]);
+    return true;
   });
   return beliefs;
 }

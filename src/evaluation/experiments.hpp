@@ -16,6 +16,8 @@ using Json = nlohmann::ordered_json;
 inline constexpr int kMostAdaptationTrials = 14;  ///< slip, hand leaves, camera dies
 inline constexpr int kMostAblationTrials = 10;
 inline constexpr int kOffsetLogs = 6;  ///< never more or fewer
+/// Of logs that `honesty` runs: two a trial, within `all` no more than this.
+inline constexpr int kHonestyLogsInAll = 14;
 
 /// What every experiment needs to know.
 struct ExperimentContext {
@@ -38,8 +40,11 @@ void run_camera_dies(ExperimentContext& context);
 void run_likelihood(ExperimentContext& context);
 void run_ablations(ExperimentContext& context);
 void run_reach(ExperimentContext& context);
-void run_recording(ExperimentContext& context);
+/// @param only_honesty  only whether what is said of the nominal robot and of the official hand can be believed
+void run_recording(ExperimentContext& context, bool only_honesty);
 void run_real(ExperimentContext& context);
+/// @param most_logs  however many trials are asked for
+void run_honesty(ExperimentContext& context, int most_logs);
 void run_diagnosis(ExperimentContext& context);
 
 }  // namespace bodyschema

@@ -17,6 +17,8 @@ FrameRecord record_of(const Estimate& estimate, Estimator& estimator, const Obse
   record.covariance_deg2 = estimate.covariance_rad2 * (180.0 / kPi) * (180.0 / kPi);
   record.likelihood = estimate.best_likelihood;
   record.total_ms = estimate.times.total_ms;
+  record.hand_sd_mm = 1e3 * estimate.hand_sd_m;
+  for (const auto& truth : frame.truth) record.visible_share = std::max(record.visible_share, truth.visible_share);
   for (std::size_t c = 0; c < estimate.X_CP.size() && c < 2; ++c) {
     if (!frame.cameras[c]) continue;
     const Pose& truth = frame.truth[c].X_CP;
@@ -41,7 +43,7 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
     EstimatorOptions options = contestant.options;
     options.filter.seed = seed * 1000003u + 17u;
     options.silhouette.threads = 1;
-    auto beliefs = pipeline.beliefs();
+    auto beliefs = contestant.beliefs.value_or(pipeline.beliefs());
     if (contestant.offsets_only || options.mode == EstimatorMode::kPaper) {
       std::erase_if(beliefs.state, [](const Belief& b) { return b.effect != "joint_offset"; });
     }
@@ -73,6 +75,7 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
     observation.encoders = frame->encoders;
     const bool ready = pipeline.segment(observation);
     if (frame->phase != simulator::Phase::kMotion || !ready) continue;
+    if (setting.on_masks) setting.on_masks(observation);
     if (observation.cameras[0]) last_q = observation.cameras[0]->joints.q;
     for (std::size_t i = 0; i < contestants.size(); ++i) {
       Observation one_eye;

@@ -62,11 +62,13 @@ TEST_F(BeliefsOfOwnRobot, ZeroLeavesAnEffectOutAndAddsNone) {
   EXPECT_EQ(find(read(load({"estimator.state.mesh_scale.sd_percent=0"})).state, "mesh_scale"), nullptr);
 }
 
-/// What is estimated is not considered as well: it would count twice.
-TEST_F(BeliefsOfOwnRobot, WhatIsEstimatedIsNoTolerance) {
+/// What is estimated is not considered as well, where it would count twice: it may be as far off as both say.
+TEST_F(BeliefsOfOwnRobot, AToleranceOfWhatIsEstimatedWidensTheBelief) {
   const auto beliefs =
       read(load({"robot.tolerances={mesh_scale: {sd_percent: 1}, link_length: {sd_mm: 2}, baseline: {sd_mm: 0.5}}"}));
-  EXPECT_NE(find(beliefs.state, "mesh_scale"), nullptr);
+  ASSERT_NE(find(beliefs.state, "mesh_scale"), nullptr);
+  const double alone = find(read(load()).state, "mesh_scale")->sd.at(0);
+  EXPECT_NEAR(find(beliefs.state, "mesh_scale")->sd.at(0), std::hypot(alone, 0.01), 1e-12);
   EXPECT_EQ(find(beliefs.tolerances, "mesh_scale"), nullptr);
   EXPECT_EQ(beliefs.tolerances.size(), 4u);  // three links and the baseline
   EXPECT_NEAR(find(beliefs.tolerances, "baseline")->sd.at(0), 5e-4, 1e-12);

@@ -72,6 +72,7 @@ TEST(Evaluate, ExperimentsThatRunAnotherNumberOfTrialsSaySo) {
                                                                       {"camera", "at most 14 trials"},
                                                                       {"ablation", "at most 10 trials"},
                                                                       {"offsets", "always 6 trials"},
+                                                                      {"honesty", "two logs a trial"},
                                                                       {"likelihood", "always one trial"},
                                                                       {"recording", "always one log"}}) {
     EXPECT_THAT(meanings.at(name), HasSubstr(words)) << name;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,9 @@ namespace bodyschema {
 struct Contestant {
   std::string name;  ///< "best.stereo", "paper.mono", ...
   EstimatorOptions options;
-  bool mono = false;          ///< left camera only
-  bool offsets_only = false;  ///< nothing but the joints' offsets is estimated
+  bool mono = false;                 ///< left camera only
+  bool offsets_only = false;         ///< nothing but the joints' offsets is estimated
+  std::optional<Beliefs> beliefs{};  ///< instead of the trial's configuration's
 };
 
 /// What one contestant did with one frame.
@@ -28,6 +30,8 @@ struct FrameRecord {
   std::array<double, 2> position_sd{-1, -1};  ///< in standard deviations by the estimate's own covariance
   std::array<double, 2> rotation_deg{-1, -1};
   std::array<double, 2> nominal_mm{-1, -1};
+  double hand_sd_mm = 0.0;     ///< as published
+  double visible_share = 0.0;  ///< of the pictures' pixels: shows the robot, in the camera that shows more
   Eigen::VectorXd offset_deg;
   Eigen::MatrixXd covariance_deg2;
   double likelihood = 0.0;
@@ -52,6 +56,8 @@ struct TrialSetting {
   Configuration estimator;  ///< complete estimator configuration
   simulator::SimulatorSettings simulator;
   simulator::SimulationPlan plan;  ///< its seed is replaced by the trial's
+  /// What befalls the masks before anybody estimates.
+  std::function<void(Observation& observation)> on_masks{};
   /// Called with each contestant after each frame of the motion, counted from 0.
   std::function<void(Estimator& estimator, const Observation& observation, const TrialRecord& trial, int frame)>
       on_frame{};
