@@ -2,6 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -109,6 +110,7 @@ struct Estimator::Impl {
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
     weights.resize(static_cast<Eigen::Index>(options.filter.particles));
     reading.resize(joints);
+    shape = Eigen::MatrixXd::Zero(state.size(), state.size());
   }
 
   // --- one step -------------------------------------------------------------------------------
@@ -321,8 +323,10 @@ struct Estimator::Impl {
     }
     fitter.learn_noise(fit);
     if (const auto block =
-            memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.quadratic, fit.x))
+            memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.quadratic, fit.x)) {
+      fitter.learn_shape(fit);
       keep_frame(*block);
+    }
     look_again();
     settle_on(fit);
   }
@@ -476,6 +480,7 @@ struct Estimator::Impl {
   /// What a few pictures taught is contradicted by all that follow: it was theirs, the next frame is searched.
   void begin_anew() {
     memory.forget_all();
+    fitter.forget_shape();
     keyframes.clear();
     doubted_since_s = -1.0;
     usual_sum = 1.0;
@@ -557,6 +562,7 @@ struct Estimator::Impl {
 
   Estimate report() {
     Estimate estimate;
+    shape = shape_covariance();
     estimate.joint_names = setup.estimated_joints;
     estimate.offset_rad = state.head(joints);
     estimate.prior_sd_rad = model.state().prior_sd().head(joints);
@@ -582,7 +588,7 @@ struct Estimator::Impl {
   }
 
   void report_memory(Estimate& estimate) {
-    const Eigen::MatrixXd covariance = contradicted ? in_frame.covariance : memory.estimate().covariance;
+    const Eigen::MatrixXd covariance = (contradicted ? in_frame.covariance : memory.estimate().covariance) + shape;
     estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
     for (Eigen::Index k = joints; k < state.size(); ++k) {
       const auto& p = model.state().parameters()[static_cast<std::size_t>(k)];
@@ -614,7 +620,7 @@ struct Estimator::Impl {
     if (!estimate.misfit.empty()) {
       current = EstimatorState::kModelMisfit;
     } else if (!contradicted && near && verdict == FrameVerdict::kAgrees && !stalled.suspected() &&
-               estimate.hand_sd_m < estimate.hand_sd_limit_m) {
+               fitter.knows_shape() && estimate.hand_sd_m < estimate.hand_sd_limit_m) {
       current = EstimatorState::kConverged;
     }
   }
@@ -626,7 +632,22 @@ struct Estimator::Impl {
     constexpr double kMore = 1.5;
     const double tolerated =
         std::sqrt(std::max(0.0, (hand_covariance_m2(frame.exposures[0]) - own_hand_covariance_m2()).trace()));
-    return std::hypot(limits::kHandPerDistance * estimate.X_CP.front().translation().norm(), kMore * tolerated);
+    const double near_m = limits::kHandPerDistance * estimate.X_CP.front().translation().norm();
+    const double own_m =
+        std::min(limits::kMostPerDistance * near_m, std::hypot(near_m, limits::kOfDescription * described_hand_sd_m()));
+    return std::hypot(own_m, kMore * tolerated);
+  }
+
+  /// How well the robot's description puts the hand before any picture, offsets left out: what may be wrong with links
+  /// and cameras, and is estimated. Of the last `hand_covariance_m2`.
+  [[nodiscard]] double described_hand_sd_m() const {
+    double square = 0.0;
+    for (Eigen::Index k = joints; k < state.size(); ++k) {
+      const auto& p = model.state().parameters()[static_cast<std::size_t>(k)];
+      if (model.state().model()[p.ref.effect].name() == "head_offset") continue;
+      square += (hand_J.col(k) * p.prior_sd).squaredNorm();
+    }
+    return std::sqrt(square);
   }
 
   /// What is wrong by more than is believed possible; empty: nothing.
@@ -676,13 +697,29 @@ struct Estimator::Impl {
 
   /// How well the hand is known in a camera, by this frame's covariance.
   Eigen::Matrix3d hand_covariance_m2(const Exposure& exposure) {
-    const Eigen::MatrixXd J = model.hand_jacobian(exposure, in_frame.x);
+    hand_J = model.hand_jacobian(exposure, in_frame.x);
+    const Eigen::MatrixXd& J = hand_J;
     const auto n = state.size();
     hand_own = J.leftCols(n) * in_frame.own * J.leftCols(n).transpose();
+    hand_own += J.leftCols(n) * shape * J.leftCols(n).transpose();
     if (J.cols() == n) return hand_own;
     const Eigen::MatrixXd T =
         (J.leftCols(n) * in_frame.sensitivity + J.rightCols(J.cols() - n)) * memory.layout().considered_sd.asDiagonal();
     return hand_own + T * T.transpose();
+  }
+  /// What outlines that are wrong alike in all postures do to the state: as if one average posture alone were known,
+  /// for the others err with it. No more than what was believed before any.
+  [[nodiscard]] Eigen::MatrixXd shape_covariance() const {
+    const double share = particles_only() ? 0.0 : fitter.shape_variance_share();
+    if (share <= 0.0 || memory.empty()) return Eigen::MatrixXd::Zero(state.size(), state.size());
+    const auto& own = memory.estimate().own;
+    const Eigen::VectorXd prior = memory.layout().prior_sd.array().square().inverse();
+    const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(state.size(), state.size());
+    Eigen::MatrixXd precision = own.ldlt().solve(identity);
+    precision.diagonal() -= prior;
+    precision /= share * static_cast<double>(memory.postures());
+    precision.diagonal() += prior;
+    return precision.ldlt().solve(identity);
   }
   /// Of the last `hand_covariance_m2`, the share that tolerances have no part in.
   [[nodiscard]] Eigen::Matrix3d own_hand_covariance_m2() const { return hand_own; }
@@ -703,6 +740,7 @@ struct Estimator::Impl {
   void begin_again() {
     filter.reset(Eigen::VectorXd::Zero(joints));
     memory.forget_all();
+    fitter.forget_shape();
     keyframes.clear();
     alternative.reset();
     state = model.state().prior_mean();
@@ -732,6 +770,8 @@ struct Estimator::Impl {
   Eigen::VectorXd state;    ///< fused over postures
   MemoryEstimate in_frame;  ///< the same with this frame's own error
   Eigen::Matrix3d hand_own = Eigen::Matrix3d::Zero();
+  Eigen::MatrixXd shape;   ///< covariance of the state by what outlines get wrong alike in all postures
+  Eigen::MatrixXd hand_J;  ///< of the last covariance of the hand
   EstimatorState current = EstimatorState::kHandNotInView;
   FrameVerdict verdict = FrameVerdict::kNothingKnown;
   Innovation innovation;

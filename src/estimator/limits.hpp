@@ -28,6 +28,13 @@ inline constexpr double kNearer = 0.8;
 /// Statistical. What one more free parameter must be better by: ln of prior over posterior variance, usually.
 inline constexpr double kPerParameter = 9.0;
 
+/// Physical. Points of a part in a picture; of fewer the mean is a point's own error.
+inline constexpr double kFewestOfPart = 4.0;
+/// Statistical. Postures; of fewer the variance between them is not known.
+inline constexpr int kPosturesOfShape = 3;
+/// Statistical. Postures after which one has faded to 1/e: the estimate that left its residuals is no longer held.
+inline constexpr double kRecentPostures = 12.0;
+
 /// Statistical. A parameter further from what was believed than this many of its standard deviations contradicts it.
 inline constexpr double kBeyondBelief_sd = 4.0;
 /// Statistical. Postures that disagree by more than this times what is claimed (mean NIS per direction).
@@ -44,5 +51,9 @@ inline constexpr double kSearchSpread_rad = 0.0349066;
 inline constexpr double kLargestSlip_rad = 0.2094395;
 /// Physical. of the distance to the camera: how well hands are to be known where nobody says (1 mm at 0.35 m).
 inline constexpr double kHandPerDistance = 1.0 / 350.0;
+/// Physical. ... or to this share of what the description of links and cameras leaves open, where that is more,
+inline constexpr double kOfDescription = 0.25;
+/// Physical. ... but no worse than by so many times the distance's share.
+inline constexpr double kMostPerDistance = 3.0;
 
 }  // namespace bodyschema::limits

@@ -14,8 +14,7 @@ constexpr double kWide_px[] = {30.0, 20.0, 14.0, 10.0, 7.0, 5.0};
 
 OutlineFitter::OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const EstimatorOptions& options,
                              std::size_t cameras)
-    : model_(model), scorer_(scorer), options_(options), noise_(cameras, OutlineNoise(options.noise)),
-      points_(cameras) {}
+    : model_(model), scorer_(scorer), options_(options), noise_(cameras, OutlineNoise(options.noise)) {}
 
 std::vector<OutlineSearch> OutlineFitter::searches(double search_px, bool last) const {
   std::vector<OutlineSearch> list;
@@ -27,9 +26,10 @@ std::vector<OutlineSearch> OutlineFitter::searches(double search_px, bool last) 
 }
 
 void OutlineFitter::look(const Frame& frame, double search_px, bool last, OutlineFit& fit) {
+  fit.points.assign(noise_.size(), {});
   model_.linearise(frame, fit.x, searches(search_px, last), last, fit.evidence,
                    [&](std::size_t c, std::span<const OutlinePoint> points) {
-                     if (last) points_[c].assign(points.begin(), points.end());
+                     if (last) fit.points[c].assign(points.begin(), points.end());
                    });
   const auto n = fit.x.size(), all = n + (last ? model_.beside_count() : 0);
   fit.quadratic = Quadratic::zero(all);
@@ -110,9 +110,19 @@ bool OutlineFitter::fits(const FrameEvidence& evidence) const {
 void OutlineFitter::learn_noise(const OutlineFit& fit) {
   for (std::size_t c = 0; c < noise_.size(); ++c) {
     if (fit.evidence.cameras[c].weight > 0.0) {
-      noise_[c].add(points_[c], model_.picture_unit_px(c), limits::kNoisePictures);
+      noise_[c].add(fit.points[c], model_.picture_unit_px(c), limits::kNoisePictures);
     }
   }
+}
+
+void OutlineFitter::learn_shape(const OutlineFit& fit) {
+  for (std::size_t c = 0; c < noise_.size(); ++c) {
+    if (fit.evidence.cameras[c].weight > 0.0) shape_.add(fit.points[c], c, model_.picture_unit_px(c));
+  }
+}
+
+double OutlineFitter::shape_variance_share() const {
+  return shape_.variance_px2(options_.noise.floor_px) / noise_.front().variance_px2();
 }
 
 }  // namespace bodyschema

@@ -10,6 +10,7 @@
 #include "bodyschema/evidence/posture_memory.hpp"
 #include "frame_model.hpp"
 #include "hypothesis_scorer.hpp"
+#include "shape_error.hpp"
 
 namespace bodyschema {
 
@@ -18,7 +19,8 @@ struct OutlineFit {
   Eigen::VectorXd x;
   FrameEvidence evidence;  ///< about x
   Quadratic quadratic;     ///< the same, divided by the variance of a residual, in absolute coordinates
-  double misfit = 0.0;     ///< chi-square: of the outline, and of x against what held it
+  std::vector<std::vector<OutlinePoint>> points;  ///< matched ones, per camera
+  double misfit = 0.0;                            ///< chi-square: of the outline, and of x against what held it
 };
 
 /// Moves states onto a frame's observed outline by Gauss-Newton, held by what a memory knows. One thread.
@@ -44,8 +46,19 @@ class OutlineFitter {
   [[nodiscard]] bool fits(const FrameEvidence& evidence) const;
   /// Measures the outlines' noise on what a good fit leaves.
   void learn_noise(const OutlineFit& fit);
+  /// Measures what outlines get wrong alike in all postures on what the fit of a new one leaves.
+  void learn_shape(const OutlineFit& fit);
+  [[nodiscard]] bool knows_shape() const { return shape_.known(); }
+  /// ... its variance, over that of what differs from posture to posture: a frame's quadratic divided by it says what
+  /// the frame would tell if nothing else erred.
+  [[nodiscard]] double shape_variance_share() const;
   [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
-  void forget() { noise_.assign(noise_.size(), OutlineNoise(options_.noise)); }
+  void forget() {
+    noise_.assign(noise_.size(), OutlineNoise(options_.noise));
+    shape_.forget();
+  }
+  /// What outlines get wrong in all postures was learned about an arm that is somewhere else.
+  void forget_shape() { shape_.forget(); }
 
  private:
   void refine(const Frame& frame, const PostureMemory& memory, std::span<const double> search_px, OutlineFit& fit);
@@ -56,7 +69,7 @@ class OutlineFitter {
   HypothesisScorer& scorer_;
   const EstimatorOptions& options_;
   std::vector<OutlineNoise> noise_;  ///< per camera
-  std::vector<std::vector<OutlinePoint>> points_;
+  ShapeError shape_;
 };
 
 }  // namespace bodyschema

@@ -210,6 +210,9 @@ std::optional<std::string> warning(const HealthFacts& f) {
     return std::string("learning the background: keep the arm out of view or moving");
   }
   if (f.estimate.state == EstimatorState::kHandNotInView) return std::string("hand not in view");
+  if (f.estimate.state == EstimatorState::kModelMisfit) {
+    return "do not use the offsets: " + f.estimate.misfit;
+  }
   for (const auto& camera : f.cameras) {
     if (camera.mask_px == 0) return fmt::format("mask empty in the {} camera", camera.name);
   }

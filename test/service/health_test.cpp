@@ -249,6 +249,13 @@ TEST(Health, Converging) {
   expect(facts, HealthLevel::kWarn, "converging: hand known to 2.1 mm so far");
 }
 
+TEST(Health, AModelThatIsContradictedIsNotOk) {
+  HealthFacts facts = well();
+  facts.estimate.state = EstimatorState::kModelMisfit;
+  facts.estimate.misfit = "the pictures ask for mesh_scale 9 %";
+  expect(facts, HealthLevel::kWarn, "do not use the offsets: the pictures ask for mesh_scale 9 %");
+}
+
 TEST(Health, Overload) {
   HealthFacts facts = well();
   facts.shed_since_last = 12;

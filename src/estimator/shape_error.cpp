@@ -1,0 +1,56 @@
+#include "shape_error.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "limits.hpp"
+
+namespace bodyschema {
+
+void ShapeError::add(std::span<const OutlinePoint> points, std::size_t camera, double unit_px) {
+  struct Mean {
+    double weight = 0.0, sum = 0.0, points = 0.0;
+  };
+  std::map<std::size_t, Mean> means;
+  for (const auto& point : points) {
+    auto& mean = means[point.part];
+    mean.weight += point.weight;
+    mean.sum += point.weight * point.residual_px / unit_px;
+    mean.points += 1.0;
+  }
+  for (const auto& [part, mean] : means) {
+    if (mean.points < limits::kFewestOfPart || mean.weight <= 0.0) continue;
+    auto& known = parts_[{camera, part}];
+    const double residual = mean.sum / mean.weight;
+    // What earlier postures left was left by an earlier estimate.
+    const double kept = std::exp(-1.0 / limits::kRecentPostures);
+    for (double* sum : {&known.postures, &known.points, &known.sum, &known.square}) *sum *= kept;
+    ++known.seen;
+    known.postures += 1.0;
+    known.points += mean.points;
+    known.sum += residual;
+    known.square += residual * residual;
+  }
+}
+
+bool ShapeError::known() const {
+  return std::any_of(parts_.begin(), parts_.end(),
+                     [](const auto& item) { return item.second.seen >= limits::kPosturesOfShape; });
+}
+
+double ShapeError::variance_px2(double floor_px) const {
+  double square = 0.0, weight = 0.0, alike = 0.0;
+  for (const auto& [place, part] : parts_) {
+    const double n = part.postures, mean = part.sum / n;
+    // Chance cannot be told from shape in the first few.
+    const double of_mean =
+        part.seen < limits::kPosturesOfShape ? 0.0 : std::max(0.0, part.square / n - mean * mean) / (n - 1.0);
+    square += part.points * (mean * mean - of_mean);
+    alike += part.points * part.points / n;
+    weight += part.points;
+  }
+  if (weight <= 0.0) return 0.0;
+  return std::max(0.0, square / weight - floor_px * floor_px) * alike / weight;
+}
+
+}  // namespace bodyschema

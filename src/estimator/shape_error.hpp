@@ -1,0 +1,39 @@
+#pragma once
+
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "bodyschema/outline/outline_measurement.hpp"
+
+namespace bodyschema {
+
+/// What outlines of the parts get wrong alike in all postures: a hand of another make, a cover that no mesh shows, a
+/// thing in the hand. No number of postures averages it out, and no disagreement between postures shows it; but what a
+/// fit could not take up of it stays as residuals that keep their sign, part by part.
+///
+/// A variance component: the mean square over the parts of the mean residual over postures, less what chance leaves
+/// there by how the same residuals vary between postures. What a fit took up is not seen; it is taken to be as large as
+/// what it left. Lengths are px of a 320x240 picture.
+class ShapeError {
+ public:
+  /// Adds one posture's picture.
+  void add(std::span<const OutlinePoint> points, std::size_t camera, double unit_px);
+  /// Variance beyond what pictures can place outlines to anyway, times how many points of a part err as one by it: what
+  /// an evidence's A is to be divided by where nothing else errs. px^2.
+  /// @param floor_px  how near pictures can place outlines
+  [[nodiscard]] double variance_px2(double floor_px) const;
+  /// Whether enough postures were seen to tell.
+  [[nodiscard]] bool known() const;
+  void forget() { parts_.clear(); }
+
+ private:
+  struct Part {
+    int seen = 0;                                                  ///< postures
+    double postures = 0.0, points = 0.0, sum = 0.0, square = 0.0;  ///< of mean residuals; fading
+  };
+  std::map<std::pair<std::size_t, std::size_t>, Part> parts_;  ///< by camera and part
+};
+
+}  // namespace bodyschema

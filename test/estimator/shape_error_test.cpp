@@ -1,0 +1,77 @@
+#include "../../src/estimator/shape_error.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "random_seed.hpp"
+
+namespace bodyschema {
+namespace {
+
+constexpr double kFloor_px = 0.1;
+
+/// Eight points of each of some parts, all with the part's residual, px.
+std::vector<OutlinePoint> outline(const std::vector<double>& residual_px) {
+  std::vector<OutlinePoint> points;
+  for (std::size_t part = 0; part < residual_px.size(); ++part) {
+    for (int i = 0; i < 8; ++i) {
+      OutlinePoint point;
+      point.part = part;
+      point.residual_px = residual_px[part];
+      points.push_back(point);
+    }
+  }
+  return points;
+}
+
+TEST(ShapeError, IsWhatKeepsItsSignFromPostureToPosture) {
+  ShapeError shape;
+  for (int i = 0; i < 6; ++i) shape.add(outline({1.0, -1.0, 1.0}), 0, 1.0);
+  // The mean square of the parts, times the points that err as one.
+  EXPECT_NEAR(shape.variance_px2(0.0), 8.0, 1e-9);
+  EXPECT_NEAR(shape.variance_px2(kFloor_px), 8.0 * (1.0 - kFloor_px * kFloor_px), 1e-9);
+  EXPECT_EQ(shape.variance_px2(1.5), 0.0) << "no nearer do pictures place outlines";
+}
+
+TEST(ShapeError, WhatDiffersFromPostureToPostureIsNone) {
+  ShapeError shape;
+  std::mt19937_64 random(test::seed());
+  std::normal_distribution<double> normal(0.0, 0.5);
+  for (int i = 0; i < 60; ++i) shape.add(outline({normal(random), normal(random), normal(random)}), 0, 1.0);
+  EXPECT_LT(shape.variance_px2(0.0), 8.0 * 0.25 / 4.0);
+}
+
+TEST(ShapeError, FewPosturesDoNotTellItFromChance) {
+  ShapeError shape;
+  for (const double sign : {1.0, -1.0}) {
+    EXPECT_FALSE(shape.known());
+    shape.add(outline({sign, 0.5 * sign}), 0, 1.0);
+  }
+  EXPECT_FALSE(shape.known());
+  shape.forget();
+  shape.add(outline({1.0, 1.0}), 0, 1.0);
+  EXPECT_NEAR(shape.variance_px2(0.0), 8.0, 1e-9) << "all of it may be shape";
+  for (int i = 0; i < 2; ++i) shape.add(outline({1.0, 1.0}), 0, 1.0);
+  EXPECT_TRUE(shape.known());
+}
+
+/// What an earlier estimate left is no longer there once the estimate has moved.
+TEST(ShapeError, EarlierPosturesFade) {
+  ShapeError shape;
+  for (int i = 0; i < 5; ++i) shape.add(outline({2.0, -2.0}), 0, 1.0);
+  for (int i = 0; i < 60; ++i) shape.add(outline({0.0, 0.0}), 0, 1.0);
+  EXPECT_EQ(shape.variance_px2(kFloor_px), 0.0);
+}
+
+TEST(ShapeError, LengthsAreThoseOfPicturesOf320x240) {
+  ShapeError large, small;
+  for (int i = 0; i < 4; ++i) {
+    large.add(outline({2.0, 2.0}), 0, 2.0);
+    small.add(outline({1.0, 1.0}), 0, 1.0);
+  }
+  EXPECT_NEAR(large.variance_px2(kFloor_px), small.variance_px2(kFloor_px), 1e-12);
+}
+
+}  // namespace
+}  // namespace bodyschema
