@@ -169,7 +169,8 @@ TEST_F(EffectsOnline, AKnockedCameraIsNotTakenForTheArm) {
     after = follow(estimator, reach, i, i + 1);
     changed += after.changed;
   }
-  EXPECT_EQ(changed, "the cameras were moved");
+  // Once, or once more by what the first picture left.
+  EXPECT_THAT(changed, ::testing::MatchesRegex("(the cameras were moved)+"));
   EXPECT_LT((after.offset_rad - before.offset_rad).cwiseAbs().maxCoeff(), radians(0.7));
   EXPECT_LT((after.X_CP[0].translation() - reach.true_hand(motion(29), 0).translation()).norm(), 1.5e-3);
 }
