@@ -194,7 +194,8 @@ class Window {
 }  // namespace
 
 struct LiveDiagnosis::Impl {
-  Impl(const Pipeline& pipeline, const LiveDiagnosisOptions& live) : options(live), window(pipeline, live) {}
+  Impl(const Pipeline& pipeline, const LiveDiagnosisOptions& live)
+      : options(live), least_postures(pipeline.options().least_postures), window(pipeline, live) {}
 
   bool watch(const Observation& observation, Estimate& estimate) {
     if (observation.encoders_begin_anew) begin_anew();
@@ -222,9 +223,8 @@ struct LiveDiagnosis::Impl {
     }
     // While no frame is kept only the last motion matters.
     if (std::ssize(encoders) > kMostEncoders) encoders.erase(encoders.begin(), encoders.begin() + kMostEncoders / 2);
-    // A state that nothing is known of is no place to ask from; one of few postures is: where pictures contradict each
-    // other, as late ones do, the estimator begins anew again and again.
-    if (estimate.postures == 0 || estimate.cameras_swapped) return;
+    // A state that nothing is known of yet is no place to ask from.
+    if (estimate.postures < least_postures || estimate.cameras_swapped) return;
     x.resize(estimate.offset_rad.size() + static_cast<Eigen::Index>(estimate.effects.size()));
     x.head(estimate.offset_rad.size()) = estimate.offset_rad;
     for (std::size_t k = 0; k < estimate.effects.size(); ++k) {
@@ -283,6 +283,7 @@ struct LiveDiagnosis::Impl {
   }
 
   LiveDiagnosisOptions options;
+  std::size_t least_postures;
   Window window;  ///< the worker's
   std::atomic<double> used_s{0.0};
 
