@@ -329,10 +329,8 @@ class RealExperiment {
                                    const std::map<std::string, double>& found_deg) {
     Eigen::VectorXd q = pipeline.setup().default_joints(pipeline.robot());
     for (const auto& [joint, angle] : row) {
-      const auto index = pipeline.robot().joint_index(joint);
-      if (index < 0) continue;
       const auto amount = [&](const auto& map) { return map.contains(joint) ? map.at(joint) : 0.0; };
-      q[index] = angle + radians(amount(hidden_deg) - amount(found_deg));
+      q[pipeline.robot().joint_index(joint)] = angle + radians(amount(hidden_deg) - amount(found_deg));
     }
     return q;
   }

@@ -67,7 +67,9 @@ JointTable JointTable::read(const fs::path& set) {
 
 std::map<std::string, double> JointTable::row(std::size_t index) const {
   std::map<std::string, double> values;
-  for (std::size_t i = 0; i < columns.size(); ++i) values[columns[i]] = rows[index][i];
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (columns[i] != "posture" && columns[i] != "time_s") values[columns[i]] = rows[index][i];
+  }
   return values;
 }
 

@@ -17,7 +17,7 @@ struct JointTable {
   std::vector<std::vector<double>> rows;
   /// Throws FileError.
   static JointTable read(const std::filesystem::path& set);
-  /// Of one row, by column.
+  /// Joint angles of one row.
   [[nodiscard]] std::map<std::string, double> row(std::size_t index) const;
 };
 
