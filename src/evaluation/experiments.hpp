@@ -15,8 +15,8 @@ using Json = nlohmann::ordered_json;
 /// What takes long is not run more often than this, whatever the options ask for.
 inline constexpr int kMostAdaptationTrials = 14;  ///< slip, hand leaves, camera dies
 inline constexpr int kMostAblationTrials = 10;
-inline constexpr int kMostEverydayTrials = 2;   ///< within `all`: the rows are many
-inline constexpr int kOffsetLogs = 6;  ///< never more or fewer
+inline constexpr int kMostEverydayTrials = 2;  ///< within `all`: the rows are many
+inline constexpr int kOffsetLogs = 6;          ///< never more or fewer
 
 /// What every experiment needs to know.
 struct ExperimentContext {
