@@ -93,7 +93,7 @@ class Calibrator {
     starts_ = {rig_};
     for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
       if (!to_be_searched(rig_.cameras[c])) continue;
-      if (pipeline_.masks_need_estimates()) {
+      if (pipeline_.masks_need_estimates() && !pipeline_.learns_background()) {
         throw DataError(
             fmt::format("{}: camera '{}' is to be found, which takes masks of the robot, and vision.method "
                         "statistics makes none before it is known where the robot is; give masks (vision.method: "

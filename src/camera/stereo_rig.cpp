@@ -103,7 +103,6 @@ CameraModel read_camera(const Configuration& section, const std::string& name) {
   k.fy = section.number("fy", kMinFocal, kMaxFocal);
   k.cx = section.number("cx", -kMaxSide, 2 * kMaxSide);
   k.cy = section.number("cy", -kMaxSide, 2 * kMaxSide);
-  camera.distortion_given = section.has("distortion");
   const auto distortion = section.numbers_or("distortion", {0, 0, 0, 0, 0});
   if (distortion.size() != camera.distortion.size()) {
     section.fail("distortion", "five numbers [k1, k2, p1, p2, k3]");

@@ -96,7 +96,9 @@ EverydayFrame frame_of(const Estimate& estimate, const simulator::SimulatedFrame
 
 std::vector<EverydayFrame> play(const ExperimentContext& context, const Job& job) {
   // A configuration of its own: they are read by one thread.
-  std::vector<std::string> overrides = context.options.overrides;
+  // One method throughout, that nobody has to choose; --set vision.method compares others.
+  std::vector<std::string> overrides = {"vision.method=auto"};
+  overrides.insert(overrides.end(), context.options.overrides.begin(), context.options.overrides.end());
   overrides.push_back("filter.seed=" + std::to_string(job.seed * 1000003u + 17u));
   overrides.emplace_back("silhouette.threads=1");
   if (job.row->lens_known) {
@@ -217,9 +219,9 @@ void run_everyday(ExperimentContext& context) {
   }
   const auto logs = play_all(context, jobs);
   context.table += fmt::format(
-      "\neveryday pictures ({} seeds a row, {}; {:.0f} s at {:.0f} Hz)\n{:<16} {:>9} {:>9} {:>10} {:>10} {:>10}\n", trials,
-      official ? "own and official iCub in turn" : "own iCub", context.options.everyday_s, kPictureRate_hz, "row",
-      "hand, mm", "worst", "converged", "dishonest", "in logs");
+      "\neveryday pictures ({} seeds a row, {}; {:.0f} s at {:.0f} Hz)\n{:<16} {:>9} {:>9} {:>10} {:>10} {:>10}\n",
+      trials, official ? "own and official iCub in turn" : "own iCub", context.options.everyday_s, kPictureRate_hz,
+      "row", "hand, mm", "worst", "converged", "dishonest", "in logs");
   auto& out = context.summary["everyday"];
   for (std::size_t begin = 0; begin < logs.size(); begin += static_cast<std::size_t>(trials)) {
     std::vector<double> hand_mm;
@@ -233,7 +235,8 @@ void run_everyday(ExperimentContext& context) {
       logs_dishonest += logs[i].dishonest > 0;
     }
     const auto hand = Statistics::of(hand_mm);
-    const double converged_rate = converged / trials, dishonest_rate = of_converged > 0.0 ? dishonest / of_converged : 0.0;
+    const double converged_rate = converged / trials,
+                 dishonest_rate = of_converged > 0.0 ? dishonest / of_converged : 0.0;
     const char* name = jobs[begin].row->name;
     out[name] = {{"hand_mm", {{"mean", hand.mean}, {"sd", hand.sd}, {"worst", hand.worst}}},
                  {"converged_rate", converged_rate},

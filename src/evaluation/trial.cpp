@@ -73,7 +73,13 @@ TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>
     if (history.size() > 400) history.erase(history.begin(), history.end() - 200);
     Observation observation = simulator::to_observation(*frame, history);
     observation.encoders = frame->encoders;
-    const bool ready = pipeline.segment(observation);
+    // Masks that are looked for near an estimate take one of their own, the same for all contestants.
+    bool ready = true;
+    if (pipeline.masks_need_estimates()) {
+      pipeline.process(observation);
+    } else {
+      ready = pipeline.segment(observation);
+    }
     if (frame->phase != simulator::Phase::kMotion || !ready) continue;
     if (setting.on_masks) setting.on_masks(observation);
     if (observation.cameras[0]) last_q = observation.cameras[0]->joints.q;

@@ -46,12 +46,12 @@ double BackgroundWatch::turned(std::size_t camera, const Eigen::VectorXd& q) {
 }
 
 bool BackgroundWatch::moved_since_last(std::size_t camera, const Eigen::VectorXd& q) {
-  const Pose& X_WC = pose(camera, q);
-  const double angle = Eigen::AngleAxisd(Eigen::Matrix3d(X_WC_stood_[camera].linear().transpose() * X_WC.linear())).angle();
-  if (stood_[camera] && angle < kStands_rad) return false;
+  const Pose X_WC = pose(camera, q);
+  const Eigen::Matrix3d R = X_WC_stood_[camera].linear().transpose() * X_WC.linear();
+  const bool moved = stood_[camera] && Eigen::AngleAxisd(R).angle() >= kStands_rad;
+  if (moved || !stood_[camera]) X_WC_stood_[camera] = X_WC;
   stood_[camera] = true;
-  X_WC_stood_[camera] = X_WC;
-  return true;
+  return moved;
 }
 
 bool BackgroundWatch::count(double turned_rad, const BinaryMask& mask, const BinaryMask& valid,

@@ -72,7 +72,7 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
         !vision_.background_pictures.contains(camera.name)) {
       configuration.section("vision").section("background_pictures").fail(camera.name, "a file for each camera");
     }
-    if (!camera.distortion_given) {
+    if (!configuration.section("cameras").section(camera.name).has("distortion")) {
       spdlog::warn(
           "camera '{}' has no distortion in the configuration and is taken to have none: most lenses bend by more than "
           "offsets are worth; set cameras.{}.distortion, to zeros where pictures come straightened",
@@ -185,7 +185,9 @@ Pipeline::Looks Pipeline::look(const Observation& observation, bool alone) {
   std::vector<std::optional<BinaryMask>> predicted(eyes_.size());
   for (std::size_t c = 0; masks_need_estimates() && c < eyes_.size(); ++c) {
     if (!observation.cameras[c]) continue;
-    predicted[c] = estimator_.predicted_silhouette(observation, c, true);
+    // Where nobody knows where the camera is, nor where it sees the robot: by the background, where one is known.
+    const bool placed = rig_.cameras[c].mount.knowledge != PlaceKnowledge::kUnknown;
+    if (placed || !learns_background()) predicted[c] = estimator_.predicted_silhouette(observation, c, true);
     if (background_watch_.moved_since_last(c, observation.cameras[c]->joints.q)) eyes_[c].segmenter.camera_turned();
   }
   const auto of_camera = [&](std::size_t c) {
@@ -199,8 +201,8 @@ Pipeline::Looks Pipeline::look(const Observation& observation, bool alone) {
   return looks;
 }
 
-/// How far off the predicted outline may be in a picture, px: by how well hand and outline were known. Where nobody
-/// knows, half a metre away a hand is as far off as three standard deviations of all offsets together put it.
+/// How far off the predicted outline may be in a picture, px: three standard deviations of hand and outline. Where
+/// nobody knows them, further than the offsets that are searched for move a hand.
 double Pipeline::reach_px(std::size_t camera) const {
   constexpr double kLeast_px = 6.0, kMost_px = 40.0, kYoung_px = 16.0;
   const double unit = picture_unit(rig_.cameras[camera].intrinsics);
@@ -300,7 +302,10 @@ Estimate Pipeline::estimate(const Observation& observation) {
   Estimate estimate = estimator_.step(observation);
   if (learning_) estimate.state = EstimatorState::kLearningBackground;
   tracking_ = estimate.state == EstimatorState::kConverged;
-  outline_sd_px_ = -1.0;
+  // A frame that contradicts what was known may show somebody's arm, or a slip: the search widens from frame to frame.
+  constexpr double kWider = 1.5, kWider_px = 1.0;
+  if (outline_sd_px_ >= 0.0) outline_sd_px_ = kWider * outline_sd_px_ + kWider_px;
+  if (estimate.postures == 0) outline_sd_px_ = -1.0;
   young_ = estimate.postures < options_.least_postures;
   if (estimate.verdict == FrameVerdict::kAgrees && !estimate.X_CP.empty()) {
     const auto& k = rig_.cameras[0].intrinsics;

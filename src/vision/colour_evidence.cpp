@@ -56,7 +56,9 @@ void ColourEvidence::measure_depth(const BinaryMask& predicted) {
   sums_.assign(depth_.size(), kFar);  // distance to the outline, unsigned
   std::vector<float>& d = sums_;
   const auto inside = [&](int x, int y) { return predicted.at(box_.u0 + x, box_.v0 + y); };
-  const auto at = [&](int x, int y) -> float& { return d[static_cast<std::size_t>(y) * static_cast<std::size_t>(w) + static_cast<std::size_t>(x)]; };
+  const auto at = [&](int x, int y) -> float& {
+    return d[static_cast<std::size_t>(y) * static_cast<std::size_t>(w) + static_cast<std::size_t>(x)];
+  };
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
       const bool here = inside(x, y);
@@ -186,7 +188,7 @@ void ColourEvidence::weigh(const RobotLooks& looks, double reach_px) {
   evidence_.resize(depth_.size());
   const float whole = rough_ ? kWholeCountRough : kWholeCount;
   const float robot_all = whole / std::max(robot_.count, 1.0f), rest_all = whole / std::max(rest_.count, 1.0f);
-  const float known = looks.known() ? kKnownCount : 0.0f;
+  const float known = looks.known() ? (rough_ ? kWholeCountRough : kKnownCount) : 0.0f;
   const auto far = static_cast<float>(reach_px);
   std::size_t i = 0;
   for (int v = box_.v0; v <= box_.v1; ++v) {
@@ -201,8 +203,7 @@ void ColourEvidence::weigh(const RobotLooks& looks, double reach_px) {
       const float robot = (robot_.near[tile * n + k] + robot_all * robot_.all[k] +
                            (known > 0.0f ? known * looks.share[palette_[k]] : 0.0f)) /
                           (robot_.total[tile] + whole + known);
-      const float rest = (rest_.near[tile * n + k] + rest_all * rest_.all[k]) /
-                         (rest_.total[tile] + whole);
+      const float rest = (rest_.near[tile * n + k] + rest_all * rest_.all[k]) / (rest_.total[tile] + whole);
       evidence_[i] = std::clamp(std::log((robot + kFloor) / (rest + kFloor)), -kMostEvidence, kMostEvidence);
     }
   }
@@ -214,6 +215,7 @@ void ColourEvidence::decide(double reach_px, int smoothing, const BackgroundMode
   const int w = box_.width(), h = box_.height();
   const auto width = static_cast<std::size_t>(w);
   const auto far = static_cast<float>(reach_px);
+  const auto everywhere = static_cast<float>(kEverywhere_px * unit_);
   sums_.resize(depth_.size());
   smooth_.resize(depth_.size());
   for (int y = 0; y < h; ++y) {  // along rows
@@ -232,14 +234,14 @@ void ColourEvidence::decide(double reach_px, int smoothing, const BackgroundMode
     for (int x = 0; x < w; ++x, ++i) {
       const float d = depth_[i];
       smooth_[i] = kMostEvidence;
-      if (d < -far) continue;
       const int u = box_.u0 + x, v = box_.v0 + y;
       if (background != nullptr &&
           background->precision[static_cast<std::size_t>(v) * static_cast<std::size_t>(background->width) +
                                 static_cast<std::size_t>(u)] > 0.0f) {
-        if (differs.at(u, v)) robot.set(u, v);
+        if (differs.at(u, v) && (d >= -far || far >= everywhere)) robot.set(u, v);
         continue;
       }
+      if (d < -far) continue;
       float sum = 0.0f;
       for (int k = -smoothing; k <= smoothing; ++k) {
         sum += sums_[static_cast<std::size_t>(std::clamp(y + k, 0, h - 1)) * width + static_cast<std::size_t>(x)];
@@ -250,13 +252,13 @@ void ColourEvidence::decide(double reach_px, int smoothing, const BackgroundMode
   }
 }
 
-void ColourEvidence::separate(const Image& image, const BinaryMask& predicted, double reach_px,
-                              const RobotLooks& looks, const BackgroundModel* background, const BinaryMask& differs,
-                              BinaryMask& robot) {
+void ColourEvidence::separate(const Image& image, const BinaryMask& predicted, double reach_px, const RobotLooks& looks,
+                              const BackgroundModel* background, const BinaryMask& differs, BinaryMask& robot) {
   const double unit = unit_of(image);
 
   robot.fill(false);
   box_ = bounding_box(predicted).grown(static_cast<int>(reach_px + kRing_px * unit), image.width, image.height);
+  if (background != nullptr && reach_px >= kEverywhere_px * unit) box_ = {0, 0, image.width - 1, image.height - 1};
   if (box_.empty()) return;
   tile_px_ = std::max(8, static_cast<int>(kTile_px * unit));
   columns_ = (box_.width() + tile_px_ - 1) / tile_px_;

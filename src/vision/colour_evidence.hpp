@@ -25,6 +25,10 @@ struct RobotLooks {
 /// colour, and what the prediction says for itself. Allocates nothing once warm. One per camera and thread.
 class ColourEvidence {
  public:
+  /// px of a 320x240 picture: a prediction that may be further off says nothing of where a known background has
+  /// changed.
+  static constexpr double kEverywhere_px = 30.0;
+
   /// @param predicted  where the robot is thought to be
   /// @param reach_px   how far off that may be
   /// @param looks      the robot's colours as known before
@@ -41,6 +45,11 @@ class ColourEvidence {
 
   /// Where the last `separate` looked.
   [[nodiscard]] const PixelBox& box() const { return box_; }
+  /// How far inside the prediction a pixel of the box lay, px; outside: negative.
+  [[nodiscard]] float depth(int u, int v) const {
+    return depth_[static_cast<std::size_t>(v - box_.v0) * static_cast<std::size_t>(box_.width()) +
+                  static_cast<std::size_t>(u - box_.u0)];
+  }
 
  private:
   struct Side {
@@ -60,6 +69,7 @@ class ColourEvidence {
               BinaryMask& robot);
 
   PixelBox box_;
+  double unit_ = 1.0;   ///< px of a 320x240 picture in this one
   bool rough_ = false;  ///< the prediction may be far off
   int tile_px_ = 32, columns_ = 0, rows_ = 0;
   std::vector<float> depth_;            ///< px inside (positive) or outside the prediction

@@ -126,7 +126,8 @@ void CoverageEstimator::average_nearby(const Image& image, const BinaryMask& sur
   pixel.robot_known = true;
 }
 
-void CoverageEstimator::project(const Image& image, const BackgroundModel& background, float least_contrast_sigma) {
+void CoverageEstimator::project(const Image& image, const BackgroundModel& background, float least_contrast_sigma,
+                                bool sharp_colours) {
   const auto channels = static_cast<std::size_t>(image.channels);
   for (auto& pixel : band_) {
     if (!pixel.robot_known) continue;
@@ -150,7 +151,7 @@ void CoverageEstimator::project(const Image& image, const BackgroundModel& backg
     pixel.share = contrast > 1e-6f ? along / contrast : 0.0f;
     // A colour that no mixture of F and B explains is that of another part of the robot.
     const float across = difference - pixel.share * along;
-    if (pixel.share < 0.5f && across * precision > std::max(25.0f, 0.25f * difference * precision) &&
+    if (sharp_colours && pixel.share < 0.5f && across * precision > std::max(25.0f, 0.25f * difference * precision) &&
         across > background_change(background, pixel.u, pixel.v)) {
       pixel.share = 1.0f;
     }
@@ -257,8 +258,8 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
 }
 
 void CoverageEstimator::estimate(const Image& image, const BackgroundModel& background, const BinaryMask& detected,
-                                 const BinaryMask& sure, float least_contrast_sigma, BinaryMask& mask,
-                                 BinaryMask& uncertain, std::vector<std::uint8_t>& coverage) {
+                                 const BinaryMask& sure, float least_contrast_sigma, bool sharp_colours,
+                                 BinaryMask& mask, BinaryMask& uncertain, std::vector<std::uint8_t>& coverage) {
   const auto pixels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   coverage.assign(pixels, 0);
   mask.fill(false);
@@ -268,7 +269,7 @@ void CoverageEstimator::estimate(const Image& image, const BackgroundModel& back
   for (int round = 0; round < 2; ++round) {
     smooth();
     look_inside(image, background, sure, round == 0);
-    project(image, background, least_contrast_sigma);
+    project(image, background, least_contrast_sigma, sharp_colours);
   }
 
   const auto width = static_cast<std::size_t>(image.width);

@@ -23,12 +23,14 @@ class CoverageEstimator {
   /// @param detected  pixels where a robot may be: all of it and at most ~2 px around it
   /// @param sure      pixels that differ from the background by themselves
   /// @param least_contrast_sigma  below this difference of F and B a pixel is uncertain
+  /// @param sharp_colours  a colour beside the outline that is no mixture of F and B is another part of the robot; not
+  ///   so where compression lets colours bleed
   /// @param mask      out: coverage of at least one half
   /// @param uncertain out: pixels of the outline that cannot be judged
   /// @param coverage  out: 0 to 255, row order
   void estimate(const Image& image, const BackgroundModel& background, const BinaryMask& detected,
-                const BinaryMask& sure, float least_contrast_sigma, BinaryMask& mask, BinaryMask& uncertain,
-                std::vector<std::uint8_t>& coverage);
+                const BinaryMask& sure, float least_contrast_sigma, bool sharp_colours, BinaryMask& mask,
+                BinaryMask& uncertain, std::vector<std::uint8_t>& coverage);
 
  private:
   struct BandPixel {
@@ -47,7 +49,7 @@ class CoverageEstimator {
   /// Finds F for pixels near the outline. `rough`: the outline may lie too far out.
   void look_inside(const Image& image, const BackgroundModel& background, const BinaryMask& sure, bool rough);
   void average_nearby(const Image& image, const BinaryMask& sure, BandPixel& pixel) const;
-  void project(const Image& image, const BackgroundModel& background, float least_contrast_sigma);
+  void project(const Image& image, const BackgroundModel& background, float least_contrast_sigma, bool sharp_colours);
 
   PixelBox box_;
   int stride_ = 0;  ///< of the window, which has one pixel of padding

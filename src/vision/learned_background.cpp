@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "bodyschema/vision/mask_operations.hpp"
+#include "region_statistics.hpp"
 
 namespace bodyschema {
 namespace {
@@ -392,6 +393,8 @@ void LearnedBackground::update(const Image& frame, const BinaryMask* robot, bool
       return;
     }
     model_.noise_sd = noise_between(first_, frame);
+    // A camera that turned between the two finds a room's texture in their difference; a single picture's is less.
+    if (setup_.method == SegmentationMethod::kAuto) model_.noise_sd = std::min(model_.noise_sd, noise_of(frame));
     const Image first = std::move(first_);
     first_ = Image{};
     for (int v = 0; v < model_.height; ++v) {

@@ -48,7 +48,7 @@ void LocalAverage::around(const Image& image, const BinaryMask& robot, const Pix
       const auto i =
           static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(box.u0) + u;
       const auto weight = static_cast<float>(columns_[(channels + 1) * columns + u]);
-      if (weight < 1.0f) continue;
+      if (weight < 1.0f || local.precision[i] > 0.0f) continue;
       float squares = static_cast<float>(columns_[channels * columns + u]) / weight;
       for (std::size_t c = 0; c < channels; ++c) {
         const float mean = static_cast<float>(columns_[c * columns + u]) / weight;

@@ -15,7 +15,7 @@ namespace bodyschema {
 class LocalAverage {
  public:
   /// Of pixels more than two away from the robot, over squares of this half side, px. Pixels of the box without any
-  /// within reach keep what `local` says of them.
+  /// within reach, and those that are known already, keep what `local` says of them.
   /// @param local  in: noise_sd; out: mean and precision within `box`. A varied background is as uncertain as it is
   ///   varied.
   void around(const Image& image, const BinaryMask& robot, const PixelBox& box, int radius, BackgroundModel& local);

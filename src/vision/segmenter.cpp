@@ -84,6 +84,15 @@ constexpr double kHolds = 0.6, kSameThoughTurned = 0.97;
 constexpr int kMostMisfits = 10;
 // The background nobody knows is averaged over squares of this half side, px; twice that where there is none so near.
 constexpr double kAverage_px = 3.0;
+// Beside the robot the background varies more where pictures were compressed: measured between these distances from the
+// predicted outline, px, beyond blur and within the blocks that an outline spoils; by the quantile of squared
+// differences that nineteen in twenty stay below (chi-square of one and of three channels).
+constexpr float kBesideFrom_px = 2.0f, kBesideTo_px = 8.0f;
+constexpr double kQuantile = 0.95;
+constexpr float kChiSquare1 = 3.84f, kChiSquare3 = 7.81f;
+constexpr float kEdgeShare = 0.2f;
+// From this on it is compression: colours bleed over the outline without being mixtures of both sides.
+constexpr float kCompressed = 4.0f;
 // Share that one picture has in what is known of the robot's colours.
 constexpr float kLookShare = 0.05f;
 
@@ -158,6 +167,8 @@ struct Segmenter::Impl {
   /// Whether the learned background is what this picture shows away from the robot.
   [[nodiscard]] bool background_holds(const Image& image);
   void forget_background();
+  /// How much more than elsewhere the background varies beside the robot: what compression makes of an outline.
+  void measure_edge_noise(const Image& image);
 
   VisionSetup setup;
   std::string camera;
@@ -170,15 +181,17 @@ struct Segmenter::Impl {
   BackgroundModel given;
   bool given_noise_known = false;
   RegionStatistics statistics;
-  BackgroundModel local;  // statistics: of the last frame, next to the robot
-  ColourEvidence evidence;        // auto
-  RobotLooks looks;               // auto
-  LocalAverage average;           // auto
-  BinaryMask known, beside;       // auto: pixels with a known background; the robot and all around it
-  Image relit;                    // auto: the last picture in the light of the learned background
+  BackgroundModel local;                         // statistics: of the last frame, next to the robot
+  ColourEvidence evidence;                       // auto
+  RobotLooks looks;                              // auto
+  LocalAverage average;                          // auto
+  BinaryMask known, beside;                      // auto: pixels with a known background; the robot and all around it
+  Image relit;                                   // auto: the last picture in the light of the learned background
   std::array<float, 3> light{1.0f, 1.0f, 1.0f};  // auto: gain of this picture, by channel
-  bool turned = false;            // auto: the camera, since the background was learned
-  int misfits = 0;                // auto: pictures in a row that the background does not fit
+  float edge_variance = 1.0f;                    // auto: beside the robot, times that of still areas
+  bool turned = false;                           // auto: the camera, since the background was learned
+  int misfits = 0;                               // auto: pictures in a row that the background does not fit
+  std::vector<float> ratios;                     // auto: of squared differences to their variances
   FrameSelection selection;
   bool learned_offline = false;
   bool just_learned = false;  // the last frame was learned from whole and gave no mask
@@ -321,7 +334,8 @@ void Segmenter::Impl::refine(const Image& image, const BackgroundModel& model, B
   // Beside a background that nobody knows, its own variety counts as noise: half as much contrast puts outlines half a
   // pixel off at most.
   const double least = (setup.method == SegmentationMethod::kAuto ? 0.5 : 1.0) * setup.least_contrast_sigma;
-  coverage_estimator.estimate(image, model, detected, sure, static_cast<float>(least), mask, uncertain, coverage);
+  coverage_estimator.estimate(image, model, detected, sure, static_cast<float>(least), edge_variance < kCompressed,
+                              mask, uncertain, coverage);
   if (setup.method == SegmentationMethod::kStatistics) {
     soften(mask, coverage);
   } else {
@@ -533,8 +547,8 @@ const Image& Segmenter::Impl::in_known_light(const Image& image) {
         const float had = std::max(model.mean[i * static_cast<std::size_t>(channels) + c], 1.0f);
         const float has = std::max(static_cast<float>(image.pixel(u, v)[c]), 1.0f);
         const float step = std::log(has / had) / std::log(kPerStep);
-        ++counts[c][static_cast<std::size_t>(
-            std::clamp(static_cast<int>(std::lround(step)), -kSteps, kSteps) + kSteps)];
+        ++counts[c]
+                [static_cast<std::size_t>(std::clamp(static_cast<int>(std::lround(step)), -kSteps, kSteps) + kSteps)];
       }
     }
   }
@@ -545,7 +559,8 @@ const Image& Segmenter::Impl::in_known_light(const Image& image) {
     while (2 * (below + counts[c][k]) < all) below += counts[c][k++];
     // Within the step: as many lie below the median as above.
     const float within = (0.5f * static_cast<float>(all) - static_cast<float>(below)) /
-                             std::max(static_cast<float>(counts[c][k]), 1.0f) - 0.5f;
+                             std::max(static_cast<float>(counts[c][k]), 1.0f) -
+                         0.5f;
     light[c] = std::pow(kPerStep, static_cast<float>(k) - kSteps + within);
     changed = changed || std::abs(light[c] - 1.0f) > kSameLight;
   }
@@ -557,8 +572,7 @@ const Image& Segmenter::Impl::in_known_light(const Image& image) {
   std::array<std::array<std::uint8_t, 256>, 3> table{};
   for (std::size_t c = 0; c < static_cast<std::size_t>(channels); ++c) {
     for (std::size_t level = 0; level < 256; ++level) {
-      table[c][level] =
-          static_cast<std::uint8_t>(std::min(static_cast<float>(level) / light[c] + 0.5f, 255.0f));
+      table[c][level] = static_cast<std::uint8_t>(std::min(static_cast<float>(level) / light[c] + 0.5f, 255.0f));
     }
   }
   const auto n = static_cast<std::size_t>(channels);
@@ -598,6 +612,34 @@ bool Segmenter::Impl::background_holds(const Image& image) {
   return holds;
 }
 
+void Segmenter::Impl::measure_edge_noise(const Image& image) {
+  const BackgroundModel& model = learned.model();
+  const auto n = static_cast<std::size_t>(channels);
+  const auto unit = static_cast<float>(std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0)));
+  const PixelBox& box = evidence.box();
+  ratios.clear();
+  for (int v = box.v0; v <= box.v1; ++v) {
+    for (int u = box.u0; u <= box.u1; ++u) {
+      const float outside = -evidence.depth(u, v) / unit;
+      if (outside < kBesideFrom_px || outside > kBesideTo_px) continue;
+      const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
+      if (model.precision[i] <= 0.0f) continue;
+      float square = 0.0f;
+      for (std::size_t c = 0; c < n; ++c) {
+        const float d = static_cast<float>(image.pixel(u, v)[c]) - model.mean[i * n + c];
+        square += d * d;
+      }
+      ratios.push_back(square * model.precision[i]);
+    }
+  }
+  constexpr std::size_t kFewest = 100;
+  if (ratios.size() < kFewest) return;
+  const auto at = ratios.begin() + static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(ratios.size()));
+  std::nth_element(ratios.begin(), at, ratios.end());
+  const float now = std::max(1.0f, *at / (n == 1 ? kChiSquare1 : kChiSquare3));
+  edge_variance += kEdgeShare * (now - edge_variance);
+}
+
 void Segmenter::Impl::forget_background() {
   learned = LearnedBackground(setup, width, height);
   learned_offline = false;
@@ -630,19 +672,27 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
     }
     return;
   }
-  known.fill(false);
   if (holds) {
-    mark_valid(learned.model(), known);
-    detect(seen, learned.model());
+    local = learned.model();
+    for (auto& precision : local.precision) precision /= edge_variance;
+    mark_valid(local, known);
+    detect(seen, local);
     components.remove_small(detected, setup.min_component_px);
     components.fill_small_holes(detected, setup.max_hole_px);
     intersect(sure, detected);
     components.fill_small_holes(sure, std::max(setup.max_hole_px, 4));
   } else {
+    if (local.width != width || local.height != height || local.channels != channels) {
+      local = BackgroundModel(width, height, channels);
+    }
+    std::fill(local.precision.begin(), local.precision.end(), 0.0f);
+    local.noise_sd = setup.noise_levels > 0.0 ? static_cast<float>(setup.noise_levels) : noise_of(seen);
+    known.fill(false);
     detected.fill(false);
     sure.fill(false);
   }
-  const BackgroundModel* background = holds ? &learned.model() : nullptr;
+  const BackgroundModel* background = holds ? &local : nullptr;
+  const bool everywhere = reach_px >= ColourEvidence::kEverywhere_px * unit;
   evidence.separate(seen, *predicted.silhouette, reach_px, looks, background, sure, robot);
   components.remove_small(robot, setup.min_component_px);
   components.fill_small_holes(robot, setup.max_hole_px);
@@ -652,25 +702,13 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
   for (int v = 0; v < height; ++v) {
     for (int w = 0; w < known.words_per_row(); ++w) {
       const auto k = known.row(v)[w];
-      detected.row(v)[w] = (detected.row(v)[w] & k & beside.row(v)[w]) | (robot.row(v)[w] & ~k) | sure.row(v)[w];
+      const auto near = everywhere ? ~std::uint64_t{0} : beside.row(v)[w];
+      detected.row(v)[w] = (detected.row(v)[w] & k & near) | (robot.row(v)[w] & ~k) | sure.row(v)[w];
     }
   }
-  if (local.width != width || local.height != height || local.channels != channels) {
-    local = BackgroundModel(width, height, channels);
-  }
-  std::fill(local.precision.begin(), local.precision.end(), 0.0f);
-  local.noise_sd = setup.noise_levels > 0.0 ? static_cast<float>(setup.noise_levels) : noise_of(seen);
-  average.around(seen, sure, evidence.box(), static_cast<int>(2.0 * kAverage_px * unit), local);
+  if (holds && !everywhere) measure_edge_noise(seen);
   average.around(seen, sure, evidence.box(), static_cast<int>(kAverage_px * unit), local);
-  if (holds) {
-    const BackgroundModel& model = learned.model();
-    const auto n = static_cast<std::size_t>(channels);
-    for (std::size_t i = 0; i < model.precision.size(); ++i) {
-      if (model.precision[i] <= 0.0f) continue;
-      local.precision[i] = model.precision[i];
-      for (std::size_t c = 0; c < n; ++c) local.mean[i * n + c] = model.mean[i * n + c];
-    }
-  }
+  average.around(seen, sure, evidence.box(), static_cast<int>(2.0 * kAverage_px * unit), local);
   valid.fill(true);
   refine(seen, local, mask, valid, coverage);
   evidence.mark_weak(robot);

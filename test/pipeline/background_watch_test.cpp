@@ -57,6 +57,16 @@ TEST_F(Watch, ATurnIsThatOfTheCameraWhateverTheArmDoes) {
   EXPECT_NEAR(degrees(watch_->turned(0, with("neck_pitch", -3.0))), 3.0, 1e-6);
 }
 
+TEST_F(Watch, ACameraMovesFromWhereItStoodLast) {
+  EXPECT_FALSE(watch_->moved_since_last(0, q_)) << "the first picture";
+  EXPECT_FALSE(watch_->moved_since_last(0, with("neck_pitch", 0.2))) << "rounding of encoders";
+  EXPECT_FALSE(watch_->moved_since_last(0, with("neck_pitch", -0.2)));
+  EXPECT_TRUE(watch_->moved_since_last(0, with("neck_pitch", 0.4)));
+  EXPECT_FALSE(watch_->moved_since_last(0, with("neck_pitch", 0.5))) << "it stands there now";
+  EXPECT_TRUE(watch_->moved_since_last(0, q_)) << "and back";
+  EXPECT_FALSE(watch_->moved_since_last(0, with("r_elbow", 30.0))) << "the arm is no camera";
+}
+
 TEST_F(Watch, CountsPicturesThatDifferFarFromTheArm) {
   const BinaryMask arm = block(100, 100, 140, 240), none;
   EXPECT_FALSE(watch_->count(0.1, block(80, 60, 160, 240), none, arm)) << "offsets may be wrong by as much";

@@ -40,7 +40,6 @@ struct CameraModel {
   std::string link;
   PinholeIntrinsics intrinsics;        ///< px
   std::array<double, 5> distortion{};  ///< k1 k2 p1 p2 k3 as OpenCV; all zero: none
-  bool distortion_given = false;       ///< whether the configuration says so
   int image_type = -1;                 ///< see number(); negative: not given
   CameraMount mount;
   std::string place;  ///< where its link is configured: Configuration::place

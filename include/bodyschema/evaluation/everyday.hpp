@@ -8,9 +8,9 @@ namespace bodyschema {
 struct EverydayFrame {
   bool in_view = false;  ///< by the truth: the hand's centre lies in the first camera's picture
   bool converged = false;
-  double hand_mm = -1.0;     ///< error of the hand in the first camera; negative: no estimate
-  double hand_sd_mm = 0.0;   ///< as published
-  double offset_sd = 0.0;    ///< the worst joint's error in its published standard deviations
+  double hand_mm = -1.0;    ///< error of the hand in the first camera; negative: no estimate
+  double hand_sd_mm = 0.0;  ///< as published
+  double offset_sd = 0.0;   ///< the worst joint's error in its published standard deviations
 };
 
 /// One log in figures.

@@ -37,7 +37,8 @@ class BackgroundWatch {
   }
   /// How far the camera has turned since; 0 below kTurn_rad.
   [[nodiscard]] double turned(std::size_t camera, const Eigen::VectorXd& q);
-  /// Whether the camera has turned by more than noise and rounding of encoders since this was last true; true at first.
+  /// Whether the camera has turned by more than noise and rounding of encoders since this was last
+  /// true, or first asked.
   [[nodiscard]] bool moved_since_last(std::size_t camera, const Eigen::VectorXd& q);
   /// Counts a picture. @return whether the background has changed with the turn
   /// @param turned_rad  what turned() said

@@ -12,8 +12,8 @@ namespace bodyschema {
 
 /// How the robot is told from what lies behind it.
 enum class SegmentationMethod {
-  kAuto,               ///< anything: backgrounds learned where they hold, colours on both sides of the predicted outline
-  kSingleColour,       ///< background of one colour, with a slow gradient of light
+  kAuto,          ///< anything: backgrounds learned where they hold, colours on both sides of the predicted outline
+  kSingleColour,  ///< background of one colour, with a slow gradient of light
   kBackgroundPicture,  ///< still cameras, a picture of the background is given
   kLearnedBackground,  ///< still cameras, the background is learned from noisy frames
   kStatistics,         ///< anything: colour statistics on both sides of the predicted outline
