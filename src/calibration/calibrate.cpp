@@ -38,6 +38,9 @@ constexpr double kLeastFound = 0.6;
 /// Physical. A link of which less is found is hidden in the pictures, and what is left must be most of the robot.
 constexpr double kHardlyFound = 0.3, kLeastSeen = 0.6;
 constexpr double kNear_px = 2.5;  ///< physical, px of a 320x240 picture: residuals of outlines that belong together
+/// Physical, px of a 320x240 picture, median: masks that are made about a prediction follow it, right or wrong; those
+/// about the right one end at the robot itself.
+constexpr double kOwnMasks_px = 1.0;
 constexpr double kBeyondBelief_sd = 4.0;    ///< statistical
 constexpr double kDisagreement = 4.0;       ///< statistical: mean NIS per direction
 constexpr std::size_t kFewestPostures = 3;  ///< fewer cannot disagree
@@ -503,6 +506,14 @@ class Calibrator {
                  fmt::format("Not converged: {:.0f} % of the predicted outline lies near an edge of the robot in the "
                              "pictures, expected at least {:.0f} %; check masks, robot and cameras' intrinsics.",
                              100.0 * found.share * found.seen, 100.0 * kLeastFound));
+    }
+    const double after_px = result_.outline_px.after / picture_unit(rig_.cameras.front().intrinsics);
+    if (pipeline_.masks_need_estimates() && after_px > kOwnMasks_px) {
+      return say(CalibrationState::kNotConverged,
+                 fmt::format("Not converged: the masks were made about a prediction of the robot and lie {:.1f} px off "
+                             "the result, so that one of the two is wrong; give masks (vision.method: given) or say "
+                             "better where the cameras are.",
+                             result_.outline_px.after));
     }
     if (only_ < kOnly) {
       return say(CalibrationState::kNotConverged,

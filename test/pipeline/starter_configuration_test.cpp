@@ -378,8 +378,7 @@ TEST_F(StarterConfiguration, AMovingRecordingWithoutMasksLearnsItsBackground) {
   EXPECT_EQ(still.section("vision").text("method"), "statistics");
   EXPECT_FALSE(still.section("estimator").section("state").has("latency"));
 
-  stills.write("joints.csv",
-               "posture,time_s,joint1,joint2,joint3,joint4,joint5,joint6,joint7\n0,10,0,0,0,0,0,0,0\n");
+  stills.write("joints.csv", "posture,time_s,joint1,joint2,joint3,joint4,joint5,joint6,joint7\n0,10,0,0,0,0,0,0,0\n");
   o.out = folder_ / "moving";
   EXPECT_TRUE(write_starter_configuration(o).usable);
   const auto moving = Configuration::load(o.out / "estimator.yaml");
