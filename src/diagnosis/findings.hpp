@@ -38,8 +38,12 @@ class Findings {
   /// What is left of every picture, predicted from the other blocks.
   HeldoutError remainders(const LogAbout& log, const BlockRegression& base, Which which);
   void describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
-  /// Whether a cause moves less than what matters, all else that was found of its joint together with it.
+  /// Whether a cause moves less than what matters, all else that was found of its joint together with it. Beside the
+  /// final model: when it was taken in, others may have had a part of it that were dropped since.
   [[nodiscard]] bool is_small(const LogAbout& log, const BlockRegression& all, std::size_t cause);
+  /// What columns of the base move, m: offsets and nuisances fitted anew without them, as the answer would be then.
+  [[nodiscard]] double size_m(const LogAbout& log, const BlockRegression& all,
+                              const std::vector<Eigen::Index>& columns);
   void find_class(const BlockRegression& all, std::size_t cause, const std::vector<Candidate>& candidates,
                   DiagnosedCause& out);
   void exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);

@@ -17,7 +17,6 @@ struct FoundCause {
   Microseconds from = 0;                       ///< of a slip
   double begin_s = 0.0, duration_s = 0.0;      ///< of a drift
   std::vector<std::vector<double>> amounts{};  ///< of a free curve
-  bool small = false;                          ///< it moves less than what matters: not named, but in the model
   [[nodiscard]] bool generic() const { return !variable.empty(); }
 };
 
