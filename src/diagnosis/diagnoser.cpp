@@ -250,25 +250,6 @@ class Diagnoser {
     return best;
   }
 
-  /// What it moves, the joints' offsets fitted anew; of a nuisance, all that it departs from what is believed of it.
-  Size size_of(const Field& field, const Trial& trial) {
-    const auto& candidate = *trial.candidate;
-    Eigen::VectorXd amount = trial.heldout.estimate.tail(candidate.columns.size());
-    if (!candidate.generic()) {
-      const auto nuisance = search_.refits() ? search_.columns_of(candidate.cause) : std::vector<Eigen::Index>{};
-      if (!nuisance.empty() && static_cast<Eigen::Index>(nuisance.size()) != amount.size()) return {};
-      if (!nuisance.empty()) amount = search_.state().x()(nuisance);
-    }
-    const auto joints = search_.state().joints();
-    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(joints, joints), B = Eigen::MatrixXd::Zero(joints, amount.size());
-    for (std::size_t b = 0; b < field.base.blocks(); ++b) {
-      H += field.base.parts()[b].H.topLeftCorner(joints, joints);
-      B += candidate.columns.B[b].topRows(joints);
-    }
-    H.diagonal() += field.base.precision().head(joints);
-    return search_.size_of(field.log, directions_of(fit_, field.log, candidate), amount, -H.ldlt().solve(B * amount));
-  }
-
   bool take(const Field& field, const Trial& trial) {
     const auto& candidate = *trial.candidate;
     FoundCause cause{.name = candidate.cause, .variable = candidate.variable, .from = candidate.from};
@@ -277,8 +258,6 @@ class Diagnoser {
     cause.duration_s = end - begin;
     cause.amounts = candidate.amounts;
     cause.columns = static_cast<std::size_t>(candidate.columns.size());
-    cause.size = size_of(field, trial);
-    cause.small = cause.size.metres() < options_.matters_m;
     return search_.add(cause, trial.heldout.estimate, field.base.size());
   }
 

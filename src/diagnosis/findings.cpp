@@ -227,36 +227,26 @@ void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candi
   exclude(log, all, candidates);
 }
 
-bool Findings::is_small(const LogAbout& log, const BlockRegression& all, std::size_t cause) {
-  const auto& found = search_.causes()[cause];
-  if (!found.small || found.name.joint.empty()) return found.small;
-  std::vector<Eigen::Index> columns;
-  std::size_t pieces = 0;
-  for (std::size_t c = 0; c < search_.causes().size(); ++c) {
-    const auto& other = search_.causes()[c];
-    if (other.name.joint != found.name.joint) continue;
-    if (!other.small) return true;  // that one says what is wrong with the joint
-    const auto more = search_.columns_of(c);
-    columns.insert(columns.end(), more.begin(), more.end());
-    ++pieces;
-  }
-  if (pieces < 2) return true;
-  return size_of(log, all, columns, values_of(search_, columns) + all.step()(columns)).metres() < options_.matters_m;
+Size Findings::size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns) {
+  return size_of(log, all, columns, values_of(search_, columns) + all.step()(columns));
 }
 
 Size Findings::size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns,
                        const Eigen::VectorXd& amount) {
-  const auto joints = search_.state().joints();
-  Eigen::MatrixXd H = all.precision().head(joints).asDiagonal(), B = Eigen::MatrixXd::Zero(joints, amount.size());
+  const auto kept = all_but(all.size(), columns);
+  Eigen::MatrixXd H = all.precision()(kept).asDiagonal();
+  Eigen::MatrixXd B = Eigen::MatrixXd::Zero(H.rows(), amount.size());
   for (const auto& block : all.parts()) {
-    H += block.H.topLeftCorner(joints, joints);
-    B += block.H.topRows(joints)(Eigen::all, columns);
+    H += block.H(kept, kept);
+    B += block.H(kept, columns);
   }
+  Eigen::VectorXd of_base = Eigen::VectorXd::Zero(search_.state().size());
+  of_base(kept) = -H.ldlt().solve(B * amount);
   std::vector<std::vector<Direction>> directions(log.base.size());
   for (std::size_t p = 0; p < directions.size(); ++p) {
     for (const auto i : columns) directions[p].push_back(log.base[p][static_cast<std::size_t>(i)]);
   }
-  return search_.size_of(log, directions, amount, -H.ldlt().solve(B * amount));
+  return search_.size_of(log, directions, amount, of_base);
 }
 
 void Findings::add_estimated(const LogAbout& log, const BlockRegression& all, const std::string& kind,
@@ -320,6 +310,21 @@ DiagnosedParameter Findings::parameter_of(const LogAbout& log, const EffectParam
   return {parameter.name, parameter.unit, value / unit, {(value - half) / unit, (value + half) / unit}, sd / unit};
 }
 
+bool Findings::is_small(const LogAbout& log, const BlockRegression& all, std::size_t cause) {
+  const auto& joint = search_.causes()[cause].name.joint;
+  auto columns = search_.columns_of(cause);
+  if (size_of(log, all, columns).metres() >= options_.matters_m) return false;
+  if (joint.empty()) return true;
+  const auto own = columns.size();
+  for (std::size_t c = 0; c < search_.causes().size(); ++c) {
+    if (c == cause || search_.causes()[c].name.joint != joint) continue;
+    const auto more = search_.columns_of(c);
+    if (size_of(log, all, more).metres() >= options_.matters_m) return true;  // that one says what is wrong with the joint
+    columns.insert(columns.end(), more.begin(), more.end());
+  }
+  return columns.size() == own || size_of(log, all, columns).metres() < options_.matters_m;
+}
+
 void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
                                const std::vector<Candidate>& candidates) {
   const auto& state = search_.state();
@@ -335,8 +340,9 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
     const double lost = reduced.base.heldout().loss.sum();
     cause.heldout_gain = lost > 0.0 ? std::max(0.0, 1.0 - loss / lost) : 0.0;
     cause.same = {found.name};
-    cause.hand_mm = 1e3 * found.size.hand_m;
-    cause.outline_px = found.size.outline_px;
+    const auto size = size_of(log, all, columns);
+    cause.hand_mm = 1e3 * size.hand_m;
+    cause.outline_px = size.outline_px;
     if (!found.generic()) {
       const auto effect = make_effect(found.name.name, {found.name.joint, found.name.source}, state.model().roles());
       std::size_t next = 0;

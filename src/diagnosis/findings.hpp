@@ -38,11 +38,15 @@ class Findings {
   /// What is left of every picture, predicted from the other blocks.
   HeldoutError remainders(const LogAbout& log, const BlockRegression& base, Which which);
   void describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
-  /// Whether a cause moves less than what matters, all else that was found of its joint together with it.
+  /// Whether a cause moves less than what matters, all else that was found of its joint together with it. Beside the
+  /// final model: when it was taken in, others may have had a part of it that were dropped since.
   [[nodiscard]] bool is_small(const LogAbout& log, const BlockRegression& all, std::size_t cause);
-  /// What some of the base's columns move by so much, the joints' offsets fitted anew.
+  /// What columns of the base move by so much: offsets and nuisances fitted anew without them, as the answer would be
+  /// then.
   [[nodiscard]] Size size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns,
                              const Eigen::VectorXd& amount);
+  /// ... by what was found.
+  [[nodiscard]] Size size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns);
   /// An effect of the state against a model that knows no effect of its kind: of joints of one kind that move the
   /// pictures alike the one is taken that explains most.
   void add_estimated(const LogAbout& log, const BlockRegression& all, const std::string& kind,

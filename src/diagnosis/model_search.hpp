@@ -27,8 +27,6 @@ struct FoundCause {
   double begin_s = 0.0, duration_s = 0.0;      ///< of a drift
   std::vector<std::vector<double>> amounts{};  ///< of a free curve
   std::size_t columns = 0;                     ///< how many parameters are fitted
-  Size size{};                                 ///< when it was found
-  bool small = false;                          ///< it moves less than what matters: not named, but in the model
   [[nodiscard]] bool generic() const { return !variable.empty(); }
 };
 

@@ -47,7 +47,10 @@ TEST(ManyHiddenFaults, EachIsNamedWithItsSize) {
   } kCases[] = {{"backlash:joint=r_elbow,value=1.5", {"backlash", "r_elbow", ""}, "width", 1.5},
                 {"encoder_gain:joint=r_elbow,value=4", {"encoder_gain", "r_elbow", ""}, "gain", 4.0},
                 {"latency:value=40", {"latency", "", ""}, "delay", 40.0},
-                {"slip:joint=r_elbow,value=5,at=17", {"slip", "r_elbow", ""}, "step", 5.0}};
+                {"slip:joint=r_elbow,value=5,at=17", {"slip", "r_elbow", ""}, "step", 5.0},
+                // Judged when they were taken in, beside what was dropped since, these were too small to matter.
+                {"camera_skew:value=-75", {"camera_skew", "", ""}, "skew", -75.0},
+                {"mesh_scale:part=hand,value=2.9", {"mesh_scale", "", "r_hand"}, "scale", 2.9}};
   for (const auto& c : kCases) {
     const auto report = answer({c.fault});
     EXPECT_EQ(report.causes.size(), 1u) << report.sentence;

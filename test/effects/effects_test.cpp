@@ -119,8 +119,8 @@ TEST(Catalogue, EveryParameterHasItsMeaningInTheHandbook) {
       last = &p;
     }
     EXPECT_TRUE(row.starts_with(begin + names + " " + last->unit + " | "))
-        << "docs/diagnosis_reference.md: expected a row '" << begin << names << " " << last->unit << " | meaning |', found '"
-        << row << "'";
+        << "docs/diagnosis_reference.md: expected a row '" << begin << names << " " << last->unit
+        << " | meaning |', found '" << row << "'";
   }
 }
 
