@@ -69,19 +69,20 @@ bool named(const LiveFindings& findings, const std::string& effect) {
 }
 
 TEST(LiveDiagnosis, NamesWhatIsWrongWhileTheRobotRuns) {
-  const auto said = listen("latency:value=80", 32.0);
+  const auto said = listen("encoder_gain:joint=r_elbow,value=5", 36.0);
   ASSERT_FALSE(said.news.empty());
   const auto& last = said.news.back();
-  ASSERT_TRUE(named(last, "latency")) << said.per_frame.back();
+  ASSERT_TRUE(named(last, "encoder_gain")) << said.per_frame.back();
   EXPECT_GT(last.blocks, 8u);
   EXPECT_GT(last.z_threshold, 3.0);
   const auto& finding = last.causes.front();
   EXPECT_GT(finding.z, last.z_threshold);
   EXPECT_GT(finding.hand_mm, 0.5) << "what does not matter is not named";
-  ASSERT_EQ(finding.effect, "latency");
+  ASSERT_EQ(finding.effect, "encoder_gain");
+  EXPECT_EQ(finding.joint, "r_elbow");
   ASSERT_EQ(finding.parameters.size(), 1u);
-  EXPECT_EQ(finding.parameters[0].unit, "ms");
-  EXPECT_NEAR(finding.parameters[0].value, 80.0, 8.0);
+  EXPECT_EQ(finding.parameters[0].unit, "%");
+  EXPECT_NEAR(finding.parameters[0].value, 5.0, 1.0);
   // Only what two looks agree about is said.
   EXPECT_TRUE(said.news.front().causes.empty());
 }
