@@ -15,7 +15,7 @@ constexpr Seconds kStart(60.0);
 TEST(LiveDiagnosis, AReplaySaysWhatTheServiceSaid) {
   if (const auto why = why_no_lcm(); !why.empty()) GTEST_SKIP() << why;
   const Scratch scratch;
-  const std::string url = private_lcm_url();
+  const std::string url = own_lcm_url();
   Listener listener(url);
   Process service({"bodyschemad", "--config", reach_configuration(), "--lcm-url", url, "--estimates",
                    (scratch / "live.jsonl").string(), "--record", (scratch / "live.lcmlog").string(),

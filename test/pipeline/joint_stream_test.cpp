@@ -1,4 +1,4 @@
-#include "joint_stream.hpp"
+#include "bodyschema/pipeline/joint_stream.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/observation/joint_motion.hpp"
 
-namespace bodyschema::diagnosis {
+namespace bodyschema {
 namespace {
 
 constexpr Microseconds kPeriod = 10'000;
@@ -113,4 +113,4 @@ TEST(JointStream, AQuickArmMovesWhileTheHeadIsRead) {
 }
 
 }  // namespace
-}  // namespace bodyschema::diagnosis
+}  // namespace bodyschema
