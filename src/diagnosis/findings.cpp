@@ -240,7 +240,7 @@ Size Findings::size_of(const LogAbout& log, const BlockRegression& all, const st
     H += block.H(kept, kept);
     B += block.H(kept, columns);
   }
-  Eigen::VectorXd of_base = Eigen::VectorXd::Zero(search_.state().size());
+  Eigen::VectorXd of_base = Eigen::VectorXd::Zero(all.size());
   of_base(kept) = -H.ldlt().solve(B * amount);
   std::vector<std::vector<Direction>> directions(log.base.size());
   for (std::size_t p = 0; p < directions.size(); ++p) {
