@@ -245,14 +245,8 @@ struct Estimator::Impl {
   /// no wrong minimum has led astray.
   bool starts_swapped(const Observation& observation) {
     if (particles_only() || eye_order.settled() || !scorer.can_be_exchanged()) return false;
-    Eigen::VectorXd x = model.state().prior_mean();
-    model.settle(frame, x);
-    const auto n = static_cast<std::size_t>(first_guesses.cols());
-    for (std::size_t i = 0; i < n; ++i) {
-      x.head(joints) = first_guesses.col(static_cast<Eigen::Index>(i));
-      scorer.place(x, i);
-    }
-    const Eigen::VectorXd distances = scorer.score(n);
+    const Eigen::VectorXd distances = score_first_guesses();
+    const auto n = static_cast<std::size_t>(distances.size());
     const Observation exchanged = with_eyes_exchanged(observation);
     scorer.observe(exchanged, frame, options.min_mask_share);
     const Eigen::VectorXd other_distances = scorer.score(n);
@@ -263,6 +257,18 @@ struct Estimator::Impl {
     scorer.observe(observation, frame, options.min_mask_share);
     if (worth_searches) as_they_are = nearest_distance(observation, distances);
     return eye_order.exchanged(as_they_are, other_distance);
+  }
+
+  /// Distances of the arms that the search began with, in the frame that the scorer has.
+  Eigen::VectorXd score_first_guesses() {
+    Eigen::VectorXd x = model.state().prior_mean();
+    model.settle(frame, x);
+    const auto n = static_cast<std::size_t>(first_guesses.cols());
+    for (std::size_t i = 0; i < n; ++i) {
+      x.head(joints) = first_guesses.col(static_cast<Eigen::Index>(i));
+      scorer.place(x, i);
+    }
+    return scorer.score(n);
   }
 
   /// Of the arm that is found from the first guesses, with these distances, in a frame that the scorer has.
@@ -422,7 +428,12 @@ struct Estimator::Impl {
 
   [[nodiscard]] std::vector<Hypothesis> hypotheses(const OutlineFit& fit) {
     std::vector<Hypothesis> list;
-    const auto anew = starts_from(filter.states(), distance, state, 3);
+    auto anew = starts_from(filter.states(), distance, state, 3);
+    if (young() && verdict != FrameVerdict::kAgrees) {
+      // What the first pictures were taken for has drawn the particles to itself, and may have been wrong.
+      const auto guesses = starts_from(first_guesses, score_first_guesses(), model.state().prior_mean(), 3);
+      anew.insert(anew.end(), guesses.begin(), guesses.end());
+    }
     std::vector<Eigen::Index> everything(static_cast<std::size_t>(state.size()));
     std::iota(everything.begin(), everything.end(), Eigen::Index{0});
     if (!young()) {

@@ -1,6 +1,6 @@
 # Run by ctest (see tests.cmake): what scripts/demo builds are the programs, and no test or benchmark.
 file(STRINGS ${SOURCE_DIR}/scripts/demo line REGEX "scripts/build release")
-string(REGEX REPLACE "^ *scripts/build release *" "" targets "${line}")
+string(REGEX REPLACE "^.*scripts/build release *" "" targets "${line}")
 separate_arguments(targets)
 list(SORT targets)
 list(SORT PROGRAMS)
