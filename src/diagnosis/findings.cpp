@@ -233,14 +233,15 @@ Size Findings::size_of(const LogAbout& log, const BlockRegression& all, const st
 
 Size Findings::size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns,
                        const Eigen::VectorXd& amount) {
-  const auto kept = all_but(all.size(), columns);
+  // The state's own: what is considered besides is nothing that an answer could take up.
+  const auto kept = all_but(search_.state().size(), columns);
   Eigen::MatrixXd H = all.precision()(kept).asDiagonal();
   Eigen::MatrixXd B = Eigen::MatrixXd::Zero(H.rows(), amount.size());
   for (const auto& block : all.parts()) {
     H += block.H(kept, kept);
     B += block.H(kept, columns);
   }
-  Eigen::VectorXd of_base = Eigen::VectorXd::Zero(all.size());
+  Eigen::VectorXd of_base = Eigen::VectorXd::Zero(search_.state().size());
   of_base(kept) = -H.ldlt().solve(B * amount);
   std::vector<std::vector<Direction>> directions(log.base.size());
   for (std::size_t p = 0; p < directions.size(); ++p) {
@@ -288,7 +289,7 @@ void Findings::add_estimated(const LogAbout& log, const BlockRegression& all, co
   if (cause.z < report_.z_threshold) return;
   const Eigen::VectorXd estimate = scores.estimate();
   const auto size = size_of(log, all, columns[best], estimate);
-  if (size.metres() < options_.matters_m) return;
+  if (!matters(size)) return;
   cause.hand_mm = 1e3 * size.hand_m;
   cause.outline_px = size.outline_px;
   cause.heldout_gain = loss > 0.0 ? most / loss : 0.0;
@@ -310,19 +311,25 @@ DiagnosedParameter Findings::parameter_of(const LogAbout& log, const EffectParam
   return {parameter.name, parameter.unit, value / unit, {(value - half) / unit, (value + half) / unit}, sd / unit};
 }
 
+bool Findings::matters(const Size& size) const {
+  // Nearer than this no picture places an outline: what moves them less has nothing in the pictures to stand on.
+  const double floor_px = options_.noise.floor_px * picture_unit(fit_.log().rig().cameras.front().intrinsics);
+  return size.metres() >= options_.matters_m && size.outline_px >= floor_px;
+}
+
 bool Findings::is_small(const LogAbout& log, const BlockRegression& all, std::size_t cause) {
   const auto& joint = search_.causes()[cause].name.joint;
   auto columns = search_.columns_of(cause);
-  if (size_of(log, all, columns).metres() >= options_.matters_m) return false;
+  if (matters(size_of(log, all, columns))) return false;
   if (joint.empty()) return true;
   const auto own = columns.size();
   for (std::size_t c = 0; c < search_.causes().size(); ++c) {
     if (c == cause || search_.causes()[c].name.joint != joint) continue;
     const auto more = search_.columns_of(c);
-    if (size_of(log, all, more).metres() >= options_.matters_m) return true;  // that one says what is wrong with the joint
+    if (matters(size_of(log, all, more))) return true;  // that one says what is wrong with the joint
     columns.insert(columns.end(), more.begin(), more.end());
   }
-  return columns.size() == own || size_of(log, all, columns).metres() < options_.matters_m;
+  return columns.size() == own || !matters(size_of(log, all, columns));
 }
 
 void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,

@@ -41,6 +41,9 @@ class Findings {
   /// Whether a cause moves less than what matters, all else that was found of its joint together with it. Beside the
   /// final model: when it was taken in, others may have had a part of it that were dropped since.
   [[nodiscard]] bool is_small(const LogAbout& log, const BlockRegression& all, std::size_t cause);
+  /// Whether a cause of this size is worth a name: it moves hand or outline by what matters, and outlines by more than
+  /// any picture gets wrong.
+  [[nodiscard]] bool matters(const Size& size) const;
   /// What columns of the base move by so much: offsets and nuisances fitted anew without them, as the answer would be
   /// then.
   [[nodiscard]] Size size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns,

@@ -76,10 +76,10 @@ TEST(Verdict, KeepsTheLettersOfAJointsName) {
 TEST(Verdict, SaysWhenAJointSlippedAndOverWhichSpanItDrifted) {
   DiagnosedCause slip, drift;
   slip.cause = {"slip", "elbow", ""};
-  slip.parameters = {{"step", "deg", 2.0, {1.9, 2.1}, Microseconds{1'600'000'048'700'000}}};
+  slip.parameters = {{"step", "deg", 2.0, {1.9, 2.1}, 0.05, Microseconds{1'600'000'048'700'000}}};
   slip.same = {slip.cause};
   drift.cause = {"drift", "prosup", ""};
-  drift.parameters = {{"change", "deg/log", 2.0, {1.9, 2.1}, Microseconds{1'600'000'003'500'000}, 50.5}};
+  drift.parameters = {{"change", "deg/log", 2.0, {1.9, 2.1}, 0.05, Microseconds{1'600'000'003'500'000}, 50.5}};
   drift.same = {drift.cause};
   auto report = report_of({slip, drift});
   report.begin_utime = 1'600'000'000'000'000;
