@@ -16,8 +16,8 @@ namespace bodyschema {
 /// with an index, and a summary at the end, so that readers can seek. Checksums are left at zero,
 /// which the format defines as "not available". One thread.
 ///
-/// Written here because Debian has no package of the official library, and Python's would need PyPI for every export. The
-/// official reader reads it back in a test (test/install/mcap_reads_back.py).
+/// Written here because Debian has no package of the official library, and Python's would need PyPI for every export.
+/// The official reader reads it back in a test (test/install/mcap_reads_back.py).
 class McapWriter {
  public:
   using SchemaId = std::uint16_t;
