@@ -215,6 +215,7 @@ void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candi
   for (auto& sample : report_.samples) sample.noise = sample.after;
   report_.extended_model = state.model();
   covariance_ = all.covariance();
+  report_.extended_model->set_uncertainty(uncertainty());
   for (Eigen::Index j = 0; j < state.joints(); ++j) {
     const auto& name = state.parameters()[static_cast<std::size_t>(j)].name;
     const double offset = degrees(state.x()[j]), half = quantile(log) * degrees(std::sqrt(covariance_(j, j)));
@@ -225,6 +226,18 @@ void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candi
   check_outlines(log);
   check_surplus(log);
   exclude(log, all, candidates);
+}
+
+/// Of the model's parameters together: a length that a camera's place trades with is known no better than that place.
+ModelUncertainty Findings::uncertainty() const {
+  ModelUncertainty result;
+  const auto& state = search_.state();
+  for (const auto& p : state.parameters()) {
+    const auto& effect = state.model()[p.ref.effect];
+    result.parameters.push_back({effect.name(), effect.target(), p.ref.parameter});
+  }
+  result.covariance = covariance_.topLeftCorner(state.size(), state.size());
+  return result;
 }
 
 Size Findings::size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns) {

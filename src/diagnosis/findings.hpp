@@ -67,6 +67,7 @@ class Findings {
   /// What the pictures show and the model lacks.
   void check_surplus(const LogAbout& log);
   [[nodiscard]] double quantile(const LogAbout& log) const;
+  [[nodiscard]] ModelUncertainty uncertainty() const;
 
   LogFit& fit_;
   ModelSearch& search_;

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <future>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -98,6 +99,7 @@ class Window {
     const double k = static_cast<double>(++looks_);
     diagnosis_.level = options_.level * 6.0 / (kPi * kPi * k * k);
     const auto report = diagnosis::look(fit_, state_, at_, noise_, tolerances_, diagnosis_);
+    about_ = report.extended_model;
     found.blocks = report.blocks;
     found.z_threshold = report.z_threshold;
     if (std::any_of(report.causes.begin(), report.causes.end(), [](const auto& c) { return c.implausible; })) {
@@ -117,11 +119,11 @@ class Window {
   void forget() {
     log_.forget_before(INT64_MAX);
     at_.reset();
+    about_.reset();
     found_ = {};
   }
 
-  /// Linearises what is new about the present estimate, and moves what is known of the rest there. False: there is
-  /// nothing new.
+  /// Measures what is new and moves what is known of the rest to the present estimate. False: there is nothing new.
   bool take(const Batch& batch) {
     state_.set(batch.x);
     const auto newest = at_ ? at_->instants.back().utime : 0;
@@ -148,19 +150,31 @@ class Window {
     search.robust_px = 0.0;
     for (const auto& noise : noise_) search.robust_px = std::max(search.robust_px, noise.robust_px());
     const bool known = at_ != nullptr;
-    auto now = std::make_shared<LinearLog>(
-        fit_.linearise(state_.model(), all_, search, fresh, [&](std::size_t p, std::span<const OutlinePoint> points) {
+    // Where outlines are to be expected by all that is suspected; what they say is kept about the state alone.
+    auto measured =
+        fit_.linearise(with_suspects(), all_, search, fresh, [&](std::size_t p, std::span<const OutlinePoint> points) {
           const auto camera = log_.pictures()[p].camera;
           const double unit = picture_unit(log_.rig().cameras[camera].intrinsics);
           if (known) noise_[camera].add(points, unit, kNoisePictures);
-        }));
-    if (at_) move_along(*now);
+        });
+    auto now = std::make_shared<LinearLog>(fit_.predict(state_.model(), all_));
+    for (const auto p : fresh) move(measured, p, *now, p);
+    if (at_) keep_old(*now);
     at_ = std::move(now);
   }
 
-  /// Evidence about one prediction, about another: quadratics keep their shape.
-  void move_along(LinearLog& now) {
-    Eigen::VectorXd before(fit_.coordinates().size()), after(before.size());
+  /// The state as it is now, and beside it what the last look named or suspected.
+  [[nodiscard]] ErrorModel with_suspects() const {
+    ErrorModel model = state_.model();
+    for (std::size_t e = 0; about_ && e < about_->size(); ++e) {
+      const Effect& effect = std::as_const(*about_)[e];
+      if (model.find(effect.name(), effect.target()) == nullptr) model.add(effect.clone());
+    }
+    return model;
+  }
+
+  /// What earlier looks measured of pictures that are still in the window.
+  void keep_old(LinearLog& now) {
     std::size_t old = 0;
     for (std::size_t p = 0; p < now.instants.size(); ++p) {
       const auto same = [&](std::size_t o) {
@@ -168,14 +182,20 @@ class Window {
       };
       while (old < at_->instants.size() && !same(old)) ++old;
       if (old == at_->instants.size()) return;  // what follows is new
-      auto& evidence = now.evidence[p] = std::move(at_->evidence[old]);
-      fit_.coordinates().read(at_->corrections[old], before);
-      fit_.coordinates().read(now.corrections[p], after);
-      const Eigen::VectorXd step = after - before;
-      const Eigen::VectorXd pull = evidence.A * step;
-      evidence.square += step.dot(pull) - 2.0 * step.dot(evidence.b);
-      evidence.b -= pull;
+      move(*at_, old, now, p);
     }
+  }
+
+  /// Evidence about one prediction, about another: quadratics keep their shape.
+  void move(LinearLog& from, std::size_t f, LinearLog& to, std::size_t t) {
+    Eigen::VectorXd before(fit_.coordinates().size()), after(before.size());
+    auto& evidence = to.evidence[t] = std::move(from.evidence[f]);
+    fit_.coordinates().read(from.corrections[f], before);
+    fit_.coordinates().read(to.corrections[t], after);
+    const Eigen::VectorXd step = after - before;
+    const Eigen::VectorXd pull = evidence.A * step;
+    evidence.square += step.dot(pull) - 2.0 * step.dot(evidence.b);
+    evidence.b -= pull;
   }
 
   LiveDiagnosisOptions options_;
@@ -186,7 +206,8 @@ class Window {
   LogFit fit_;
   std::vector<std::uint32_t> all_;  ///< coordinates
   std::vector<OutlineNoise> noise_;
-  std::shared_ptr<LinearLog> at_;  ///< the window about the estimate at the last look
+  std::shared_ptr<LinearLog> at_;    ///< the window about the estimate at the last look
+  std::optional<ErrorModel> about_;  ///< the model by the last look, with what is merely suspected
   std::size_t looks_ = 0;
   LiveFindings found_;  ///< by the last look
 };

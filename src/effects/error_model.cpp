@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -27,11 +28,18 @@ std::string scalar(const YAML::Node& entry, const char* key) {
   return node && node.IsScalar() ? node.Scalar() : std::string();
 }
 
-void read_parameters(const YAML::Node& entry, const std::string& origin, Effect& effect) {
-  const auto node = entry["parameters"];
-  if (!node || !node.IsMap()) {
-    fail(origin, entry.Mark(), effect.description() + ": expected a mapping 'parameters'");
+double read_number(const YAML::Node& node, const std::string& origin, const std::string& what) {
+  double value = 0.0;
+  if (!YAML::convert<double>::decode(node, value) || !std::isfinite(value)) {
+    fail(origin, node.Mark(),
+         what + " is '" + (node.IsScalar() ? node.Scalar() : "...") + "', expected a finite number");
   }
+  return value;
+}
+
+/// Numbers by the keys of an effect's parameters, SI: `take(parameter, value)` for each.
+template <class Take>
+void read_keys(const YAML::Node& node, const std::string& origin, const Effect& effect, Take take) {
   std::vector<std::string> keys;
   for (const auto& p : effect.parameters()) keys.push_back(p.key());
   for (const auto& item : node) {
@@ -41,27 +49,97 @@ void read_parameters(const YAML::Node& entry, const std::string& origin, Effect&
       fail(origin, item.first.Mark(),
            effect.description() + ": unknown parameter '" + key + "'; did you mean '" + nearest_name(key, keys) + "'?");
     }
-    auto& p = effect.parameters()[static_cast<std::size_t>(at - keys.begin())];
-    double value = 0.0;
-    if (!YAML::convert<double>::decode(item.second, value) || !std::isfinite(value)) {
-      fail(origin, item.second.Mark(),
-           effect.description() + ": '" + key + "' is '" + (item.second.IsScalar() ? item.second.Scalar() : "...") +
-               "', expected a finite number");
-    }
-    p.value = value * p.si_per_unit;
+    const auto i = static_cast<std::size_t>(at - keys.begin());
+    const double value = read_number(item.second, origin, effect.description() + ": '" + key + "'");
+    take(i, value * effect.parameters()[i].si_per_unit);
   }
-  for (std::size_t i = 0; i < keys.size(); ++i) {
-    if (!node[keys[i]]) {
-      fail(origin, node.Mark(), effect.description() + ": expected parameter '" + keys[i] + "'");
+}
+
+void read_parameters(const YAML::Node& entry, const std::string& origin, Effect& effect) {
+  const auto node = entry["parameters"];
+  if (!node || !node.IsMap()) {
+    fail(origin, entry.Mark(), effect.description() + ": expected a mapping 'parameters'");
+  }
+  read_keys(node, origin, effect, [&](std::size_t i, double value) { effect.parameters()[i].value = value; });
+  for (const auto& p : std::as_const(effect).parameters()) {
+    if (!node[p.key()]) fail(origin, node.Mark(), effect.description() + ": expected parameter '" + p.key() + "'");
+  }
+}
+
+/// Standard deviations of an effect's parameters, where it has some.
+void read_sds(const YAML::Node& entry, const std::string& origin, const Effect& effect,
+              std::vector<ModelUncertainty::Parameter>& parameters, std::vector<double>& sds) {
+  const auto node = entry["sd"];
+  if (!node) return;
+  if (!node.IsMap()) fail(origin, node.Mark(), effect.description() + ": 'sd': expected a mapping");
+  read_keys(node, origin, effect, [&](std::size_t i, double sd) {
+    const auto& p = effect.parameters()[i];
+    if (sd < 0.0 || !p.fitted) {
+      fail(origin, node.Mark(),
+           effect.description() + ": sd of '" + p.key() + "': expected " +
+               (p.fitted ? "0 or more" : "none, it is a setting"));
+    }
+    if (sd <= 0.0) return;
+    parameters.push_back({effect.name(), effect.target(), i});
+    sds.push_back(sd);
+  });
+}
+
+/// Correlations of parameters that have a standard deviation, each with those before it; none: they are independent.
+Eigen::MatrixXd read_covariance(const YAML::Node& node, const std::string& origin, const std::vector<double>& sds) {
+  const auto n = static_cast<Eigen::Index>(sds.size());
+  const auto sd = Eigen::Map<const Eigen::VectorXd>(sds.data(), n);
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(n, n);
+  if (node) {
+    const std::string expected =
+        "'correlations': expected " + std::to_string(std::max<Eigen::Index>(0, n - 1)) +
+        " rows, each parameter with an sd against all before it, in the order of this file, from -1 to 1";
+    if (!node.IsSequence() || static_cast<Eigen::Index>(node.size()) != std::max<Eigen::Index>(0, n - 1)) {
+      fail(origin, node.Mark(), expected);
+    }
+    for (Eigen::Index i = 1; i < n; ++i) {
+      const auto row = node[static_cast<std::size_t>(i - 1)];
+      if (!row.IsSequence() || static_cast<Eigen::Index>(row.size()) != i) fail(origin, row.Mark(), expected);
+      for (Eigen::Index j = 0; j < i; ++j) {
+        const double r = read_number(row[static_cast<std::size_t>(j)], origin, "a correlation");
+        if (std::abs(r) > 1.0) fail(origin, row.Mark(), expected);
+        correlation(i, j) = correlation(j, i) = r;
+      }
+    }
+    constexpr double kRounding = 1e-6;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation, Eigen::EigenvaluesOnly);
+    if (n > 0 && eigen.eigenvalues()(0) < -kRounding) {
+      fail(origin, node.Mark(), "'correlations': contradict each other, expected those of some numbers");
     }
   }
+  return sd.asDiagonal() * correlation * sd.asDiagonal();
+}
+
+/// Standard deviations of an effect's parameters that have some, and which of the uncertain ones they are.
+void write_sds(YAML::Emitter& out, const Effect& effect, const ModelUncertainty& known,
+               std::vector<Eigen::Index>& order) {
+  bool begun = false;
+  for (std::size_t p = 0; p < effect.parameters().size(); ++p) {
+    const auto& all = known.parameters;
+    const auto at = std::find(all.begin(), all.end(), ModelUncertainty::Parameter{effect.name(), effect.target(), p});
+    if (at == all.end()) continue;
+    const auto i = static_cast<Eigen::Index>(at - all.begin());
+    const double sd = std::sqrt(std::max(0.0, known.covariance(i, i)));
+    if (sd <= 0.0) continue;
+    if (!begun) out << YAML::Key << "sd" << YAML::Value << YAML::BeginMap;
+    begun = true;
+    const auto& parameter = effect.parameters()[p];
+    out << YAML::Key << parameter.key() << YAML::Value << sd / parameter.si_per_unit;
+    order.push_back(i);
+  }
+  if (begun) out << YAML::EndMap;
 }
 
 }  // namespace
 
 ErrorModel::ErrorModel(JointRoles roles) : roles_(std::move(roles)) {}
 
-ErrorModel::ErrorModel(const ErrorModel& other) : roles_(other.roles_) {
+ErrorModel::ErrorModel(const ErrorModel& other) : roles_(other.roles_), uncertainty_(other.uncertainty_) {
   for (const auto& effect : other.effects_) effects_.push_back(effect->clone());
 }
 
@@ -94,20 +172,21 @@ ErrorModel ErrorModel::parse(const std::string& yaml, const JointRoles& roles, c
   }
   for (const auto& item : root) {
     const auto key = item.first.Scalar();
-    if (key != "version" && key != "effects") {
-      fail(origin, item.first.Mark(),
-           "unknown key '" + key + "'; did you mean '" + nearest_name(key, {"version", "effects"}) + "'?");
+    const std::vector<std::string> known = {"version", "effects", "correlations"};
+    if (std::find(known.begin(), known.end(), key) == known.end()) {
+      fail(origin, item.first.Mark(), "unknown key '" + key + "'; did you mean '" + nearest_name(key, known) + "'?");
     }
   }
   ErrorModel model(roles);
   const auto list = root["effects"];
   if (!list) return model;
   if (!list.IsSequence()) fail(origin, list.Mark(), "'effects': expected a list");
+  std::vector<double> sds;
   for (const auto& entry : list) {
     if (!entry.IsMap()) fail(origin, entry.Mark(), "'effects': expected entries with a 'name'");
     for (const auto& item : entry) {
       const auto key = item.first.Scalar();
-      const std::vector<std::string> known = {"name", "joint", "source", "parameters"};
+      const std::vector<std::string> known = {"name", "joint", "source", "parameters", "sd"};
       if (std::find(known.begin(), known.end(), key) == known.end()) {
         fail(origin, item.first.Mark(), "unknown key '" + key + "'; did you mean '" + nearest_name(key, known) + "'?");
       }
@@ -123,12 +202,15 @@ ErrorModel ErrorModel::parse(const std::string& yaml, const JointRoles& roles, c
       fail(origin, entry.Mark(), effect->description() + ": listed twice");
     }
     read_parameters(entry, origin, *effect);
+    read_sds(entry, origin, *effect, model.uncertainty_.parameters, sds);
     model.add(std::move(effect));
   }
+  model.uncertainty_.covariance = read_covariance(root["correlations"], origin, sds);
   return model;
 }
 
 std::string ErrorModel::to_yaml() const {
+  std::vector<Eigen::Index> order;  // of the uncertain parameters
   YAML::Emitter out;
   out.SetDoublePrecision(16);
   out << YAML::Comment(
@@ -148,9 +230,27 @@ std::string ErrorModel::to_yaml() const {
     for (const auto& p : std::as_const(*effect).parameters()) {
       out << YAML::Key << p.key() << YAML::Value << p.in_unit();
     }
-    out << YAML::EndMap << YAML::EndMap;
+    out << YAML::EndMap;
+    write_sds(out, std::as_const(*effect), uncertainty_, order);
+    out << YAML::EndMap;
   }
-  out << YAML::EndSeq << YAML::EndMap;
+  out << YAML::EndSeq;
+  if (order.size() > 1) {
+    const auto& covariance = uncertainty_.covariance;
+    const Eigen::VectorXd sd = covariance.diagonal().cwiseSqrt();
+    out << YAML::Newline
+        << YAML::Comment("of each parameter that has an sd with all those before it, in the order of this file")
+        << YAML::Key << "correlations" << YAML::Value << YAML::BeginSeq;
+    for (std::size_t i = 1; i < order.size(); ++i) {
+      out << YAML::Flow << YAML::BeginSeq;
+      for (std::size_t j = 0; j < i; ++j) {
+        out << std::clamp(covariance(order[i], order[j]) / (sd[order[i]] * sd[order[j]]), -1.0, 1.0);
+      }
+      out << YAML::EndSeq;
+    }
+    out << YAML::EndSeq;
+  }
+  out << YAML::EndMap;
   return std::string(out.c_str()) + "\n";
 }
 

@@ -37,12 +37,7 @@ ErrorModel without_offsets(const ErrorModel& known) {
   for (std::size_t e = 0; e < known.size(); ++e) {
     if (known[e].name() != "joint_offset") model.add(known[e].clone());
   }
-  return model;
-}
-
-ErrorModel effects_of(const std::vector<Belief>& beliefs, const JointRoles& roles) {
-  ErrorModel model(roles);
-  for (const auto& belief : beliefs) model.add(belief.effect, belief.target);
+  model.set_uncertainty(known.uncertainty());
   return model;
 }
 
@@ -111,11 +106,12 @@ struct Estimator::Impl {
   Impl(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& robot_setup, const StereoRig& stereo_rig,
        const Beliefs& beliefs, const EstimatorOptions& estimator_options, const ErrorModel& known)
       : options(estimator_options), setup(robot_setup), rig(stereo_rig),
-        model(robot, setup, rig, known.roles(), State(without_offsets(known), beliefs.state),
-              effects_of(beliefs.tolerances, known.roles())),
-        joints(model.state().joints()), scorer(model, silhouette_model(*robot, setup), rig.intrinsics(),
-                                               options.silhouette, options.filter.particles, !particles_only()),
-        filter(joints, options.filter), memory(memory_layout(model.state(), beliefs.tolerances), options.memory),
+        state_at_first(without_offsets(known), beliefs.state),
+        considered(Considered::beside(state_at_first, beliefs.tolerances)),
+        model(robot, setup, rig, known.roles(), state_at_first, considered.effects), joints(model.state().joints()),
+        scorer(model, silhouette_model(*robot, setup), rig.intrinsics(), options.silhouette, options.filter.particles,
+               !particles_only()),
+        filter(joints, options.filter), memory(memory_layout(model.state(), considered), options.memory),
         fitter(model, scorer, options, rig.cameras.size()), state(model.state().prior_mean()),
         in_frame(memory.estimate()), stalled(joints) {
     first_guesses = filter.states();
@@ -731,7 +727,7 @@ struct Estimator::Impl {
     hand_own += J.leftCols(n) * shape * J.leftCols(n).transpose();
     if (J.cols() == n) return hand_own;
     const Eigen::MatrixXd T =
-        (J.leftCols(n) * in_frame.sensitivity + J.rightCols(J.cols() - n)) * memory.layout().considered_sd.asDiagonal();
+        (J.leftCols(n) * in_frame.sensitivity + J.rightCols(J.cols() - n)) * memory.layout().considered_root;
     return hand_own + T * T.transpose();
   }
   /// What outlines that are wrong alike in all postures do to the state: as if one average posture alone were known,
@@ -779,6 +775,8 @@ struct Estimator::Impl {
   EstimatorOptions options;
   RobotSetup setup;
   StereoRig rig;
+  State state_at_first;
+  Considered considered;
   FrameModel model;
   Frame frame;                           ///< the last one; its observation is gone once `step` has returned
   Eigen::Index joints;                   ///< estimated ones; the first entries of a state

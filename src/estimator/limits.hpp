@@ -11,6 +11,10 @@ inline constexpr double kLeastMatched = 0.5;
 inline constexpr double kFewestPoints = 20.0;
 /// Physical. rad; Gauss-Newton goes no further at once: sines are no longer linear.
 inline constexpr double kMaxStep_rad = 0.2;
+/// Physical. px of a 320x240 picture: no picture places an outline better, and a fit that moves it by less has arrived.
+inline constexpr double kSettled_px = 0.1;
+/// Computational. More steps than these towards it are not taken.
+inline constexpr int kMostSteps = 8;
 /// Physical. Pictures after which the measured noise has forgotten one: light and background change in minutes.
 inline constexpr double kNoisePictures = 100.0;
 

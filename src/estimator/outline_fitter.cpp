@@ -1,6 +1,7 @@
 #include "outline_fitter.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "limits.hpp"
 
@@ -44,15 +45,28 @@ void OutlineFitter::look(const Frame& frame, double search_px, bool last, Outlin
   fit.quadratic.b += fit.quadratic.A.leftCols(n) * fit.x;
 }
 
+double OutlineFitter::take_step(const Frame& frame, const PostureMemory& memory, double search_px, OutlineFit& fit) {
+  const Eigen::Index n = fit.x.size();
+  look(frame, search_px, false, fit);
+  Eigen::VectorXd step = memory.solve_with(fit.quadratic) - fit.x;
+  const double largest = step.head(model_.state().joints()).cwiseAbs().maxCoeff();
+  if (largest > limits::kMaxStep_rad) step *= limits::kMaxStep_rad / largest;
+  fit.x += step;
+  double square = 0.0, weight = 0.0;
+  for (const auto& seen : fit.evidence.cameras) {
+    if (seen.weight <= 0.0) continue;
+    square += step.dot(seen.A.topLeftCorner(n, n) * step);
+    weight += seen.weight;
+  }
+  return weight > 0.0 ? std::sqrt(square / weight) : 0.0;
+}
+
 void OutlineFitter::refine(const Frame& frame, const PostureMemory& memory, std::span<const double> search_px,
-                           OutlineFit& fit) {
-  const Eigen::Index joints = model_.state().joints();
-  for (const double reach_px : search_px) {
-    look(frame, reach_px, false, fit);
-    Eigen::VectorXd step = memory.solve_with(fit.quadratic) - fit.x;
-    const double largest = step.head(joints).cwiseAbs().maxCoeff();
-    if (largest > limits::kMaxStep_rad) step *= limits::kMaxStep_rad / largest;
-    fit.x += step;
+                           int more_steps, OutlineFit& fit) {
+  double moved_px = 0.0;
+  for (const double reach_px : search_px) moved_px = take_step(frame, memory, reach_px, fit);
+  for (int i = 0; i < more_steps && moved_px > limits::kSettled_px; ++i) {
+    moved_px = take_step(frame, memory, search_px.back(), fit);
   }
   look(frame, search_px.back(), true, fit);
   fit.misfit = memory.distance(fit.x);
@@ -62,14 +76,15 @@ void OutlineFitter::refine(const Frame& frame, const PostureMemory& memory, std:
 OutlineFit OutlineFitter::follow(const Frame& frame, const PostureMemory& memory) {
   OutlineFit fit;
   fit.x = memory.estimate().x;
-  refine(frame, memory, kNear_px, fit);
+  refine(frame, memory, kNear_px, 0, fit);
   return fit;
 }
 
 OutlineFit OutlineFitter::follow_from(const Frame& frame, const Eigen::VectorXd& start, const PostureMemory& memory) {
   OutlineFit fit;
   fit.x = start;
-  refine(frame, memory, kWide_px, fit);
+  // What still moves would claim a place that it has not reached.
+  refine(frame, memory, kWide_px, limits::kMostSteps, fit);
   return fit;
 }
 

@@ -61,7 +61,11 @@ class OutlineFitter {
   void forget_shape() { shape_.forget(); }
 
  private:
-  void refine(const Frame& frame, const PostureMemory& memory, std::span<const double> search_px, OutlineFit& fit);
+  /// @param more_steps  at most, at the last distance, until the outline has settled
+  void refine(const Frame& frame, const PostureMemory& memory, std::span<const double> search_px, int more_steps,
+              OutlineFit& fit);
+  /// @return how far it moves the outline, px of a 320x240 picture, rms
+  double take_step(const Frame& frame, const PostureMemory& memory, double search_px, OutlineFit& fit);
   void look(const Frame& frame, double search_px, bool last, OutlineFit& fit);
   [[nodiscard]] std::vector<OutlineSearch> searches(double search_px, bool last) const;
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <random>
 
+#include "bodyschema/core/write_file.hpp"
 #include "bodyschema/evaluation/statistics.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/simulator/outline_noise.hpp"
@@ -195,8 +196,21 @@ Json log_json(const char* row, const TrialRecord& trial, const HonestyLog& log, 
   return json;
 }
 
+/// Frame by frame, a line a log: where what was said did not hold.
+std::string frames_line(const char* row, const TrialRecord& trial, const HonestyLog& log) {
+  Json json = {{"row", row}, {"seed", trial.seed}};
+  for (std::size_t f = 0; f < log.size(); ++f) {
+    json["state"].push_back(to_string(trial.contestants[0].frames[f].state));
+    json["hand_error_mm"].push_back(log[f].hand_error_mm ? Json(*log[f].hand_error_mm) : Json(nullptr));
+    json["hand_sd_mm"].push_back(log[f].hand_sd_mm);
+    json["worst_offset_sd"].push_back(
+        log[f].offset_error_deg.cwiseQuotient(log[f].offset_sd_deg).cwiseAbs().maxCoeff());
+  }
+  return json.dump() + '\n';
+}
+
 void add_healthy(ExperimentContext& context, const Configuration& estimator, int count, Json& summary,
-                 std::vector<HonestyLog>& all) {
+                 std::vector<HonestyLog>& all, std::string& frames) {
   std::vector<Contestant> contestants = {{"tolerances", options_for(context, "best")},
                                          {"exact", options_for(context, "best")}};
   contestants[1].beliefs = Pipeline(context.simulated).beliefs();
@@ -211,6 +225,7 @@ void add_healthy(ExperimentContext& context, const Configuration& estimator, int
   for (const auto& record : records) {
     with.push_back(honesty_log(record, 0));
     summary["each_log"].push_back(log_json("healthy", record, with.back()));
+    frames += frames_line("healthy", record, with.back());
     without.push_back(honesty_log(record, 1));
   }
   const auto figures = honesty_figures(pointers(with)), exact = honesty_figures(pointers(without));
@@ -236,7 +251,8 @@ void run_honesty(ExperimentContext& context, int most_logs) {
                                "converged", "wrong", "logs", "95 % hold", "else", "published", "sd/error");
   Json& summary = context.summary["honesty"];
   std::vector<HonestyLog> all, usual, twice;
-  add_healthy(context, estimator, static_cast<int>(healthy), summary, all);
+  std::string frames;
+  add_healthy(context, estimator, static_cast<int>(healthy), summary, all, frames);
 
   // Errors in turn; of each, every fourth log draws at twice the size.
   const auto row_of = [](std::size_t t) { return t % kRows.size(); };
@@ -257,7 +273,9 @@ void run_honesty(ExperimentContext& context, int most_logs) {
   for (std::size_t t = 0; t < records.size(); ++t) {
     logs_of.push_back(honesty_log(records[t], 0));
     summary["each_log"].push_back(log_json(kRows[row_of(t)].key, records[t], logs_of.back(), is_twice(t)));
+    frames += frames_line(kRows[row_of(t)].key, records[t], logs_of.back());
   }
+  replace_file(context.options.out / "honesty_frames.jsonl", frames);
 
   double worst_ratio = summary["healthy"]["sd_to_error_median"];
   for (std::size_t r = 0; r < kRows.size(); ++r) {

@@ -1,5 +1,7 @@
 #include "bodyschema/evaluation/trial.hpp"
 
+#include <mutex>
+
 #include "bodyschema/evaluation/statistics.hpp"
 #include "bodyschema/pipeline/hand_errors.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
@@ -37,7 +39,13 @@ FrameRecord record_of(const Estimate& estimate, Estimator& estimator, const Obse
 
 TrialRecord run_trial(const TrialSetting& setting, const std::vector<Contestant>& contestants, std::uint64_t seed,
                       const std::function<void(double)>& progress) {
-  Pipeline pipeline(setting.estimator);
+  auto pipeline_of = [&] {
+    // Trials run side by side, and their configurations are views of one document: reading notes which keys are known.
+    static std::mutex reading;
+    const std::lock_guard lock(reading);
+    return Pipeline(setting.estimator);
+  };
+  Pipeline pipeline = pipeline_of();
   std::vector<Estimator> estimators;
   for (const auto& contestant : contestants) {
     EstimatorOptions options = contestant.options;

@@ -69,7 +69,7 @@ std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std:
                                     const std::function<TrialSetting(std::uint64_t)>& setting_of,
                                     const std::vector<Contestant>& contestants) {
   std::vector<TrialRecord> records(static_cast<std::size_t>(trials));
-  // Configuration is read by one thread only: settings are made before the work is shared out.
+  // Settings are made before the work is shared out: configuration is read by one thread at a time.
   std::vector<TrialSetting> settings;
   for (int t = 0; t < trials; ++t) {
     settings.push_back(setting_of(context.options.seed + static_cast<std::uint64_t>(t)));

@@ -14,12 +14,6 @@ MemoryOptions unfading(MemoryOptions options) {
   return options;
 }
 
-ErrorModel effects_of(const std::vector<Belief>& beliefs, const JointRoles& roles) {
-  ErrorModel model(roles);
-  for (const auto& belief : beliefs) model.add(belief.effect, belief.target);
-  return model;
-}
-
 std::vector<ParameterRef> refs_of(const State& state) {
   std::vector<ParameterRef> refs;
   for (const auto& parameter : state.parameters()) refs.push_back(parameter.ref);
@@ -39,7 +33,7 @@ Eigen::VectorXd posture_of(const Eigen::VectorXd& q, const JointRoles& roles) {
   return result;
 }
 
-MemoryLayout memory_layout(const State& state, const std::vector<Belief>& considered) {
+MemoryLayout memory_layout(const State& state, const Considered& considered) {
   MemoryLayout layout;
   layout.prior_mean = state.prior_mean();
   layout.prior_sd = state.prior_sd();
@@ -47,15 +41,13 @@ MemoryLayout memory_layout(const State& state, const std::vector<Belief>& consid
     const auto& effect = state.model()[parameter.ref.effect];
     layout.is_joint.push_back(effect.name() == "joint_offset" || effect.name() == "head_offset");
   }
-  std::vector<double> sds;
-  for (const auto& belief : considered) sds.insert(sds.end(), belief.sd.begin(), belief.sd.end());
-  layout.considered_sd = Eigen::Map<const Eigen::VectorXd>(sds.data(), static_cast<Eigen::Index>(sds.size()));
+  layout.considered_root = considered.root;
   return layout;
 }
 
-BatchFit::BatchFit(LogFit& fit, State state, const std::vector<Belief>& considered, const BatchSettings& settings)
-    : fit_(fit), state_(std::move(state)), beside_(effects_of(considered, fit.log().roles())), settings_(settings),
-      memory_(memory_layout(state_, considered), unfading(settings.memory)),
+BatchFit::BatchFit(LogFit& fit, State state, const std::vector<Belief>& tolerances, const BatchSettings& settings)
+    : fit_(fit), state_(std::move(state)), beside_(Considered::beside(state_, tolerances)), settings_(settings),
+      memory_(memory_layout(state_, beside_), unfading(settings.memory)),
       noise_(fit.log().rig().cameras.size(), OutlineNoise(settings.noise)) {
   group_postures();
 }
@@ -123,9 +115,9 @@ void BatchFit::measure(const std::vector<std::size_t>& pictures) {
 void BatchFit::fuse(const std::vector<std::size_t>& pictures) {
   constexpr int kRounds = 4;
   const auto refs = refs_of(state_);
-  auto beside = fitted_parameters(beside_);
+  auto beside = fitted_parameters(beside_.effects);
   auto coordinates = fit_.moved_by(state_.model(), refs);
-  const auto more = fit_.moved_by(beside_, beside);
+  const auto more = fit_.moved_by(beside_.effects, beside);
   coordinates.insert(coordinates.end(), more.begin(), more.end());
   std::sort(coordinates.begin(), coordinates.end());
   coordinates.erase(std::unique(coordinates.begin(), coordinates.end()), coordinates.end());
@@ -137,7 +129,7 @@ void BatchFit::fuse(const std::vector<std::size_t>& pictures) {
   for (int round = 0; round < kRounds; ++round) {
     at_ = fit_.linearise(state_.model(), coordinates, {kFinest_px, settings_.spacing_px, robust_px}, pictures);
     misfit_ = fit_.misfit(at_, at_.sampled());
-    const auto own = fit_.directions(at_, state_.model(), refs), other = fit_.directions(at_, beside_, beside);
+    const auto own = fit_.directions(at_, state_.model(), refs), other = fit_.directions(at_, beside_.effects, beside);
     std::vector<Eigen::Index> position(static_cast<std::size_t>(fit_.coordinates().size()), -1);
     for (std::size_t i = 0; i < coordinates.size(); ++i) position[coordinates[i]] = static_cast<Eigen::Index>(i);
     const Eigen::VectorXd x = state_.x();

@@ -109,18 +109,14 @@ const Coordinates& LogFit::coordinates() const {
   return workers_.front()->coordinates();
 }
 
-LinearLog LogFit::linearise(const ErrorModel& model, std::span<const std::uint32_t> coordinates,
-                            const OutlineSearch& search, std::span<const std::size_t> pictures,
-                            const std::function<void(std::size_t, std::span<const OutlinePoint>)>& look) {
+LinearLog LogFit::predict(const ErrorModel& model, std::span<const std::uint32_t> coordinates) {
   LinearLog result;
   const auto count = log_.pictures().size();
   result.coordinates.assign(coordinates.begin(), coordinates.end());
   result.instants.resize(count);
   result.corrections.assign(count, model.roles().no_corrections());
   result.evidence.resize(count);
-  std::vector<char> wanted(count, pictures.empty() ? 1 : 0);
-  for (const auto p : pictures) wanted[p] = 1;
-
+  for (auto& evidence : result.evidence) evidence.clear(static_cast<Eigen::Index>(coordinates.size()));
   auto playing = model;
   playing.forget();
   bool sags = false;
@@ -139,17 +135,23 @@ LinearLog LogFit::linearise(const ErrorModel& model, std::span<const std::uint32
         result.instants[p].payload_torque = sagged.payload_torque;
         playing.corrections(result.instants[p], result.corrections[p]);
       });
+  return result;
+}
 
+LinearLog LogFit::linearise(const ErrorModel& model, std::span<const std::uint32_t> coordinates,
+                            const OutlineSearch& search, std::span<const std::size_t> pictures,
+                            const std::function<void(std::size_t, std::span<const OutlinePoint>)>& look) {
+  LinearLog result = predict(model, coordinates);
+  const auto count = log_.pictures().size();
+  std::vector<char> wanted(count, pictures.empty() ? 1 : 0);
+  for (const auto p : pictures) wanted[p] = 1;
   OutlineSearch weighed = search;
   weighed.part_weight = part_weight_;
   std::atomic<std::size_t> next{0};
   const auto work = [&](OutlineMeasurement& measurement) {
     for (std::size_t p; (p = next++) < count;) {
       auto& evidence = result.evidence[p];
-      if (wanted[p] == 0) {
-        evidence.clear(static_cast<Eigen::Index>(coordinates.size()));
-        continue;
-      }
+      if (wanted[p] == 0) continue;
       const auto& picture = log_.pictures()[p];
       measurement.linearise(log_.edges(p), picture.joints.q, result.corrections[p], picture.camera, coordinates,
                             weighed, evidence);

@@ -54,7 +54,7 @@ Quadratic PostureMemory::sum(const Block* without) const {
 }
 
 MemoryEstimate PostureMemory::solve(const Quadratic& total) const {
-  const auto n = layout_.estimated(), m = layout_.considered_sd.size();
+  const auto n = layout_.estimated(), m = layout_.considered_root.rows();
   MemoryEstimate result;
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(total.A.topLeftCorner(n, n));
   result.x = ldlt.solve(total.b.head(n));
@@ -65,8 +65,8 @@ MemoryEstimate PostureMemory::solve(const Quadratic& total) const {
 }
 
 Eigen::MatrixXd PostureMemory::with_considered(const MemoryEstimate& estimate) const {
-  if (layout_.considered_sd.size() == 0) return estimate.own;
-  const Eigen::MatrixXd T = estimate.sensitivity * layout_.considered_sd.asDiagonal();
+  if (layout_.considered_root.rows() == 0) return estimate.own;
+  const Eigen::MatrixXd T = estimate.sensitivity * layout_.considered_root;
   return estimate.own + T * T.transpose();
 }
 
@@ -113,7 +113,7 @@ MemoryEstimate PostureMemory::in_posture() const {
 }
 
 MemoryEstimate PostureMemory::in_posture(const Quadratic& frame) const {
-  const auto n = layout_.estimated(), m = layout_.considered_sd.size();
+  const auto n = layout_.estimated(), m = layout_.considered_root.rows();
   const MemoryEstimate before = in_posture();
   // What is considered errs alike in memory and frame: it is carried through, not added.
   const Eigen::MatrixXd precision = inverse(before.own);
@@ -127,7 +127,7 @@ MemoryEstimate PostureMemory::in_posture(const Quadratic& frame) const {
 }
 
 PostureMemory::Step PostureMemory::step(const Quadratic& frame, std::span<const Eigen::Index> parameters) const {
-  const auto n = layout_.estimated(), m = layout_.considered_sd.size();
+  const auto n = layout_.estimated(), m = layout_.considered_root.rows();
   const auto& known = estimate();
   const Quadratic seen = with_posture_error(frame);
   // In units of what was believed.
@@ -148,9 +148,8 @@ PostureMemory::Step PostureMemory::step(const Quadratic& frame, std::span<const 
   Eigen::MatrixXd S = Eigen::MatrixXd::Identity(told, told) + to_x * known.own * to_x.transpose();
   if (m > 0) {
     const Eigen::MatrixXd E = root.cwiseInverse().asDiagonal() *
-                                  (U.transpose() * (scale * seen.A.topRightCorner(n, m))) *
-                                  layout_.considered_sd.asDiagonal() +
-                              to_x * known.sensitivity * layout_.considered_sd.asDiagonal();
+                                  (U.transpose() * (scale * seen.A.topRightCorner(n, m))) * layout_.considered_root +
+                              to_x * known.sensitivity * layout_.considered_root;
     S += E * E.transpose();
   }
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(S);

@@ -1,5 +1,6 @@
 #include "bodyschema/evidence/state.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <utility>
 
@@ -66,6 +67,22 @@ std::string name_of(const Effect& effect, const EffectParameter& parameter) {
   const auto fitted =
       std::count_if(effect.parameters().begin(), effect.parameters().end(), [](const auto& p) { return p.fitted; });
   return effect.description() + (fitted > 1 ? " " + parameter.name : "");
+}
+
+const Effect* find(const ErrorModel& model, const std::string& name, const EffectTarget& target) {
+  for (std::size_t e = 0; e < model.size(); ++e) {
+    if (model[e].name() == name && model[e].target() == target) return &model[e];
+  }
+  return nullptr;
+}
+
+/// R with R R' = C; its units may differ by orders of magnitude.
+Eigen::MatrixXd root_of(const Eigen::MatrixXd& C) {
+  if (C.isDiagonal()) return C.diagonal().cwiseSqrt().asDiagonal();
+  const Eigen::VectorXd sd = C.diagonal().cwiseMax(1e-300).cwiseSqrt();
+  const Eigen::MatrixXd correlation = sd.cwiseInverse().asDiagonal() * C * sd.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation);
+  return sd.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 }  // namespace
@@ -155,6 +172,52 @@ void State::set(const Eigen::VectorXd& x) {
     auto& parameter = model_[ref.effect].parameters()[ref.parameter];
     parameter.value = std::max(x[i], parameter.at_least);
   }
+}
+
+Considered Considered::beside(const State& state, const std::vector<Belief>& tolerances) {
+  Considered result{ErrorModel(state.model().roles()), {}};
+  for (const auto& belief : tolerances) result.effects.add(belief.effect, belief.target);
+  const auto& known = state.model().uncertainty();
+  std::vector<bool> open(known.parameters.size());
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    const auto& p = known.parameters[i];
+    open[i] = p.effect != "joint_offset" && state.find(p.effect, p.target, p.parameter) < 0;
+    if (!open[i] || result.effects.find(p.effect, p.target) != nullptr) continue;
+    // As it is known: some effects move nothing until they have a time, or a size.
+    const auto* own = find(state.model(), p.effect, p.target);
+    result.effects.add(own != nullptr ? own->clone() : make_effect(p.effect, p.target, state.model().roles()));
+  }
+  const auto refs = fitted_parameters(result.effects);
+  const auto position = [&](const std::string& effect, const EffectTarget& target, std::size_t parameter) {
+    return std::find_if(refs.begin(), refs.end(),
+                        [&](const ParameterRef& ref) {
+                          const auto& other = std::as_const(result.effects)[ref.effect];
+                          return ref.parameter == parameter && other.name() == effect && other.target() == target;
+                        }) -
+           refs.begin();
+  };
+  const auto n = static_cast<Eigen::Index>(refs.size());
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
+  for (const auto& belief : tolerances) {
+    std::size_t fitted = 0;
+    const auto* effect = find(result.effects, belief.effect, belief.target);
+    for (std::size_t p = 0; p < effect->parameters().size(); ++p) {
+      if (!effect->parameters()[p].fitted) continue;
+      const auto k = position(belief.effect, belief.target, p);
+      covariance(k, k) += belief.sd[fitted] * belief.sd[fitted];
+      ++fitted;
+    }
+  }
+  for (std::size_t i = 0; i < open.size(); ++i) {
+    for (std::size_t j = 0; j < open.size(); ++j) {
+      if (!open[i] || !open[j]) continue;
+      const auto &a = known.parameters[i], &b = known.parameters[j];
+      covariance(position(a.effect, a.target, a.parameter), position(b.effect, b.target, b.parameter)) +=
+          known.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  }
+  result.root = root_of(covariance);
+  return result;
 }
 
 Eigen::Index State::find(const std::string& effect, const EffectTarget& target, std::size_t parameter) const {

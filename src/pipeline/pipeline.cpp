@@ -37,6 +37,7 @@ ErrorModel effects_beside(const std::optional<ErrorModel>& model, const std::sha
       rest.add(effect.clone());
     }
   }
+  if (model) rest.set_uncertainty(model->uncertainty());
   return rest;
 }
 

@@ -41,6 +41,45 @@ TEST(ErrorModel, ReadsBackWhatItWrote) {
   }
 }
 
+TEST(ErrorModel, ReadsBackHowWellItIsKnown) {
+  ErrorModel model(roles());
+  model.add("joint_offset", {"elbow", ""});
+  model.add("latency", {}).parameters()[0].value = 0.05;
+  model.add("focal_length", {});
+  Eigen::Matrix3d covariance;
+  covariance << 4e-4, 1e-5, 0.0, 1e-5, 1e-6, -2e-6, 0.0, -2e-6, 9e-6;
+  model.set_uncertainty(
+      {{{"focal_length", {}, 0}, {"latency", {}, 0}, {"joint_offset", {"elbow", ""}, 0}}, covariance});
+  const auto text = model.to_yaml();
+  EXPECT_THAT(text, HasSubstr("sd:\n      delay_ms: 1\n"));
+  const auto again = ErrorModel::parse(text, roles()).uncertainty();
+  ASSERT_EQ(again.parameters.size(), 3u);
+  EXPECT_EQ(again.parameters[0].effect, "joint_offset") << "in the order of the file";
+  EXPECT_EQ(again.parameters[2].effect, "focal_length");
+  const Eigen::Matrix3d reversed = covariance.reverse();
+  EXPECT_LT((again.covariance - reversed).cwiseAbs().maxCoeff(), 1e-15);
+  EXPECT_TRUE(full_model().uncertainty().parameters.empty()) << "who names none takes it for exact";
+}
+
+TEST(ErrorModel, RefusesAnUncertaintyThatIsNone) {
+  const std::string head = "version: 1\neffects:\n  - name: latency\n    parameters: {delay_ms: 1}\n    sd: ";
+  const auto refused = [](const std::string& yaml, const char* what) {
+    EXPECT_THAT([&] { ErrorModel::parse(yaml, roles()); }, ThrowsMessage<ConfigurationError>(HasSubstr(what))) << yaml;
+  };
+  refused(head + "{delay_ms: -1}\n", "expected 0 or more");
+  refused(head + "{delay: 1}\n", "did you mean 'delay_ms'?");
+  refused(head + "1\n", "expected a mapping");
+  const std::string two = head + "{delay_ms: 1}\n  - name: focal_length\n    parameters: {scale_percent: 0}\n" +
+                          "    sd: {scale_percent: 1}\ncorrelations: ";
+  EXPECT_NO_THROW(ErrorModel::parse(two + "[[0.5]]\n", roles()));
+  for (const char* wrong : {"1\n", "[]\n", "[[0.1, 0.2]]\n", "[[1.5]]\n", "[[a]]\n"}) {
+    refused(two + wrong, wrong == std::string("[[a]]\n") ? "expected a finite number" : "expected 1 rows");
+  }
+  const std::string three = two.substr(0, two.find("correlations")) +
+                            "  - name: mesh_scale\n    parameters: {scale_percent: 0}\n    sd: {scale_percent: 1}\n";
+  refused(three + "correlations: [[0.9], [0.9, -0.9]]\n", "contradict each other");
+}
+
 TEST(ErrorModel, CopiesAreIndependent) {
   auto model = full_model();
   auto copy = model;

@@ -112,12 +112,13 @@ TEST_F(BatchFitOfOwnRobot, PosturesAreToldByArmAndHead) {
 
 TEST_F(BatchFitOfOwnRobot, AMemorysLayoutIsThatOfStateAndTolerances) {
   const State state(roles_, beliefs({{"head_offset", {"neck_yaw", ""}, {0.05}}, {"mesh_scale", {}, {0.01}}}));
-  const auto layout = memory_layout(state, {{"baseline", {}, {0.001}}, {"base_shift", {}, {0.002, 0.003, 0.0}}});
+  const auto layout = memory_layout(
+      state, Considered::beside(state, {{"baseline", {}, {0.001}}, {"base_shift", {}, {0.002, 0.003, 0.0}}}));
   EXPECT_EQ(layout.estimated(), 9);
   EXPECT_EQ(layout.size(), 13);
   const std::vector<bool> angles = {true, true, true, true, true, true, true, true, false};
   EXPECT_EQ(layout.is_joint, angles) << "offsets of arm and head";
-  EXPECT_NEAR(layout.considered_sd(2), 0.003, 1e-15);
+  EXPECT_NEAR(layout.considered_root(2, 2), 0.003, 1e-15);
 }
 
 }  // namespace

@@ -17,8 +17,8 @@ class MemoryOfTwo : public testing::Test {
     layout_.prior_mean = Eigen::Vector2d::Zero();
     layout_.prior_sd = Eigen::Vector2d(1.0, 2.0);
     layout_.is_joint = {joints, joints};
-    layout_.considered_sd =
-        Eigen::Map<Eigen::VectorXd>(considered.data(), static_cast<Eigen::Index>(considered.size()));
+    layout_.considered_root =
+        Eigen::Map<Eigen::VectorXd>(considered.data(), static_cast<Eigen::Index>(considered.size())).asDiagonal();
   }
   [[nodiscard]] PostureMemory memory() const { return {layout_, options_}; }
   /// A frame that measures `direction`'(x, considered) = value with a standard deviation.

@@ -160,5 +160,38 @@ TEST(State, BesideAKnownModelItsCentreIsWhatIsKnown) {
   EXPECT_EQ(state.model().find("latency", {})->parameters()[0].value, 0.03);
 }
 
+/// What whoever found an extended model left open of it is considered with its correlations, but for what is estimated.
+TEST(Considered, IsWhatIsToleratedAndWhatAKnownModelLeavesOpen) {
+  ErrorModel known(roles());
+  known.add("link_length", {"prosup", ""}).parameters()[0].value = 0.004;
+  known.add("latency", {}).parameters()[0].value = 0.03;
+  Eigen::MatrixXd covariance(4, 4);
+  covariance << 4e-6, 3e-6, 0.0, 1e-8,  //
+      3e-6, 9e-6, 0.0, 0.0,             //
+      0.0, 0.0, 1e-4, 0.0,              //
+      1e-8, 0.0, 0.0, 1e-6;
+  known.set_uncertainty({{{"link_length", {"prosup", ""}, 0},
+                          {"latency", {}, 0},
+                          {"joint_offset", {"elbow", ""}, 0},
+                          {"focal_length", {}, 0}},
+                         covariance});
+  const auto offsets = read("    joint_offset: {sd_deg: 5}\n");
+  const auto all = Considered::beside(State(known, offsets), {{"latency", {}, {0.004}}, {"baseline", {}, {0.001}}});
+  ASSERT_EQ(all.effects.size(), 4u) << "latency, baseline, link and focal length; offsets are found anew";
+  EXPECT_EQ(all.effects[2].parameters()[0].value, 0.004) << "as it is known";
+  const Eigen::MatrixXd C = all.root * all.root.transpose();
+  EXPECT_NEAR(C(0, 0), 9e-6 + 16e-6, 1e-15) << "latency: what was left open, and what is tolerated besides";
+  EXPECT_NEAR(C(1, 1), 1e-6, 1e-15);
+  EXPECT_NEAR(C(2, 2), 4e-6, 1e-15);
+  EXPECT_NEAR(C(2, 0), 3e-6, 1e-15);
+  EXPECT_NEAR(C(3, 2), 1e-8, 1e-15) << "of the cameras, which the rig holds already";
+  EXPECT_NEAR(C(1, 0), 0.0, 1e-15);
+
+  const auto some =
+      Considered::beside(State(known, read("    joint_offset: {sd_deg: 5}\n    link_length: {sd_mm: 1}\n")), {});
+  EXPECT_EQ(some.effects.size(), 2u) << "one link is estimated";
+  EXPECT_EQ(Considered::beside(State(roles(), offsets), {}).root.size(), 0);
+}
+
 }  // namespace
 }  // namespace bodyschema

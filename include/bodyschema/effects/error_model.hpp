@@ -4,12 +4,25 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/effects/effect_kind.hpp"
 
 namespace bodyschema {
+
+/// How well parameters of a model are known together. Nothing else of it is uncertain.
+struct ModelUncertainty {
+  struct Parameter {
+    std::string effect;
+    EffectTarget target;
+    std::size_t parameter = 0;  ///< of the effect
+    friend bool operator==(const Parameter&, const Parameter&) = default;
+  };
+  std::vector<Parameter> parameters;
+  Eigen::MatrixXd covariance;  ///< SI
+};
 
 /// A list of effects with their parameters: what is known to be wrong with the model of a robot.
 /// The diagnosis writes one (`extended_model.yaml`); the daemon, replay and export load it, so that
@@ -44,6 +57,10 @@ class ErrorModel {
   void add(std::unique_ptr<Effect> effect);
   void remove(const std::string& name, const EffectTarget& target);
 
+  /// What whoever found these parameters left open of them; a model that names none is taken for exact.
+  [[nodiscard]] const ModelUncertainty& uncertainty() const { return uncertainty_; }
+  void set_uncertainty(ModelUncertainty uncertainty) { uncertainty_ = std::move(uncertainty); }
+
   /// Offsets held by the joint_offset effects (encoder = true + offset), radians, RobotModel order.
   [[nodiscard]] Eigen::VectorXd offsets() const;
 
@@ -59,6 +76,7 @@ class ErrorModel {
  private:
   JointRoles roles_;
   std::vector<std::unique_ptr<Effect>> effects_;
+  ModelUncertainty uncertainty_;
 };
 
 /// "backlash of r_elbow width 0.8 deg": fitted parameters only.

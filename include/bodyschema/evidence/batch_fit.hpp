@@ -25,8 +25,8 @@ struct BatchSettings {
 class BatchFit {
  public:
   /// @param state  where it starts; beliefs about it are its priors
-  /// @param considered  what may be wrong besides
-  BatchFit(LogFit& fit, State state, const std::vector<Belief>& considered, const BatchSettings& settings);
+  /// @param tolerances  what may be wrong besides
+  BatchFit(LogFit& fit, State state, const std::vector<Belief>& tolerances, const BatchSettings& settings);
 
   /// Where the fit begins; beliefs stay as they are.
   void start_at(const Eigen::VectorXd& x) { state_.set(x); }
@@ -56,7 +56,7 @@ class BatchFit {
 
   LogFit& fit_;
   State state_;
-  ErrorModel beside_;
+  Considered beside_;
   BatchSettings settings_;
   PostureMemory memory_;
   std::vector<OutlineNoise> noise_;
@@ -69,6 +69,6 @@ class BatchFit {
 /// Joint angles that tell one posture from another: arm and head.
 Eigen::VectorXd posture_of(const Eigen::VectorXd& q, const JointRoles& roles);
 /// What a memory about a state has to know.
-MemoryLayout memory_layout(const State& state, const std::vector<Belief>& considered);
+MemoryLayout memory_layout(const State& state, const Considered& considered);
 
 }  // namespace bodyschema

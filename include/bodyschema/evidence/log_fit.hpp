@@ -63,6 +63,8 @@ class LogFit {
   [[nodiscard]] PictureLog& log() { return log_; }
   [[nodiscard]] OutlineMeasurement& measurement() { return *workers_.front(); }
 
+  /// What a model says of every picture, with evidence of nothing seen.
+  LinearLog predict(const ErrorModel& model, std::span<const std::uint32_t> coordinates);
   /// Compares pictures with the predictions of a model.
   /// @param coordinates  wanted, by position
   /// @param pictures  which; empty: all. The others' evidence is that of nothing seen

@@ -27,11 +27,11 @@ struct MemoryLayout {
   Eigen::VectorXd prior_mean, prior_sd;  ///< of what is estimated, SI
   /// Which of these are angles of joints: what a posture gets wrong shows as if these were wrong in it.
   std::vector<bool> is_joint;
-  /// Standard deviations of what is not estimated but may be wrong all the same, SI: Schmidt's considered parameters
-  /// (Jazwinski 1970, section 8.4). Quadratics are over the estimated parameters, then these.
-  Eigen::VectorXd considered_sd;
+  /// What is not estimated but may be wrong all the same: Schmidt's considered parameters (Jazwinski 1970, section
+  /// 8.4). A root of their covariance, SI. Quadratics are over the estimated parameters, then these.
+  Eigen::MatrixXd considered_root;
   [[nodiscard]] Eigen::Index estimated() const { return prior_sd.size(); }
-  [[nodiscard]] Eigen::Index size() const { return prior_sd.size() + considered_sd.size(); }
+  [[nodiscard]] Eigen::Index size() const { return prior_sd.size() + considered_root.rows(); }
 };
 
 struct MemoryOptions {

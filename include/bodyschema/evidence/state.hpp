@@ -70,4 +70,14 @@ class State {
   Eigen::Index joints_ = 0;
 };
 
+/// What may be wrong beside a state: effects whose fitted parameters are not estimated, and how far off they may be.
+struct Considered {
+  ErrorModel effects;
+  Eigen::MatrixXd root;  ///< of the covariance of `effects`' fitted parameters, in their order, SI
+
+  /// What is tolerated, and what the state's own model leaves open of itself (ErrorModel::uncertainty) where the state
+  /// does not hold it.
+  static Considered beside(const State& state, const std::vector<Belief>& tolerances);
+};
+
 }  // namespace bodyschema
