@@ -57,7 +57,6 @@ class Diagnoser {
     if (!asked_) field();
     Findings(fit_, search_, options_, report_).name_causes(asked_->log, asked_->candidates);
     word_verdict(report_, fit_.log().roles());
-    report_.extended_model = with_suspects();
     return std::move(report_);
   }
 
@@ -283,59 +282,6 @@ class Diagnoser {
     refused_.push_back(search_.causes()[worst].name);
     search_.drop(worst);
     return true;
-  }
-
-  /// The state's model with the causes that were named, and with the known one that stands out most beside them, even
-  /// if not enough to be named: outlines that a model misses by much count little, and what is wrong shows its size
-  /// where it is taken into account.
-  [[nodiscard]] ErrorModel with_suspects() const {
-    ErrorModel model = search_.state().model();
-    for (const auto& cause : report_.causes) {
-      Eigen::VectorXd sizes(static_cast<Eigen::Index>(cause.parameters.size()));
-      std::vector<std::size_t> which;
-      Microseconds from = 0;
-      for (const auto& p : cause.parameters) {
-        const auto i = which.size();
-        sizes[static_cast<Eigen::Index>(i)] = p.estimate;
-        which.push_back(i);
-        from = p.from.value_or(from);
-      }
-      if (cause.cause.name != "unexplained") add_suspect(model, cause.cause, from, which, sizes, true);
-    }
-    const Candidate* most = nullptr;
-    for (const auto& candidate : asked_->candidates) {
-      if (candidate.generic() || candidate.z() < limits::kWorthATrial_z) continue;
-      if (candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
-      if (most == nullptr || candidate.z() > most->z()) most = &candidate;
-    }
-    if (most == nullptr || !is_plausible(*most, most->scores.estimate())) return model;
-    spdlog::debug("live diagnosis: suspects {}, z {:.1f}", most->cause.text(), most->z());
-    add_suspect(model, most->cause, most->from, most->parameters, most->scores.estimate(), false);
-    return model;
-  }
-
-  /// @param which  of the effect's fitted parameters
-  /// @param in_units  whether sizes are in the parameters' units, not SI
-  void add_suspect(ErrorModel& model, const CauseName& cause, Microseconds from, const std::vector<std::size_t>& which,
-                   const Eigen::VectorXd& sizes, bool in_units) const {
-    const EffectTarget target{cause.joint, cause.source};
-    if (model.find(cause.name, target) != nullptr) return;
-    auto effect = make_effect(cause.name, target, fit_.log().roles());
-    const auto timing = effect_kind(cause.name).timing;
-    if (timing == EffectTiming::kFromATime) effect->parameters()[1].value = seconds(from);
-    if (timing == EffectTiming::kOverTheLog) {
-      const auto [begin, end] = seen_span(fit_, asked_->log.at);
-      effect->parameters()[1].value = begin;
-      effect->parameters()[2].value = end - begin;
-    }
-    std::size_t fitted = 0;
-    for (auto& p : effect->parameters()) {
-      if (!p.fitted) continue;
-      const auto at = std::find(which.begin(), which.end(), fitted++);
-      if (at == which.end()) continue;
-      p.value = std::max(p.at_least, sizes[at - which.begin()] * (in_units ? p.si_per_unit : 1.0));
-    }
-    model.add(std::move(effect));
   }
 
   std::vector<Candidate> candidates_of_end() {

@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <cmath>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/core/error.hpp"
@@ -46,6 +47,14 @@ Json json_of(const DiagnosedParameter& p) {
   return j;
 }
 
+/// "12:03:07 UTC".
+std::string clock_time(Microseconds utime) {
+  const auto t = static_cast<std::time_t>(seconds(utime));
+  std::tm parts{};
+  gmtime_r(&t, &parts);
+  return fmt::format("{:02}:{:02}:{:02} UTC", parts.tm_hour, parts.tm_min, parts.tm_sec);
+}
+
 Json json_of(const DiagnosedCause& c) {
   Json j = json_of(c.cause);
   if (!c.variable.empty()) j["variable"] = c.variable;
@@ -87,6 +96,7 @@ std::string CauseName::text() const {
 
 std::string DiagnosedParameter::when(Microseconds log_begin) const {
   if (!from) return "";
+  if (log_begin == 0) return "at " + clock_time(*from);
   const double begin_s = seconds(*from - log_begin);
   if (!duration_s) return fmt::format("{:.1f} s into the log", begin_s);
   return fmt::format("from {:.1f} to {:.1f} s into the log", begin_s, begin_s + *duration_s);

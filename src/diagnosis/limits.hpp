@@ -7,14 +7,15 @@
 namespace bodyschema::diagnosis::limits {
 
 // Physical.
-constexpr double kFrom_px = 32.0;      ///< px of a 320x240 picture: outlines may lie so far off at first
-constexpr double kSearch_px = 8.0;     ///< ... and once near
-constexpr double kJump_rad = 0.14;     ///< between two pictures: the arm was moved from posture to posture
-constexpr double kFloor_px = 0.1;      ///< no picture places a flank nearer (OutlineNoise::Prior::floor_px)
-constexpr double kImplausible = 20.0;  ///< of an effect's typical size: no robot is so wrong
-constexpr double kLeastFound = 0.6;    ///< share of the outline that must be found where the robot is seen at all
-constexpr double kMostOfTheLog = 0.5;  ///< of the blocks: what is seen there beside the robot is no passer-by
-constexpr double kFlankFloors = 3.0;   ///< times kFloor_px: so far off a whole flank is not where a picture may put it
+constexpr double kFrom_px = 32.0;       ///< px of a 320x240 picture: outlines may lie so far off at first
+constexpr double kSearch_px = 8.0;      ///< ... and once near
+constexpr double kOneFrame_rad = 0.05;  ///< a joint's angle in one picture: 60 ms late at 50 deg/s
+constexpr double kJump_rad = 0.14;      ///< between two pictures: the arm was moved from posture to posture
+constexpr double kFloor_px = 0.1;       ///< no picture places a flank nearer (OutlineNoise::Prior::floor_px)
+constexpr double kImplausible = 20.0;   ///< of an effect's typical size: no robot is so wrong
+constexpr double kLeastFound = 0.6;     ///< share of the outline that must be found where the robot is seen at all
+constexpr double kMostOfTheLog = 0.5;   ///< of the blocks: what is seen there beside the robot is no passer-by
+constexpr double kFlankFloors = 3.0;    ///< times kFloor_px: so far off a whole flank is not where a picture may put it
 constexpr double kNoiseRatio =
     1.3;  ///< what is left over what of it differs between blocks: more is no noise of pixels
 constexpr double kLostContrast = 0.5;  ///< between the shares of two parts of the log that are seen

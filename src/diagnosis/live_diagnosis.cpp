@@ -8,7 +8,6 @@
 #include <atomic>
 #include <chrono>
 #include <future>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -25,7 +24,6 @@ constexpr int kNice = 10;                       // of the thread: less than the 
 constexpr double kEncoderPeriod_s = 0.008;      // what has a memory needs 100 Hz; more is thinned
 constexpr std::ptrdiff_t kMostEncoders = 2000;  // samples kept beside
 constexpr std::size_t kMostWaiting = 60;        // frames kept for a look that is late
-constexpr double kRobust_px = 3.0;              // before the noise of outlines is known, as in a diagnosis of a log
 constexpr double kNoisePictures = 100.0;        // after so many a picture's noise has faded
 
 /// What a look works on.
@@ -83,6 +81,9 @@ class Window {
     noise_.assign(pipeline.rig().cameras.size(), OutlineNoise(diagnosis_.noise));
     all_.resize(static_cast<std::size_t>(fit_.coordinates().size()));
     for (std::size_t i = 0; i < all_.size(); ++i) all_[i] = static_cast<std::uint32_t>(i);
+    for (const auto joint : state_.model().roles().arm) {
+      joints_.push_back(static_cast<std::uint32_t>(fit_.coordinates().find({Coordinate::Kind::kJoint, joint})));
+    }
   }
 
   LiveFindings look(const Batch& batch) {
@@ -99,7 +100,6 @@ class Window {
     const double k = static_cast<double>(++looks_);
     diagnosis_.level = options_.level * 6.0 / (kPi * kPi * k * k);
     const auto report = diagnosis::look(fit_, state_, at_, noise_, tolerances_, diagnosis_);
-    about_ = report.extended_model;
     found.blocks = report.blocks;
     found.z_threshold = report.z_threshold;
     if (std::any_of(report.causes.begin(), report.causes.end(), [](const auto& c) { return c.implausible; })) {
@@ -119,7 +119,6 @@ class Window {
   void forget() {
     log_.forget_before(INT64_MAX);
     at_.reset();
-    about_.reset();
     found_ = {};
   }
 
@@ -142,35 +141,41 @@ class Window {
   }
 
   void linearise(const std::vector<std::size_t>& fresh) {
+    auto measured = fit_.predict(state_.model(), joints_);
+    bring_near(measured, fresh);
+    measured.coordinates = all_;
     OutlineSearch search{.search_px = diagnosis::limits::kSearch_px, .spacing_px = diagnosis_.spacing_px};
-    if (!at_) {
-      search.robust_px = kRobust_px;
-      noise_ = fit_.noise(state_.model(), search, diagnosis_.noise, fresh);
-    }
-    search.robust_px = 0.0;
     for (const auto& noise : noise_) search.robust_px = std::max(search.robust_px, noise.robust_px());
-    const bool known = at_ != nullptr;
-    // Where outlines are to be expected by all that is suspected; what they say is kept about the state alone.
-    auto measured =
-        fit_.linearise(with_suspects(), all_, search, fresh, [&](std::size_t p, std::span<const OutlinePoint> points) {
-          const auto camera = log_.pictures()[p].camera;
-          const double unit = picture_unit(log_.rig().cameras[camera].intrinsics);
-          if (known) noise_[camera].add(points, unit, kNoisePictures);
-        });
+    fit_.measure(measured, search, fresh, [&](std::size_t p, std::span<const OutlinePoint> points) {
+      const auto camera = log_.pictures()[p].camera;
+      noise_[camera].add(points, picture_unit(log_.rig().cameras[camera].intrinsics), kNoisePictures);
+    });
     auto now = std::make_shared<LinearLog>(fit_.predict(state_.model(), all_));
     for (const auto p : fresh) move(measured, p, *now, p);
     if (at_) keep_old(*now);
     at_ = std::move(now);
   }
 
-  /// The state as it is now, and beside it what the last look named or suspected.
-  [[nodiscard]] ErrorModel with_suspects() const {
-    ErrorModel model = state_.model();
-    for (std::size_t e = 0; about_ && e < about_->size(); ++e) {
-      const Effect& effect = std::as_const(*about_)[e];
-      if (model.find(effect.name(), effect.target()) == nullptr) model.add(effect.clone());
+  /// Predictions of pictures as each of them has the arm's joints: outlines far off count little, and what pushes them
+  /// there, a latency or a gain, would hardly be seen. What they say is kept about the state all the same.
+  void bring_near(LinearLog& measured, const std::vector<std::size_t>& fresh) {
+    for (const double search_px : {diagnosis::limits::kFrom_px, diagnosis::limits::kSearch_px}) {
+      fit_.measure(measured,
+                   {.search_px = search_px, .spacing_px = diagnosis_.spacing_px, .robust_px = 0.5 * search_px}, fresh);
+      for (const auto p : fresh) {
+        const auto& evidence = measured.evidence[p];
+        if (evidence.weight <= 0.0) continue;
+        const auto camera = log_.pictures()[p].camera;
+        const double variance =
+            noise_[camera].variance_px2() * std::pow(picture_unit(log_.rig().cameras[camera].intrinsics), 2);
+        Eigen::MatrixXd precision = evidence.A / variance;
+        precision.diagonal().array() += std::pow(diagnosis::limits::kOneFrame_rad, -2);
+        const Eigen::VectorXd step = precision.ldlt().solve(evidence.b / variance);
+        for (std::size_t i = 0; i < joints_.size(); ++i) {
+          fit_.coordinates()[joints_[i]].in(measured.corrections[p]) += step[static_cast<Eigen::Index>(i)];
+        }
+      }
     }
-    return model;
   }
 
   /// What earlier looks measured of pictures that are still in the window.
@@ -204,10 +209,9 @@ class Window {
   State state_;
   PictureLog log_;
   LogFit fit_;
-  std::vector<std::uint32_t> all_;  ///< coordinates
+  std::vector<std::uint32_t> all_, joints_;  ///< coordinates; those of the arm's joints
   std::vector<OutlineNoise> noise_;
-  std::shared_ptr<LinearLog> at_;    ///< the window about the estimate at the last look
-  std::optional<ErrorModel> about_;  ///< the model by the last look, with what is merely suspected
+  std::shared_ptr<LinearLog> at_;  ///< the window about the estimate at the last look
   std::size_t looks_ = 0;
   LiveFindings found_;  ///< by the last look
 };

@@ -8,8 +8,7 @@
 namespace bodyschema::diagnosis {
 
 /// What pictures ask for beside a model, from their linearisation alone: the search of `diagnose` without its fits, in
-/// the time of a few frames. Verdict, sentence and causes of the report are filled in; its extended model holds what is
-/// merely suspected as well: the next pictures are best measured about it.
+/// the time of a few frames. Verdict, sentence and causes of the report are filled in.
 /// @param state  the model, about which they were linearised
 /// @param pictures  over all coordinates
 /// @param noise  per camera

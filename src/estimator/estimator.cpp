@@ -733,10 +733,13 @@ struct Estimator::Impl {
   /// What outlines that are wrong alike in all postures do to the state: as if one average posture alone were known,
   /// for the others err with it. No more than what was believed before any.
   [[nodiscard]] Eigen::MatrixXd shape_covariance() const {
-    const double share = particles_only() ? 0.0 : fitter.shape_variance_share();
-    if (share <= 0.0 || memory.empty()) return Eigen::MatrixXd::Zero(state.size(), state.size());
+    if (particles_only() || memory.empty()) return Eigen::MatrixXd::Zero(state.size(), state.size());
     const auto& own = memory.estimate().own;
     const Eigen::VectorXd prior = memory.layout().prior_sd.array().square().inverse();
+    const double told = static_cast<double>(state.size()) - own.diagonal().dot(prior);
+    const double share = fitter.shape_variance_share(told);
+    fprintf(stderr, "told %.1f share %.3f without %.3f\n", told, share, fitter.shape_variance_share(0.0));
+    if (share <= 0.0) return Eigen::MatrixXd::Zero(state.size(), state.size());
     const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(state.size(), state.size());
     Eigen::MatrixXd precision = own.ldlt().solve(identity);
     precision.diagonal() -= prior;

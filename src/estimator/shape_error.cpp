@@ -38,8 +38,8 @@ bool ShapeError::known() const {
                      [](const auto& item) { return item.second.seen >= limits::kPosturesOfShape; });
 }
 
-double ShapeError::variance_px2(double floor_px) const {
-  double square = 0.0, weight = 0.0, alike = 0.0;
+double ShapeError::variance_px2(double floor_px, double fitted) const {
+  double square = 0.0, weight = 0.0, alike = 0.0, weight_square = 0.0;
   for (const auto& [place, part] : parts_) {
     const double n = part.postures, mean = part.sum / n;
     // Chance cannot be told from shape in the first few.
@@ -48,9 +48,13 @@ double ShapeError::variance_px2(double floor_px) const {
     square += part.points * (mean * mean - of_mean);
     alike += part.points * part.points / n;
     weight += part.points;
+    weight_square += part.points * part.points;
   }
   if (weight <= 0.0) return 0.0;
-  return std::max(0.0, square / weight - floor_px * floor_px) * alike / weight;
+  // Parts that have a say: as many as equally large ones would be.
+  const double parts = weight * weight / weight_square;
+  const double left = parts / std::max(1.0, parts - fitted);
+  return std::max(0.0, left * square / weight - floor_px * floor_px) * alike / weight;
 }
 
 }  // namespace bodyschema

@@ -14,8 +14,9 @@ namespace bodyschema {
 /// fit could not take up of it stays as residuals that keep their sign, part by part.
 ///
 /// A variance component: the mean square over the parts of the mean residual over postures, less what chance leaves
-/// there by how the same residuals vary between postures. What a fit took up is not seen; it is taken to be as large as
-/// what it left. Lengths are px of a 320x240 picture.
+/// there by how the same residuals vary between postures. What a fit took up is not seen: as of any variance that is
+/// measured on what a fit leaves, degrees of freedom make up for it, those of as many parts as have a say of their own
+/// less those of the parameters that were fitted. Lengths are px of a 320x240 picture.
 class ShapeError {
  public:
   /// Adds one posture's picture.
@@ -23,7 +24,8 @@ class ShapeError {
   /// Variance beyond what pictures can place outlines to anyway, times how many points of a part err as one by it: what
   /// an evidence's A is to be divided by where nothing else errs. px^2.
   /// @param floor_px  how near pictures can place outlines
-  [[nodiscard]] double variance_px2(double floor_px) const;
+  /// @param fitted  parameters that all postures together told
+  [[nodiscard]] double variance_px2(double floor_px, double fitted) const;
   /// Whether enough postures were seen to tell.
   [[nodiscard]] bool known() const;
   void forget() { parts_.clear(); }

@@ -142,6 +142,13 @@ LinearLog LogFit::linearise(const ErrorModel& model, std::span<const std::uint32
                             const OutlineSearch& search, std::span<const std::size_t> pictures,
                             const std::function<void(std::size_t, std::span<const OutlinePoint>)>& look) {
   LinearLog result = predict(model, coordinates);
+  measure(result, search, pictures, look);
+  return result;
+}
+
+void LogFit::measure(LinearLog& result, const OutlineSearch& search, std::span<const std::size_t> pictures,
+                     const std::function<void(std::size_t, std::span<const OutlinePoint>)>& look) {
+  const auto& coordinates = result.coordinates;
   const auto count = log_.pictures().size();
   std::vector<char> wanted(count, pictures.empty() ? 1 : 0);
   for (const auto p : pictures) wanted[p] = 1;
@@ -169,8 +176,6 @@ LinearLog LogFit::linearise(const ErrorModel& model, std::span<const std::uint32
   std::vector<std::jthread> threads;
   for (std::size_t t = 1; t < workers_.size(); ++t) threads.emplace_back([&, t] { work(*workers_[t]); });
   work(*workers_.front());
-  threads.clear();
-  return result;
 }
 
 std::vector<std::vector<Direction>> LogFit::directions(const LinearLog& at, const ErrorModel& model,

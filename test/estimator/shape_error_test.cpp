@@ -29,9 +29,17 @@ TEST(ShapeError, IsWhatKeepsItsSignFromPostureToPosture) {
   ShapeError shape;
   for (int i = 0; i < 6; ++i) shape.add(outline({1.0, -1.0, 1.0}), 0, 1.0);
   // The mean square of the parts, times the points that err as one.
-  EXPECT_NEAR(shape.variance_px2(0.0), 8.0, 1e-9);
-  EXPECT_NEAR(shape.variance_px2(kFloor_px), 8.0 * (1.0 - kFloor_px * kFloor_px), 1e-9);
-  EXPECT_EQ(shape.variance_px2(1.5), 0.0) << "no nearer do pictures place outlines";
+  EXPECT_NEAR(shape.variance_px2(0.0, 0.0), 8.0, 1e-9);
+  EXPECT_NEAR(shape.variance_px2(kFloor_px, 0.0), 8.0 * (1.0 - kFloor_px * kFloor_px), 1e-9);
+  EXPECT_EQ(shape.variance_px2(1.5, 0.0), 0.0) << "no nearer do pictures place outlines";
+}
+
+/// Of six parts two parameters take up as much as two parts have: what four leave is measured.
+TEST(ShapeError, WhatAFitTookUpIsMadeUpFor) {
+  ShapeError shape;
+  for (int i = 0; i < 6; ++i) shape.add(outline({1.0, -1.0, 1.0, -1.0, 1.0, -1.0}), 0, 1.0);
+  EXPECT_NEAR(shape.variance_px2(0.0, 2.0), 1.5 * shape.variance_px2(0.0, 0.0), 1e-9);
+  EXPECT_NEAR(shape.variance_px2(0.0, 9.0), 6.0 * shape.variance_px2(0.0, 0.0), 1e-9) << "no more than one part tells";
 }
 
 TEST(ShapeError, WhatDiffersFromPostureToPostureIsNone) {
@@ -39,7 +47,7 @@ TEST(ShapeError, WhatDiffersFromPostureToPostureIsNone) {
   std::mt19937_64 random(test::seed());
   std::normal_distribution<double> normal(0.0, 0.5);
   for (int i = 0; i < 60; ++i) shape.add(outline({normal(random), normal(random), normal(random)}), 0, 1.0);
-  EXPECT_LT(shape.variance_px2(0.0), 8.0 * 0.25 / 4.0);
+  EXPECT_LT(shape.variance_px2(0.0, 0.0), 8.0 * 0.25 / 4.0);
 }
 
 TEST(ShapeError, FewPosturesDoNotTellItFromChance) {
@@ -51,7 +59,7 @@ TEST(ShapeError, FewPosturesDoNotTellItFromChance) {
   EXPECT_FALSE(shape.known());
   shape.forget();
   shape.add(outline({1.0, 1.0}), 0, 1.0);
-  EXPECT_NEAR(shape.variance_px2(0.0), 8.0, 1e-9) << "all of it may be shape";
+  EXPECT_NEAR(shape.variance_px2(0.0, 0.0), 8.0, 1e-9) << "all of it may be shape";
   for (int i = 0; i < 2; ++i) shape.add(outline({1.0, 1.0}), 0, 1.0);
   EXPECT_TRUE(shape.known());
 }
@@ -61,7 +69,7 @@ TEST(ShapeError, EarlierPosturesFade) {
   ShapeError shape;
   for (int i = 0; i < 5; ++i) shape.add(outline({2.0, -2.0}), 0, 1.0);
   for (int i = 0; i < 60; ++i) shape.add(outline({0.0, 0.0}), 0, 1.0);
-  EXPECT_EQ(shape.variance_px2(kFloor_px), 0.0);
+  EXPECT_EQ(shape.variance_px2(kFloor_px, 0.0), 0.0);
 }
 
 TEST(ShapeError, LengthsAreThoseOfPicturesOf320x240) {
@@ -70,7 +78,7 @@ TEST(ShapeError, LengthsAreThoseOfPicturesOf320x240) {
     large.add(outline({2.0, 2.0}), 0, 2.0);
     small.add(outline({1.0, 1.0}), 0, 1.0);
   }
-  EXPECT_NEAR(large.variance_px2(kFloor_px), small.variance_px2(kFloor_px), 1e-12);
+  EXPECT_NEAR(large.variance_px2(kFloor_px, 0.0), small.variance_px2(kFloor_px, 0.0), 1e-12);
 }
 
 }  // namespace

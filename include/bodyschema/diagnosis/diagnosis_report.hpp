@@ -30,7 +30,7 @@ struct DiagnosedParameter {
   /// since the Unix epoch.
   std::optional<Microseconds> from{};
   std::optional<double> duration_s{};  ///< of a drift: until the last picture in which the arm is seen
-  /// "48.7 s into the log", "from 3.5 to 54.0 s into the log" or nothing.
+  /// "48.7 s into the log", "from 3.5 to 54.0 s into the log" or nothing; where no log begins (0), "at 12:03:07 UTC".
   [[nodiscard]] std::string when(Microseconds log_begin) const;
 };
 

@@ -65,6 +65,9 @@ class LogFit {
 
   /// What a model says of every picture, with evidence of nothing seen.
   LinearLog predict(const ErrorModel& model, std::span<const std::uint32_t> coordinates);
+  /// Compares pictures with predictions, each with its own. Parameters as of `linearise`.
+  void measure(LinearLog& predicted, const OutlineSearch& search, std::span<const std::size_t> pictures = {},
+               const std::function<void(std::size_t, std::span<const OutlinePoint>)>& look = {});
   /// Compares pictures with the predictions of a model.
   /// @param coordinates  wanted, by position
   /// @param pictures  which; empty: all. The others' evidence is that of nothing seen
