@@ -49,6 +49,15 @@ Eigen::VectorXd values_of(const ModelSearch& search, const std::vector<Eigen::In
   return values;
 }
 
+/// The motion of what is seen as a whole that would explain what is left, with beliefs so wide that they only keep what
+/// no single picture tells from running off.
+Eigen::VectorXd motion_of_all(Eigen::MatrixXd A, const Eigen::VectorXd& b, double precision) {
+  constexpr double kShift_m = 0.02, kTurn_rad = 0.1;
+  A.diagonal().head<3>().array() += 1.0 / (precision * kShift_m * kShift_m);
+  A.diagonal().tail<3>().array() += 1.0 / (precision * kTurn_rad * kTurn_rad);
+  return A.ldlt().solve(b);
+}
+
 /// How much worse another explanation is, in standard deviations of the difference: on blocks that neither has seen,
 /// and in how far nuisances must depart from what is believed of them for it (log likelihoods that are d apart in the
 /// mean differ by a variance of 4 d).
@@ -169,13 +178,7 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
       const auto at = coordinates.find({Coordinate::Kind::kJoint, roles.arm[j]});
       if (evidence.A(at, at) > 0.0) out.apparent_deg[j] = degrees(b[at] / evidence.A(at, at));
     }
-    // The motion of the hand that would explain it: of what is seen as a whole, with beliefs so wide that they only
-    // keep what no single picture tells from running off.
-    constexpr double kShift_m = 0.02, kTurn_rad = 0.1;
-    Eigen::MatrixXd A = evidence.A(rig, rig);
-    A.diagonal().head<3>().array() += 1.0 / (log.precision[p] * kShift_m * kShift_m);
-    A.diagonal().tail<3>().array() += 1.0 / (log.precision[p] * kTurn_rad * kTurn_rad);
-    const Eigen::VectorXd motion = A.ldlt().solve(b(rig));
+    const Eigen::VectorXd motion = motion_of_all(evidence.A(rig, rig), b(rig), log.precision[p]);
     const auto& picture = fit_.log().pictures()[p];
     const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera, rig,
                                                     measurement.projection().hand_link());

@@ -31,6 +31,31 @@ std::vector<ParameterRef> refs_of(const State& state) {
   return refs;
 }
 
+/// A part of a log in which the robot is hardly found.
+struct LostPart {
+  std::size_t split = 0;  ///< the first picture after it changed
+  bool at_first = false;  ///< it is what lies before
+};
+
+/// Seen from the beginning up to some picture, and hardly from there on; or the other way round.
+std::optional<LostPart> lost_part(const LinearLog& at) {
+  const auto count = at.evidence.size();
+  std::vector<double> seen(count + 1, 0.0);
+  for (std::size_t p = 0; p < count; ++p) seen[p + 1] = seen[p] + (at.evidence[p].weight > 0.0 ? 1.0 : 0.0);
+  std::optional<LostPart> part;
+  double most = 0.0;
+  for (std::size_t p = 1; p < count; ++p) {
+    const double before = seen[p] / static_cast<double>(p);
+    const double after = (seen.back() - seen[p]) / static_cast<double>(count - p);
+    const double contrast = std::abs(before - after) * std::sqrt(static_cast<double>(p * (count - p)));
+    if (contrast <= most) continue;
+    most = contrast;
+    part.reset();
+    if (std::abs(before - after) >= limits::kLostContrast) part = LostPart{p, before < after};
+  }
+  return part;
+}
+
 /// Every n-th observation, so that at most so many pictures are looked at.
 std::vector<std::size_t> raster_of(const PictureLog& log, std::size_t most) {
   const auto pictures = log.pictures();
@@ -363,26 +388,11 @@ void ModelSearch::polish(double block_s) {
 void ModelSearch::look_for_lost_part() {
   const auto pictures = fit_.log().pictures();
   const auto at = fit_.linearise(state_.model(), {}, search());
-  // Seen from the beginning up to some picture, and hardly from there on; or the other way round.
-  std::vector<double> seen(pictures.size() + 1, 0.0);
-  for (std::size_t p = 0; p < pictures.size(); ++p) seen[p + 1] = seen[p] + (at.evidence[p].weight > 0.0 ? 1.0 : 0.0);
-  std::size_t split = 0;
-  double most = 0.0;
-  for (std::size_t p = 1; p < pictures.size(); ++p) {
-    const double before = seen[p] / static_cast<double>(p);
-    const double after = (seen.back() - seen[p]) / static_cast<double>(pictures.size() - p);
-    const double contrast = std::abs(before - after) * std::sqrt(static_cast<double>(p * (pictures.size() - p)));
-    if (contrast <= most) continue;
-    most = contrast;
-    split = p;
-  }
-  const auto count = static_cast<double>(pictures.size());
-  const double before = seen[split] / std::max(1.0, static_cast<double>(split));
-  const double after = (seen.back() - seen[split]) / std::max(1.0, count - static_cast<double>(split));
-  if (split == 0 || std::abs(before - after) < limits::kLostContrast) return;
+  const auto part = lost_part(at);
+  if (!part) return;
   std::vector<std::size_t> lost;
   for (const auto p : raster_) {
-    if ((p < split) == (before < after)) lost.push_back(p);
+    if ((p < part->split) == part->at_first) lost.push_back(p);
   }
   if (lost.size() < 2 * static_cast<std::size_t>(state_.size())) return;
   State there = state_;
@@ -393,16 +403,16 @@ void ModelSearch::look_for_lost_part() {
             .spacing_px = options_.spacing_px},
            lost);
   const Eigen::VectorXd change = there.x() - state_.x();
-  const double sign = before < after ? 1.0 : -1.0;  // a slip moves the joint against its offset, from its time on
+  const double sign = part->at_first ? 1.0 : -1.0;  // a slip moves the joint against its offset, from its time on
   std::optional<State> best;
   FoundCause found;
   double cost = cost_ * (1.0 - limits::kLeastGain);
   for (Eigen::Index j = 0; j < state_.joints(); ++j) {
     const FoundCause slip{.name = {"slip", state_.parameters()[static_cast<std::size_t>(j)].name, ""},
                           .variable = {},
-                          .from = pictures[split].joints.utime};
+                          .from = pictures[part->split].joints.utime};
     State state = state_with({slip});
-    take_over(state, before < after ? there : state_);
+    take_over(state, part->at_first ? there : state_);
     Eigen::VectorXd x = state.x();
     const auto step = state.find("slip", {slip.name.joint, ""}, 0);
     if (step < 0) continue;

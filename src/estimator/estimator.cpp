@@ -738,7 +738,6 @@ struct Estimator::Impl {
     const Eigen::VectorXd prior = memory.layout().prior_sd.array().square().inverse();
     const double told = static_cast<double>(state.size()) - own.diagonal().dot(prior);
     const double share = fitter.shape_variance_share(told);
-    fprintf(stderr, "told %.1f share %.3f without %.3f\n", told, share, fitter.shape_variance_share(0.0));
     if (share <= 0.0) return Eigen::MatrixXd::Zero(state.size(), state.size());
     const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(state.size(), state.size());
     Eigen::MatrixXd precision = own.ldlt().solve(identity);

@@ -28,6 +28,30 @@ void play(const PictureLog& log, Observe observe, Visit visit) {
   }
 }
 
+/// A state that a fit has tried.
+struct Trial {
+  Eigen::VectorXd x;
+  LinearLog at;
+  double cost = 0.0;  ///< with the beliefs' share, per outline point
+};
+
+/// Levenberg's and Marquardt's step.
+/// @param precision, away  of the beliefs, and of the state from them
+Eigen::VectorXd damped_step(const std::vector<StateEvidence>& pictures, double variance_px2,
+                            const Eigen::VectorXd& precision, const Eigen::VectorXd& away, double damping) {
+  Eigen::MatrixXd H = precision.asDiagonal();
+  Eigen::VectorXd g = -precision.cwiseProduct(away);
+  for (const auto& e : pictures) {
+    H += e.A / variance_px2;
+    g += e.b / variance_px2;
+  }
+  // Scaled to a unit diagonal: parameters have different units.
+  const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd S = scale.asDiagonal() * H * scale.asDiagonal();
+  S.diagonal().array() += damping;
+  return scale.asDiagonal() * S.ldlt().solve(scale.asDiagonal() * g);
+}
+
 }  // namespace
 
 double LinearLog::rms_px() const {
@@ -264,13 +288,7 @@ double LogFit::fit(State& state, const FitSettings& settings, std::span<const st
   for (const auto& p : state.parameters()) parameters.push_back(p.ref);
   const auto coordinates = moved_by(state.model(), parameters);
   const Eigen::VectorXd precision = state.prior_sd().array().square().inverse();
-  const auto n = state.size();
 
-  struct Trial {
-    Eigen::VectorXd x;
-    LinearLog at;
-    double cost = 0.0;  ///< with the beliefs' share, per outline point
-  };
   double usual_points = 0.0;
   const auto look = [&](const Eigen::VectorXd& x, double search_px) {
     const bool near = search_px <= settings.finest_px;
@@ -287,20 +305,9 @@ double LogFit::fit(State& state, const FitSettings& settings, std::span<const st
     return trial;
   };
   const auto step = [&](const Trial& trial, double damping) {
-    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
-    Eigen::VectorXd g = Eigen::VectorXd::Zero(n);
     state.set(trial.x);
-    for (const auto& e : project(trial.at, state.model(), parameters)) {
-      H += e.A / settings.variance_px2;
-      g += e.b / settings.variance_px2;
-    }
-    H.diagonal() += precision;
-    g -= precision.cwiseProduct(trial.x - state.prior_mean());
-    // Scaled to a unit diagonal: parameters have different units.
-    const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
-    Eigen::MatrixXd S = scale.asDiagonal() * H * scale.asDiagonal();
-    S.diagonal().array() += damping;
-    return Eigen::VectorXd(scale.asDiagonal() * S.ldlt().solve(scale.asDiagonal() * g));
+    return damped_step(project(trial.at, state.model(), parameters), settings.variance_px2, precision,
+                       trial.x - state.prior_mean(), damping);
   };
 
   Trial best = look(state.x(), std::max(settings.finest_px, settings.from_px));

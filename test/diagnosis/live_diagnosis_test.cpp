@@ -89,7 +89,7 @@ TEST(LiveDiagnosis, NamesWhatIsWrongWhileTheRobotRuns) {
 
 /// What moves outlines by many pixels, where the arm is fast, is seen no worse than what moves them by one.
 TEST(LiveDiagnosis, MeasuresALargeLatencyAndSaysWhenAJointSlipped) {
-  const auto late = listen("latency:value=60", 26.0);
+  const auto late = listen("latency:value=60", 36.0);
   ASSERT_TRUE(named(late.news.back(), "latency")) << late.per_frame.back();
   EXPECT_NEAR(late.news.back().causes.front().parameters.at(0).value, 60.0, 4.0);
   const auto slipped = listen("slip:joint=r_elbow,value=3,at=15", 36.0);
