@@ -611,7 +611,8 @@ struct Estimator::Impl {
   }
 
   void report_memory(Estimate& estimate) {
-    const Eigen::MatrixXd covariance = (contradicted ? in_frame.covariance : memory.estimate().covariance) + shape;
+    const MemoryEstimate& known = contradicted ? in_frame : memory.estimate();
+    const Eigen::MatrixXd covariance = known.covariance + (disagreement() - 1.0) * known.own + shape;
     estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
     for (Eigen::Index k = joints; k < state.size(); ++k) {
       const auto& p = model.state().parameters()[static_cast<std::size_t>(k)];
@@ -673,6 +674,10 @@ struct Estimator::Impl {
     return std::sqrt(square);
   }
 
+  /// What postures disagree by, times what is claimed of them: no estimate is better than the postures that it is made
+  /// of.
+  [[nodiscard]] double disagreement() const { return std::max(1.0, memory.dispersion()); }
+
   /// What is wrong by more than is believed possible; empty: nothing.
   [[nodiscard]] std::string misfit() {
     const auto& known = memory.estimate();
@@ -723,7 +728,7 @@ struct Estimator::Impl {
     hand_J = model.hand_jacobian(exposure, in_frame.x);
     const Eigen::MatrixXd& J = hand_J;
     const auto n = state.size();
-    hand_own = J.leftCols(n) * in_frame.own * J.leftCols(n).transpose();
+    hand_own = disagreement() * J.leftCols(n) * in_frame.own * J.leftCols(n).transpose();
     hand_own += J.leftCols(n) * shape * J.leftCols(n).transpose();
     if (J.cols() == n) return hand_own;
     const Eigen::MatrixXd T =

@@ -39,6 +39,10 @@ inline constexpr int kPosturesOfShape = 3;
 /// Statistical. Postures after which one has faded to 1/e: the estimate that left its residuals is no longer held.
 inline constexpr double kRecentPostures = 12.0;
 
+/// Physical. Share of what parts get wrong that no fit takes up: parameters turn and shift a limb, which moves its two
+/// flanks against each other; to the outside of both at once, as a wrong shape does, few do.
+inline constexpr double kLeastLeft = 0.5;
+
 /// Statistical. A parameter further from what was believed than this many of its standard deviations contradicts it.
 inline constexpr double kBeyondBelief_sd = 4.0;
 /// Statistical. Postures that disagree by more than this times what is claimed (mean NIS per direction).

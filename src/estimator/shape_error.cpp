@@ -53,7 +53,7 @@ double ShapeError::variance_px2(double floor_px, double fitted) const {
   if (weight <= 0.0) return 0.0;
   // Parts that have a say: as many as equally large ones would be.
   const double parts = weight * weight / weight_square;
-  const double left = parts / std::max(1.0, parts - fitted);
+  const double left = parts / std::max(limits::kLeastLeft * parts, parts - fitted);
   return std::max(0.0, left * square / weight - floor_px * floor_px) * alike / weight;
 }
 
