@@ -159,9 +159,11 @@ class Window {
   /// Predictions of pictures as each of them has the arm's joints: outlines far off count little, and what pushes them
   /// there, a latency or a gain, would hardly be seen. What they say is kept about the state all the same.
   void bring_near(LinearLog& measured, const std::vector<std::size_t>& fresh) {
+    constexpr double kSparse = 2.0;  // of the way there half the points tell
     for (const double search_px : {diagnosis::limits::kFrom_px, diagnosis::limits::kSearch_px}) {
-      fit_.measure(measured,
-                   {.search_px = search_px, .spacing_px = diagnosis_.spacing_px, .robust_px = 0.5 * search_px}, fresh);
+      fit_.measure(
+          measured,
+          {.search_px = search_px, .spacing_px = kSparse * diagnosis_.spacing_px, .robust_px = 0.5 * search_px}, fresh);
       for (const auto p : fresh) {
         const auto& evidence = measured.evidence[p];
         if (evidence.weight <= 0.0) continue;

@@ -383,7 +383,13 @@ struct Estimator::Impl {
   /// The frame and what is known of it, as it is reported.
   void settle_on(const OutlineFit& fit) {
     state = memory.empty() ? fit.x : memory.estimate().x;
-    in_frame = (contradicted || memory.empty() ? memory.beliefs() : memory).in_posture(fit.quadratic);
+    const PostureMemory held = contradicted || memory.empty() ? memory.beliefs() : memory;
+    if (fitter.lies_near(fit.evidence)) {
+      in_frame = held.in_posture(fit.quadratic);
+    } else {  // an arm that is not where outlines are has nothing to learn from how these run
+      in_frame = held.in_posture();
+      in_frame.x = fit.x;
+    }
     rms_px = fit.evidence.rms_px();
     near = fitter.fits(fit.evidence);
     best_likelihood = hammoude_likelihood(scorer.distance(in_frame.x));
