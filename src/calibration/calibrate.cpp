@@ -18,6 +18,7 @@
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "bodyschema/evidence/outline_distance.hpp"
 #include "bodyschema/pipeline/watched_log.hpp"
+#include "beyond_model.hpp"
 #include "calibration_files.hpp"
 #include "next_posture.hpp"
 #include "raw_pictures.hpp"
@@ -85,6 +86,7 @@ class Calibrator {
     std::optional<BatchFit> best;
     if (!masks || still) best.emplace(fitted(fit, starts_));
     if (masks) with_better_masks(*masks, fit, best);
+    if (masks || !pipeline_.learns_background()) without_strangers(fit, best);
     progress(0.6);
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
@@ -164,6 +166,23 @@ class Calibrator {
       best.emplace(std::move(next));
     }
   }
+
+  /// What the masks show beyond the model is left out: a tool, somebody's arm.
+  void without_strangers(LogFit& fit, std::optional<BatchFit>& best) {
+    if (!is_near(*best)) return;
+    const auto beyond = beyond_model(*log_, best->at().corrections);
+    if (beyond.pictures == 0) return;
+    leave_out(*log_, beyond);
+    fit.refresh();
+    const Eigen::VectorXd x = best->state().x();
+    best.emplace(started(fit, x));
+    best->run(0.0, {});
+    if (beyond.on_link.empty()) return;
+    result_.remarks.push_back("something is on " + beyond.on_link +
+                              " that the robot's model does not have: what the masks show of it is left out");
+  }
+
+  [[nodiscard]] static bool is_near(const BatchFit& batch) { return batch.noise().front().sd_px() < kNear_px; }
 
   [[nodiscard]] BatchFit started(LogFit& fit, const Eigen::VectorXd& x) const {
     const auto roles = log_->roles();
