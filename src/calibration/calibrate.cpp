@@ -60,6 +60,12 @@ bool to_be_searched(const CameraModel& camera) {
 /// nothing is known but what is configured, then after a fit of what moved.
 constexpr std::array kReaches = {40.0, 30.0, 20.0, 12.0, 8.0, 6.0, 5.0};
 constexpr std::array kReachesMoved = {16.0, 12.0, 8.0, 6.0, 5.0, 4.0, 4.0};
+static_assert(kReaches.size() == kReachesMoved.size());
+constexpr double kWide_px = 12.0;  ///< ... and then once more, to see whether it makes a difference
+constexpr std::array kReachesAgain = {6.0, 4.0};
+constexpr int kMostChecks = 3;
+constexpr double kSettled_sd = 2.0;       ///< statistical
+constexpr double kReachOfGiven_px = 4.0;  ///< ... after a fit to masks of others
 constexpr std::size_t kRawKept = 64;  ///< observations of such a log whose pictures are looked at
 
 class Calibrator {
@@ -73,20 +79,22 @@ class Calibrator {
   Calibration run() {
     WatchedLog watched = watch_log(
         pipeline_,
-        {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .kept = raw() ? kRawKept : 12,
+        {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .kept = raw() || given() ? kRawKept : 12,
          .quiet = options_.quiet}, false);
     refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);
     log_ = &watched.pictures;
     if (!options_.quiet) bar_.emplace("calibration", 100);
     std::optional<RawPictures> masks;
-    if (raw()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
-    const bool still = masks && masks->by_what_moved();
+    if (raw() || given()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
+    const bool still = masks && masks->cameras_stood_still();
+    if (raw() && still) masks->by_what_moved();
     find_cameras(still);
     LogFit fit(*log_, threads_of(options_));
     std::optional<BatchFit> best;
-    if (!masks || still) best.emplace(fitted(fit, starts_));
-    if (masks) with_better_masks(*masks, fit, best);
-    if (masks || !pipeline_.learns_background()) without_strangers(fit, best);
+    if (!raw() || still) best.emplace(fitted(fit, starts_));
+    if (raw()) with_better_masks(*masks, fit, best);
+    if (given() && still) by_pictures_too(*masks, fit, best);
+    if (raw() || !pipeline_.learns_background()) without_strangers(fit, best);
     progress(0.6);
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
@@ -148,23 +156,85 @@ class Calibrator {
   // --- pictures without masks -------------------------------------------------------------------
 
   [[nodiscard]] bool raw() const { return pipeline_.masks_need_estimates(); }
+  [[nodiscard]] bool given() const {
+    return configuration_.section("vision").text_or("method", "learned_background") == "given";
+  }
 
-  /// Masks and fit by turns, masks ever nearer to what the fit of all postures says.
-  void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
-    const auto& reaches = best ? kReachesMoved : kReaches;
-    for (const double reach_px : reaches) {
-      if (!best) {
-        masks.about(nominal(fit), reach_px);
-      } else {
-        masks.about(best->at().corrections, reach_px);
-      }
-      fit.refresh();
-      const auto x = best ? best->state().x() : Eigen::VectorXd();
-      BatchFit next = started(fit, x);
-      next.run(reach_px, {});
-      if (std::getenv("BS_DEBUG")) fmt::print("reach {} misfit {} rms {}\n", reach_px, next.misfit(), next.noise().front().sd_px());
-      best.emplace(std::move(next));
+  /// Masks of others bring the robot near. Where the cameras stood still, the pictures themselves say better where its
+  /// outline is than a network did; they are taken if the robot's outline then lies more closely.
+  void by_pictures_too(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
+    if (!is_near(*best)) return;
+    PictureLog as_given = masks.about(best->at().corrections, kReachOfGiven_px);
+    const Eigen::VectorXd x = best->state().x();
+    fit.refresh();
+    BatchFit once = started(fit, x);
+    once.run(0.0, {});
+    masks.about(once.at().corrections, kReachOfGiven_px);
+    fit.refresh();
+    BatchFit twice = started(fit, once.state().x());
+    twice.run(0.0, {});
+    const bool all = as_given.pictures().size() == log_->pictures().size();
+    if (all && outline_variance(twice) < outline_variance(*best)) {
+      best.emplace(std::move(twice));
+      as_given_.emplace(std::move(as_given));
+      return;
     }
+    *log_ = std::move(as_given);
+    fit.refresh();
+  }
+
+  /// From the masks that were given, where there are any: they are a witness where pictures said better.
+  double outline_distance_px(LogFit& fit, const ErrorModel& model, std::span<const std::size_t> pictures = {}) {
+    if (!as_given_) return median_outline_distance_px(fit, model, pictures);
+    std::swap(*log_, *as_given_);
+    fit.refresh();
+    const double px = median_outline_distance_px(fit, model, pictures);
+    std::swap(*log_, *as_given_);
+    fit.refresh();
+    return px;
+  }
+
+  static double outline_variance(const BatchFit& batch) {
+    double sum = 0.0;
+    for (const auto& noise : batch.noise()) sum += noise.variance_px2();
+    return sum;
+  }
+
+  /// Masks and fit by turns, masks ever nearer to what the fit of all postures says, until it makes no difference how far
+  /// they looked: masks that are made about a prediction follow it, right or wrong, but the wider they look the less.
+  void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
+    for (const double reach_px : best ? kReachesMoved : kReaches) with_masks_anew(masks, fit, best, reach_px);
+    for (int again = 0; again < kMostChecks; ++again) {
+      const MemoryEstimate near = best->estimate();
+      with_masks_anew(masks, fit, best, kWide_px);
+      unsettled_ = moved_joint(best->state(), near, best->estimate());
+      for (const double reach_px : kReachesAgain) with_masks_anew(masks, fit, best, reach_px);
+      const auto back = moved_joint(best->state(), near, best->estimate());
+      if (unsettled_.empty()) unsettled_ = back;
+      if (unsettled_.empty()) return;
+    }
+  }
+
+  void with_masks_anew(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best, double reach_px) {
+    masks.about(best ? best->at().corrections : nominal(fit), reach_px);
+    fit.refresh();
+    BatchFit next = started(fit, best ? best->state().x() : Eigen::VectorXd());
+    next.run(reach_px, {});
+    best.emplace(std::move(next));
+    if (std::getenv("BS_DEBUG")) {
+      fmt::print("reach {} misfit {:.3f} rms {:.3f}", reach_px, best->misfit(), best->noise().front().sd_px());
+      for (Eigen::Index k = 0; k < best->state().joints(); ++k) fmt::print(" {:.2f}/{:.2f}", degrees(best->state().x()[k]), degrees(std::sqrt(best->estimate().covariance(k, k))));
+      fmt::print("\n");
+    }
+  }
+
+  /// A joint that two answers about one state place further apart than either claims to know it; empty: none.
+  static std::string moved_joint(const State& state, const MemoryEstimate& a, const MemoryEstimate& b) {
+    for (Eigen::Index k = 0; k < state.joints(); ++k) {
+      const double sd = std::sqrt(std::max(a.covariance(k, k), b.covariance(k, k)));
+      if (std::abs(a.x[k] - b.x[k]) > kSettled_sd * sd) return state.parameters()[static_cast<std::size_t>(k)].name;
+    }
+    return {};
   }
 
   /// What the masks show beyond the model is left out: a tool, somebody's arm.
@@ -365,8 +435,8 @@ class Calibrator {
     result_.outline_sd_px = batch.noise().front().sd_px() * picture_unit(rig_.cameras.front().intrinsics);
     result_.outline_points_alike = batch.noise().front().correlated_points();
     describe_cameras(batch);
-    result_.outline_px.before = median_outline_distance_px(fit, ErrorModel(log_->roles()));
-    result_.outline_px.after = median_outline_distance_px(fit, state.model());
+    result_.outline_px.before = outline_distance_px(fit, ErrorModel(log_->roles()));
+    result_.outline_px.after = outline_distance_px(fit, state.model());
     result_.hand_sd_m = hand_sd_m(fit, batch);
     result_.views = views(fit, batch);
   }
@@ -506,7 +576,7 @@ class Calibrator {
       BatchFit part(fit, start, beliefs.tolerances, settings());
       part.start_at(batch.state().x());
       part.run(0.0, kept);
-      sum += median_outline_distance_px(fit, part.state().model(), left_out) * static_cast<double>(left_out.size());
+      sum += outline_distance_px(fit, part.state().model(), left_out) * static_cast<double>(left_out.size());
       n += static_cast<double>(left_out.size());
     }
     if (n > 0.0) result_.outline_px.heldout = sum / n;
@@ -584,6 +654,13 @@ class Calibrator {
                              "better where the cameras are.",
                              result_.outline_px.after));
     }
+    if (!unsettled_.empty()) {
+      return say(CalibrationState::kNotConverged,
+                 fmt::format("Not converged: without masks the answer depends on how far from the prediction the robot's "
+                             "outline is looked for ({} moves by more than {:.0f} standard deviations); record more "
+                             "postures, or give masks (vision.method: given).",
+                             unsettled_, kSettled_sd));
+    }
     if (only_ < kOnly) {
       return say(CalibrationState::kNotConverged,
                  fmt::format("Not converged: another place of the camera explains the pictures nearly as well (misfit "
@@ -648,7 +725,9 @@ class Calibrator {
   Pipeline pipeline_;
   StereoRig rig_;
   PictureLog* log_ = nullptr;
+  std::optional<PictureLog> as_given_;  ///< with the masks of others, where the log has better ones now
   std::vector<StereoRig> starts_;
+  std::string unsettled_;  ///< a joint whose offset depends on how masks were made
   double ambiguity_ = 0.0;
   double only_ = kAlone;  ///< misfit of the second best place over that of the best
   Calibration result_;

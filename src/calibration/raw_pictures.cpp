@@ -42,9 +42,9 @@ RawPictures::RawPictures(PictureLog& log, const VisionSetup& vision, const std::
   }
 }
 
-bool RawPictures::by_what_moved() {
-  std::vector<Observation> seen;
-  for (const auto& full : kept_) seen.push_back(without_pictures(full));
+bool RawPictures::cameras_stood_still() {
+  moved_.clear();
+  for (const auto& full : kept_) moved_.push_back(without_pictures(full));
   std::size_t all = 0, known = 0;
   for (std::size_t c = 0; c < segmenters_.size(); ++c) {
     std::vector<Image> frames;
@@ -54,19 +54,21 @@ bool RawPictures::by_what_moved() {
     if (frames.size() < kFewestFrames) return false;
     segmenters_[c].learn(frames);
     for (std::size_t i = 0; i < kept_.size(); ++i) {
-      auto& camera = seen[i].cameras[c];
+      auto& camera = moved_[i].cameras[c];
       if (!camera) continue;
       segmenters_[c].segment(kept_[i].cameras[c]->image, camera->mask, camera->valid, camera->coverage);
       all += static_cast<std::size_t>(camera->mask.width()) * static_cast<std::size_t>(camera->mask.height());
       known += camera->valid.count();
     }
   }
-  if (static_cast<double>(known) < kStands * static_cast<double>(all)) return false;
-  replace(seen, true);
-  return true;
+  return static_cast<double>(known) > kStands * static_cast<double>(all);
 }
 
-void RawPictures::about(std::span<const Corrections> corrections, double reach_px) {
+void RawPictures::by_what_moved() {
+  replace(moved_, true);
+}
+
+PictureLog RawPictures::about(std::span<const Corrections> corrections, double reach_px) {
   std::vector<Observation> seen;
   for (const auto& full : kept_) seen.push_back(without_pictures(full));
   SilhouettePreview preview(log_);
@@ -96,7 +98,7 @@ void RawPictures::about(std::span<const Corrections> corrections, double reach_p
                              PredictedRobot(&predicted[k], reach, false));
     }
   }
-  replace(seen, false);
+  return replace(seen, false);
 }
 
 std::size_t RawPictures::picture_of(std::size_t camera, Microseconds utime) const {
@@ -107,13 +109,13 @@ std::size_t RawPictures::picture_of(std::size_t camera, Microseconds utime) cons
   return static_cast<std::size_t>(found - pictures.begin());
 }
 
-void RawPictures::replace(const std::vector<Observation>& seen, bool learned) {
+PictureLog RawPictures::replace(const std::vector<Observation>& seen, bool learned) {
   PictureLog log(log_.robot(), log_.setup(), log_.rig());
   for (const auto& observation : seen) log.add(observation);
   log.set_encoders({log_.encoders().begin(), log_.encoders().end()});
   log.finish();
   if (learned) log.learned_background();
-  log_ = std::move(log);
+  return std::exchange(log_, std::move(log));
 }
 
 }  // namespace bodyschema

@@ -448,6 +448,7 @@ class Starter {
   }
 
   [[nodiscard]] std::string estimator_yaml() const {
+    const bool stills = !o_.stills.empty();
     std::string text = fmt::format(
         "# The included files of config/ are the installed ones and explain every key.\n"
         "include: [config/estimator.yaml, config/bus.yaml, config/vision.yaml, "
@@ -459,9 +460,10 @@ class Starter {
         "  channel_prefix: {}\n",
         masks_     ? "given"
         : learned_ ? "learned_background"
+        : stills   ? "auto"
                    : "statistics",
-        masks_     ? "statistics, without masks"
-        : learned_ ? "statistics, where the cameras move"
+        masks_     ? "auto, without masks"
+        : learned_ ? "auto, where the cameras move"
                    : "single_colour, learned_background",
         yaml(o_.channel_prefix));
     text += state_yaml();
