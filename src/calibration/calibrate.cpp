@@ -62,7 +62,7 @@ constexpr std::array kReaches = {40.0, 30.0, 20.0, 12.0, 8.0, 6.0, 5.0};
 constexpr std::array kReachesMoved = {16.0, 12.0, 8.0, 6.0, 5.0, 4.0, 4.0};
 static_assert(kReaches.size() == kReachesMoved.size());
 constexpr double kWide_px = 12.0;  ///< ... and then once more, to see whether it makes a difference
-constexpr std::array kReachesAgain = {6.0, 4.0};
+constexpr std::array kReachesAgain = {6.0, 4.0, 4.0};
 constexpr int kMostChecks = 3;
 constexpr double kSettled_sd = 2.0;       ///< statistical
 constexpr double kReachOfGiven_px = 4.0;  ///< ... after a fit to masks of others
@@ -94,7 +94,9 @@ class Calibrator {
     if (!raw() || still) best.emplace(fitted(fit, starts_));
     if (raw()) with_better_masks(*masks, fit, best);
     if (given() && still) by_pictures_too(*masks, fit, best);
-    if (raw() || !pipeline_.learns_background()) without_strangers(fit, best);
+    if (raw() || !pipeline_.learns_background()) {
+      without_strangers(fit, best, raw() || as_given_ ? &*masks : nullptr);
+    }
     progress(0.6);
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
@@ -205,13 +207,18 @@ class Calibrator {
   void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
     for (const double reach_px : best ? kReachesMoved : kReaches) with_masks_anew(masks, fit, best, reach_px);
     for (int again = 0; again < kMostChecks; ++again) {
-      const MemoryEstimate near = best->estimate();
-      with_masks_anew(masks, fit, best, kWide_px);
-      unsettled_ = moved_joint(best->state(), near, best->estimate());
+      PictureLog near = masks.about(best->at().corrections, kWide_px);
+      fit.refresh();
+      BatchFit wide = started(fit, best->state().x());
+      wide.run(kWide_px, {});
+      unsettled_ = moved_joint(best->state(), best->estimate(), wide.estimate());
+      if (unsettled_.empty()) {
+        *log_ = std::move(near);
+        fit.refresh();
+        return;
+      }
+      best.emplace(std::move(wide));
       for (const double reach_px : kReachesAgain) with_masks_anew(masks, fit, best, reach_px);
-      const auto back = moved_joint(best->state(), near, best->estimate());
-      if (unsettled_.empty()) unsettled_ = back;
-      if (unsettled_.empty()) return;
     }
   }
 
@@ -221,11 +228,6 @@ class Calibrator {
     BatchFit next = started(fit, best ? best->state().x() : Eigen::VectorXd());
     next.run(reach_px, {});
     best.emplace(std::move(next));
-    if (std::getenv("BS_DEBUG")) {
-      fmt::print("reach {} misfit {:.3f} rms {:.3f}", reach_px, best->misfit(), best->noise().front().sd_px());
-      for (Eigen::Index k = 0; k < best->state().joints(); ++k) fmt::print(" {:.2f}/{:.2f}", degrees(best->state().x()[k]), degrees(std::sqrt(best->estimate().covariance(k, k))));
-      fmt::print("\n");
-    }
   }
 
   /// A joint that two answers about one state place further apart than either claims to know it; empty: none.
@@ -238,9 +240,19 @@ class Calibrator {
   }
 
   /// What the masks show beyond the model is left out: a tool, somebody's arm.
-  void without_strangers(LogFit& fit, std::optional<BatchFit>& best) {
+  /// @param masks  that the log's were made with; null: they were given
+  void without_strangers(LogFit& fit, std::optional<BatchFit>& best, RawPictures* masks) {
     if (!is_near(*best)) return;
-    const auto beyond = beyond_model(*log_, best->at().corrections);
+    const auto& corrections = best->at().corrections;
+    BeyondModel beyond;
+    if (masks == nullptr) {
+      beyond = beyond_model(*log_, corrections);
+    } else {
+      // Masks that look no further than the outline may be off show hardly anything of it.
+      PictureLog near = masks->about(corrections, kWide_px);
+      beyond = beyond_model(*log_, corrections);
+      *log_ = std::move(near);
+    }
     if (beyond.pictures == 0) return;
     leave_out(*log_, beyond);
     fit.refresh();
