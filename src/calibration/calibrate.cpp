@@ -64,8 +64,7 @@ static_assert(kReaches.size() == kReachesMoved.size());
 constexpr double kWide_px = 12.0;  ///< ... and then once more, to see whether it makes a difference
 constexpr std::array kReachesAgain = {6.0, 4.0, 4.0};
 constexpr int kMostChecks = 3;
-constexpr double kSettled_sd = 2.0;       ///< statistical
-constexpr double kReachOfGiven_px = 4.0;  ///< ... after a fit to masks of others
+constexpr double kSettled_sd = 2.0;   ///< statistical
 constexpr std::size_t kRawKept = 64;  ///< observations of such a log whose pictures are looked at
 
 class Calibrator {
@@ -77,15 +76,17 @@ class Calibrator {
   }
 
   Calibration run() {
-    WatchedLog watched = watch_log(
-        pipeline_,
-        {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .kept = raw() || given() ? kRawKept : 12,
-         .quiet = options_.quiet}, false);
+    WatchedLog watched = watch_log(pipeline_,
+                                   {.log = options_.log,
+                                    .picture_rate_hz = options_.picture_rate_hz,
+                                    .kept = raw() ? kRawKept : 12,
+                                    .quiet = options_.quiet},
+                                   false);
     refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);
     log_ = &watched.pictures;
     if (!options_.quiet) bar_.emplace("calibration", 100);
     std::optional<RawPictures> masks;
-    if (raw() || given()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
+    if (raw()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
     const bool still = masks && masks->cameras_stood_still();
     if (raw() && still) masks->by_what_moved();
     find_cameras(still);
@@ -93,10 +94,7 @@ class Calibrator {
     std::optional<BatchFit> best;
     if (!raw() || still) best.emplace(fitted(fit, starts_));
     if (raw()) with_better_masks(*masks, fit, best);
-    if (given() && still) by_pictures_too(*masks, fit, best);
-    if (raw() || !pipeline_.learns_background()) {
-      without_strangers(fit, best, raw() || as_given_ ? &*masks : nullptr);
-    }
+    if (!raw() && !pipeline_.learns_background()) without_strangers(fit, best);
     progress(0.6);
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
@@ -125,9 +123,9 @@ class Calibrator {
       if (!to_be_searched(rig_.cameras[c])) continue;
       if (raw() && !moved) {
         throw DataError(
-            fmt::format("{}: camera '{}' is to be found, which takes masks of the robot, and vision.method "
-                        "statistics makes none before it is known where the robot is; give masks (vision.method: "
-                        "given) or say roughly where the camera is (cameras.{}.pose: roughly)",
+            fmt::format("{}: camera '{}' is to be found, which takes masks of the robot, and none are to be had "
+                        "before it is known where the robot is, as no background stands still in the pictures; give "
+                        "masks (vision.method: given) or say roughly where the camera is (cameras.{}.pose: roughly)",
                         options_.log.string(), rig_.cameras[c].name, rig_.cameras[c].name));
       }
       CameraSearch search(*log_, threads_of(options_));
@@ -158,52 +156,9 @@ class Calibrator {
   // --- pictures without masks -------------------------------------------------------------------
 
   [[nodiscard]] bool raw() const { return pipeline_.masks_need_estimates(); }
-  [[nodiscard]] bool given() const {
-    return configuration_.section("vision").text_or("method", "learned_background") == "given";
-  }
-
-  /// Masks of others bring the robot near. Where the cameras stood still, the pictures themselves say better where its
-  /// outline is than a network did; they are taken if the robot's outline then lies more closely.
-  void by_pictures_too(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
-    if (!is_near(*best)) return;
-    PictureLog as_given = masks.about(best->at().corrections, kReachOfGiven_px);
-    const Eigen::VectorXd x = best->state().x();
-    fit.refresh();
-    BatchFit once = started(fit, x);
-    once.run(0.0, {});
-    masks.about(once.at().corrections, kReachOfGiven_px);
-    fit.refresh();
-    BatchFit twice = started(fit, once.state().x());
-    twice.run(0.0, {});
-    const bool all = as_given.pictures().size() == log_->pictures().size();
-    if (all && outline_variance(twice) < outline_variance(*best)) {
-      best.emplace(std::move(twice));
-      as_given_.emplace(std::move(as_given));
-      return;
-    }
-    *log_ = std::move(as_given);
-    fit.refresh();
-  }
-
-  /// From the masks that were given, where there are any: they are a witness where pictures said better.
-  double outline_distance_px(LogFit& fit, const ErrorModel& model, std::span<const std::size_t> pictures = {}) {
-    if (!as_given_) return median_outline_distance_px(fit, model, pictures);
-    std::swap(*log_, *as_given_);
-    fit.refresh();
-    const double px = median_outline_distance_px(fit, model, pictures);
-    std::swap(*log_, *as_given_);
-    fit.refresh();
-    return px;
-  }
-
-  static double outline_variance(const BatchFit& batch) {
-    double sum = 0.0;
-    for (const auto& noise : batch.noise()) sum += noise.variance_px2();
-    return sum;
-  }
-
-  /// Masks and fit by turns, masks ever nearer to what the fit of all postures says, until it makes no difference how far
-  /// they looked: masks that are made about a prediction follow it, right or wrong, but the wider they look the less.
+  /// Masks and fit by turns, masks ever nearer to what the fit of all postures says, until it makes no difference how
+  /// far they looked: masks that are made about a prediction follow it, right or wrong, but the wider they look the
+  /// less.
   void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
     for (const double reach_px : best ? kReachesMoved : kReaches) with_masks_anew(masks, fit, best, reach_px);
     for (int again = 0; again < kMostChecks; ++again) {
@@ -240,19 +195,9 @@ class Calibrator {
   }
 
   /// What the masks show beyond the model is left out: a tool, somebody's arm.
-  /// @param masks  that the log's were made with; null: they were given
-  void without_strangers(LogFit& fit, std::optional<BatchFit>& best, RawPictures* masks) {
+  void without_strangers(LogFit& fit, std::optional<BatchFit>& best) {
     if (!is_near(*best)) return;
-    const auto& corrections = best->at().corrections;
-    BeyondModel beyond;
-    if (masks == nullptr) {
-      beyond = beyond_model(*log_, corrections);
-    } else {
-      // Masks that look no further than the outline may be off show hardly anything of it.
-      PictureLog near = masks->about(corrections, kWide_px);
-      beyond = beyond_model(*log_, corrections);
-      *log_ = std::move(near);
-    }
+    const auto beyond = beyond_model(*log_, best->at().corrections);
     if (beyond.pictures == 0) return;
     leave_out(*log_, beyond);
     fit.refresh();
@@ -275,9 +220,7 @@ class Calibrator {
   }
 
   /// Encoders and cameras as they are configured.
-  std::vector<Corrections> nominal(LogFit& fit) const {
-    return fit.predict(ErrorModel(log_->roles()), {}).corrections;
-  }
+  std::vector<Corrections> nominal(LogFit& fit) const { return fit.predict(ErrorModel(log_->roles()), {}).corrections; }
 
   // --- fit --------------------------------------------------------------------------------------
 
@@ -447,8 +390,8 @@ class Calibrator {
     result_.outline_sd_px = batch.noise().front().sd_px() * picture_unit(rig_.cameras.front().intrinsics);
     result_.outline_points_alike = batch.noise().front().correlated_points();
     describe_cameras(batch);
-    result_.outline_px.before = outline_distance_px(fit, ErrorModel(log_->roles()));
-    result_.outline_px.after = outline_distance_px(fit, state.model());
+    result_.outline_px.before = median_outline_distance_px(fit, ErrorModel(log_->roles()));
+    result_.outline_px.after = median_outline_distance_px(fit, state.model());
     result_.hand_sd_m = hand_sd_m(fit, batch);
     result_.views = views(fit, batch);
   }
@@ -588,7 +531,7 @@ class Calibrator {
       BatchFit part(fit, start, beliefs.tolerances, settings());
       part.start_at(batch.state().x());
       part.run(0.0, kept);
-      sum += outline_distance_px(fit, part.state().model(), left_out) * static_cast<double>(left_out.size());
+      sum += median_outline_distance_px(fit, part.state().model(), left_out) * static_cast<double>(left_out.size());
       n += static_cast<double>(left_out.size());
     }
     if (n > 0.0) result_.outline_px.heldout = sum / n;
@@ -667,11 +610,12 @@ class Calibrator {
                              result_.outline_px.after));
     }
     if (!unsettled_.empty()) {
-      return say(CalibrationState::kNotConverged,
-                 fmt::format("Not converged: without masks the answer depends on how far from the prediction the robot's "
-                             "outline is looked for ({} moves by more than {:.0f} standard deviations); record more "
-                             "postures, or give masks (vision.method: given).",
-                             unsettled_, kSettled_sd));
+      return say(
+          CalibrationState::kNotConverged,
+          fmt::format("Not converged: without masks the answer depends on how far from the prediction the robot's "
+                      "outline is looked for ({} moves by more than {:.0f} standard deviations); record more "
+                      "postures, or give masks (vision.method: given).",
+                      unsettled_, kSettled_sd));
     }
     if (only_ < kOnly) {
       return say(CalibrationState::kNotConverged,
@@ -737,7 +681,6 @@ class Calibrator {
   Pipeline pipeline_;
   StereoRig rig_;
   PictureLog* log_ = nullptr;
-  std::optional<PictureLog> as_given_;  ///< with the masks of others, where the log has better ones now
   std::vector<StereoRig> starts_;
   std::string unsettled_;  ///< a joint whose offset depends on how masks were made
   double ambiguity_ = 0.0;

@@ -103,9 +103,8 @@ PictureLog RawPictures::about(std::span<const Corrections> corrections, double r
 
 std::size_t RawPictures::picture_of(std::size_t camera, Microseconds utime) const {
   const auto pictures = log_.pictures();
-  const auto found = std::find_if(pictures.begin(), pictures.end(), [&](const Picture& p) {
-    return p.camera == camera && p.joints.utime == utime;
-  });
+  const auto found = std::find_if(pictures.begin(), pictures.end(),
+                                  [&](const Picture& p) { return p.camera == camera && p.joints.utime == utime; });
   return static_cast<std::size_t>(found - pictures.begin());
 }
 

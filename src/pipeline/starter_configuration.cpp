@@ -493,8 +493,9 @@ class Starter {
     if (stills_) {
       double width = 0.0;
       for (const auto& camera : cameras_) width = std::max(width, static_cast<double>(camera.k.width));
-      text += fmt::format("    principal_point common: {{sd_px: {:.1f}}} # of calibrations of one camera after the other\n",
-                          kCentre_share * width);
+      text +=
+          fmt::format("    principal_point common: {{sd_px: {:.1f}}} # of calibrations of one camera after the other\n",
+                      kCentre_share * width);
     }
     if (straight && !o_.rectified && cameras_.size() == 1) {
       text += fmt::format("    distortion: {{sd: {}}}           # a lens without any is none\n", kLens_sd);

@@ -26,6 +26,7 @@ class BeyondTheModel : public DrawnLog {
     return rig_.cameras[p.camera].intrinsics.project(projection.hand().translation());
   }
   static void paint(CameraObservation& seen, const Eigen::Vector2d& at, int half_px, bool robot) {
+    std::printf("at %.1f %.1f mask %dx%d coverage %zu\n", at.x(), at.y(), seen.mask.width(), seen.mask.height(), seen.coverage.size());
     for (int v = static_cast<int>(at.y()) - half_px; v <= static_cast<int>(at.y()) + half_px; ++v) {
       for (int u = static_cast<int>(at.x()) - half_px; u <= static_cast<int>(at.x()) + half_px; ++u) {
         if (u < 0 || v < 0 || u >= seen.mask.width() || v >= seen.mask.height()) continue;
