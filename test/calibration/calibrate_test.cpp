@@ -174,7 +174,7 @@ TEST_F(Calibrated, ACameraThatMovedIsNotFoundWithoutMasks) {
   const auto configuration =
       arm7("estimator.yaml", {"vision.method=statistics", "cameras.left.pose=unknown", "cameras.right.pose=unknown"});
   EXPECT_THAT([&] { (void)calibrate(configuration, options); },
-              ::testing::ThrowsMessage<DataError>(HasSubstr("'left' is to be found, which takes masks")));
+              ::testing::ThrowsMessage<DataError>(HasSubstr("camera 'left' is to be found")));
 }
 
 }  // namespace
