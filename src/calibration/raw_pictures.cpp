@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/outline/outline_measurement.hpp"
 #include "bodyschema/pipeline/silhouette_preview.hpp"
 #include "bodyschema/vision/mask_operations.hpp"
@@ -39,6 +40,19 @@ RawPictures::RawPictures(PictureLog& log, const VisionSetup& vision, const std::
     : log_(log), vision_(with_auto(vision)), kept_(kept) {
   for (const auto& camera : log.rig().cameras) {
     segmenters_.emplace_back(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height);
+    shown_.push_back(camera.has_distortion() ? Undistorter(camera).valid() : BinaryMask());
+  }
+}
+
+void RawPictures::segment(std::size_t camera, const Image& image, const PredictedRobot& predicted,
+                          CameraObservation& out) {
+  segmenters_[camera].segment(image, out.mask, out.valid, out.coverage, predicted);
+  const BinaryMask& shown = shown_[camera];
+  for (int v = 0; v < shown.height(); ++v) {
+    for (int w = 0; w < shown.words_per_row(); ++w) {
+      out.mask.row(v)[w] &= shown.row(v)[w];
+      out.valid.row(v)[w] &= shown.row(v)[w];
+    }
   }
 }
 
@@ -56,7 +70,7 @@ bool RawPictures::cameras_stood_still() {
     for (std::size_t i = 0; i < kept_.size(); ++i) {
       auto& camera = moved_[i].cameras[c];
       if (!camera) continue;
-      segmenters_[c].segment(kept_[i].cameras[c]->image, camera->mask, camera->valid, camera->coverage);
+      segment(c, kept_[i].cameras[c]->image, {}, *camera);
       all += static_cast<std::size_t>(camera->mask.width()) * static_cast<std::size_t>(camera->mask.height());
       known += camera->valid.count();
     }
@@ -94,8 +108,7 @@ PictureLog RawPictures::about(std::span<const Corrections> corrections, double r
     segmenters_[c].learn(frames, robots);
     for (std::size_t k = 0; k < where.size(); ++k) {
       auto& camera = *seen[where[k]].cameras[c];
-      segmenters_[c].segment(frames[k], camera.mask, camera.valid, camera.coverage,
-                             PredictedRobot(&predicted[k], reach, false));
+      segment(c, frames[k], PredictedRobot(&predicted[k], reach, false), camera);
     }
   }
   return replace(seen, false);

@@ -36,7 +36,11 @@ class RawPictures {
   PictureLog& log_;
   VisionSetup vision_;
   const std::vector<Observation>& kept_;
+  /// Masks of one picture; what lies beyond the edge of a straightened picture does not count.
+  void segment(std::size_t camera, const Image& image, const PredictedRobot& predicted, CameraObservation& out);
+
   std::vector<Segmenter> segmenters_;  ///< one per camera
+  std::vector<BinaryMask> shown_;      ///< by camera, where its lens shows something; empty: everywhere
   std::vector<Observation> moved_;     ///< masks of what moves
 };
 
