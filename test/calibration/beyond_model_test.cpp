@@ -48,7 +48,7 @@ TEST_F(BeyondTheModel, MasksOfTheModelHaveNothing) {
   EXPECT_TRUE(beyond.on_link.empty()) << beyond.on_link;
 }
 
-TEST_F(BeyondTheModel, AThingInTheHandIsFoundNamedAndLeftOut) {
+TEST_F(BeyondTheModel, AThingAtTheArmsEndIsFoundAndLeftOut) {
   auto observations = healthy();
   const Eigen::Vector2d at = tip(*observations[0].cameras[0]);
   for (auto& observation : observations) {
@@ -57,7 +57,6 @@ TEST_F(BeyondTheModel, AThingInTheHandIsFoundNamedAndLeftOut) {
   auto log = log_of(observations);
   const auto beyond = look_at(*log);
   EXPECT_EQ(beyond.pictures, log->pictures().size());
-  EXPECT_FALSE(beyond.on_link.empty());
   const std::size_t pictures = log->pictures().size();
   leave_out(*log, beyond);
   ASSERT_EQ(log->pictures().size(), pictures);
