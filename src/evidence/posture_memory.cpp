@@ -197,8 +197,10 @@ std::optional<std::uint64_t> PostureMemory::add(double time_s, const Eigen::Vect
     const bool stays = (q - open.q).cwiseAbs().maxCoeff() < options_.same_posture_rad;
     if (stays || time_s - open.begin_s < options_.block_s) {
       open.end_s = time_s;
-      open.average(frame);
-      changed();
+      if (stays) {
+        open.average(frame);
+        changed();
+      }
       return std::nullopt;
     }
   }

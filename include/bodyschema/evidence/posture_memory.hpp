@@ -61,10 +61,11 @@ struct Innovation {
 /// What postures taught about a state, kept posture by posture: the fused estimate, the same without any of them and
 /// the test of a new one come from the same sums.
 ///
-/// A block is one posture of the arm, or a quarter of a second of motion. It counts as one frame, and says what its
-/// frames say on average: what the model gets wrong in a posture it gets wrong in all pictures of it, so that more of
-/// them make nothing surer; but what noise does to one of them is not taken for the arm's. A posture that comes again
-/// takes the place of what it said before. Every block is linearised about one state, and again when
+/// A block is one posture of the arm, or a quarter of a second of motion. It counts as one frame: what the model gets
+/// wrong in a posture it gets wrong in all pictures of it, so that more of them make nothing surer. While the arm stands
+/// it says what its frames say on average, so that one frame's noise is not taken for the arm's; of motion the first
+/// frame speaks. A posture that comes again takes the place of what it said before. Every block is linearised about one
+/// state, and again when
 /// the estimate has moved on: quadratics from different places claim to know directions that no picture tells (Huang et
 /// al., 2010, on the consistency of filters for simultaneous localisation and mapping). What blocks disagree about
 /// beyond their pictures' noise is learned as an error of every posture, in the joints' angles (a variance component,
