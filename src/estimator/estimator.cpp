@@ -14,6 +14,7 @@
 #include "bodyschema/evidence/distributions.hpp"
 #include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/filter/particle_filter.hpp"
+#include "bodyschema/search/search_level.hpp"
 #include "explanations.hpp"
 #include "eye_order.hpp"
 #include "frame_model.hpp"
@@ -108,9 +109,11 @@ struct Estimator::Impl {
       : options(estimator_options), setup(robot_setup), rig(stereo_rig),
         state_at_first(without_offsets(known), beliefs.state),
         considered(Considered::beside(state_at_first, beliefs.tolerances)),
-        model(robot, setup, rig, known.roles(), state_at_first, considered.effects), joints(model.state().joints()),
-        scorer(model, silhouette_model(*robot, setup), rig.intrinsics(), options.silhouette, options.filter.particles,
-               !particles_only()),
+        outlines(particles_only() ? silhouette_model(*robot, setup)
+                                  : outline_level(silhouette_model(*robot, setup), rig.intrinsics())),
+        model(robot, setup, rig, known.roles(), state_at_first, considered.effects, &outlines), joints(model.state().joints()),
+        scorer(model, silhouette_model(*robot, setup), particles_only() ? nullptr : &outlines, rig.intrinsics(),
+               options.silhouette, options.filter.particles),
         filter(joints, options.filter), memory(memory_layout(model.state(), considered), options.memory),
         fitter(model, scorer, options, rig.cameras.size()), state(model.state().prior_mean()),
         in_frame(memory.estimate()), stalled(joints) {
@@ -790,6 +793,7 @@ struct Estimator::Impl {
   StereoRig rig;
   State state_at_first;
   Considered considered;
+  SilhouetteModel outlines;  ///< what outlines and pictures to look at are drawn from
   FrameModel model;
   Frame frame;                           ///< the last one; its observation is gone once `step` has returned
   Eigen::Index joints;                   ///< estimated ones; the first entries of a state

@@ -38,8 +38,12 @@ void OutlineEvidence::clear(Eigen::Index coordinates) {
 
 OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
                                        const StereoRig& rig, const JointRoles& roles)
+    : OutlineMeasurement(robot, setup, rig, roles, silhouette_model(*robot, setup)) {}
+
+OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
+                                       const StereoRig& rig, const JointRoles& roles, const SilhouetteModel& drawn)
     : coordinates_(roles), projection_(robot, setup, rig, roles), moved_(robot, setup, rig, roles),
-      extractor_(silhouette_model(*robot, setup), rig.intrinsics()), probe_(roles.no_corrections()),
+      extractor_(drawn, rig.intrinsics()), probe_(roles.no_corrections()),
       X_CB_(projection_.part_count()) {}
 
 void OutlineMeasurement::linearise(const ObservedEdges& edges, const Eigen::Ref<const Eigen::VectorXd>& q,

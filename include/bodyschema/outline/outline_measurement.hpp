@@ -66,6 +66,9 @@ class OutlineMeasurement {
  public:
   OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
                      const JointRoles& roles);
+  /// @param drawn  the rendered links' meshes as outlines are taken from, one per mesh of the robot
+  OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                     const JointRoles& roles, const SilhouetteModel& drawn);
 
   [[nodiscard]] const Coordinates& coordinates() const { return coordinates_; }
   [[nodiscard]] RobotProjection& projection() { return projection_; }
