@@ -69,12 +69,9 @@ SearchLevel search_level(const SilhouetteModel& model, std::span<const PinholeIn
 }
 
 SilhouetteModel outline_level(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras) {
-  constexpr int kRows = 240;
-  std::vector<PinholeIntrinsics> pictures;
-  for (const auto& camera : cameras) {
-    pictures.push_back(every_nth_pixel(camera, std::max(1, shorter_side(cameras) / kRows)));
-  }
-  return simplified(model, search_mesh_bound_m(model, pictures));
+  constexpr double kRows = 240.0, kFiner = 0.25;
+  const double rows = shorter_side(cameras);
+  return simplified(model, kFiner * search_mesh_bound_m(model, cameras) * rows / std::min(rows, kRows));
 }
 
 }  // namespace bodyschema
