@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+
+#include "bodyschema/camera/lens_knowledge.hpp"
 
 namespace bodyschema {
 
@@ -83,6 +86,18 @@ std::vector<Belief> camera_beliefs(const StereoRig& rig) {
   return list;
 }
 
+/// Of what a lens does beyond its configuration; where cameras differ, of the one that is known least. Nothing where the
+/// configuration says what to believe.
+std::optional<Belief> lens_belief(const Configuration& configuration, const StereoRig& rig) {
+  if (configuration.section("estimator").section("state").has("distortion")) return std::nullopt;
+  double sd = 0.0;
+  for (const auto& camera : rig.cameras) {
+    sd = std::max(sd, lens_sd(lens_knowledge(configuration.section("cameras").section(camera.name))));
+  }
+  if (sd == 0.0) return std::nullopt;
+  return Belief{"distortion", {}, {sd}};
+}
+
 Beliefs Beliefs::from(const Configuration& configuration, const JointRoles& roles, const StereoRig& rig,
                       const EstimatorOptions& options) {
   Beliefs beliefs;
@@ -92,6 +107,7 @@ Beliefs Beliefs::from(const Configuration& configuration, const JointRoles& role
                   [&](const Belief& b) { return b.effect == belief.effect && b.target == belief.target; });
     beliefs.state.push_back(std::move(belief));
   }
+  if (auto lens = lens_belief(configuration, rig)) beliefs.state.push_back(std::move(*lens));
   beliefs.tolerances = read_beliefs(configuration.section("robot").section("tolerances"), roles);
   for (const char* section : {"estimator", "robot"}) {
     const char* key = section == std::string("robot") ? "tolerances" : "state";

@@ -9,6 +9,7 @@
 #include <exception>
 #include <stdexcept>
 
+#include "bodyschema/camera/lens_knowledge.hpp"
 #include "bodyschema/imports/joint_mapping.hpp"
 #include "bodyschema/imports/yarp_import.hpp"
 #include "bodyschema/outline/outline_measurement.hpp"
@@ -73,10 +74,11 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
         !vision_.background_pictures.contains(camera.name)) {
       configuration.section("vision").section("background_pictures").fail(camera.name, "a file for each camera");
     }
-    if (!configuration.section("cameras").section(camera.name).has("distortion")) {
+    if (lens_knowledge(configuration.section("cameras").section(camera.name)) == LensKnowledge::kUnknown) {
       spdlog::warn(
-          "camera '{}' has no distortion in the configuration and is taken to have none: most lenses bend by more than "
-          "offsets are worth; set cameras.{}.distortion, to zeros where pictures come straightened",
+          "camera '{}' has no distortion in the configuration: how its lens bends pictures (k1) is estimated beside the "
+          "offsets, which takes longer and tells them less well; set cameras.{}.distortion, to none where pictures "
+          "come straightened",
           camera.name, camera.name);
     }
     std::optional<Undistorter> undistorter;
@@ -120,6 +122,21 @@ void Pipeline::take_background_from(Pipeline& other) {
   }
   for (std::size_t c = 0; c < eyes_.size(); ++c) eyes_[c].segmenter = std::move(other.eyes_[c].segmenter);
   background_watch_.take_from(other.background_watch_);
+}
+
+LooksByCamera Pipeline::looks() const {
+  LooksByCamera looks;
+  for (std::size_t c = 0; c < eyes_.size(); ++c) {
+    if (eyes_[c].segmenter.looks().known()) looks[rig_.cameras[c].name] = eyes_[c].segmenter.looks();
+  }
+  return looks;
+}
+
+void Pipeline::know_looks(const LooksByCamera& looks) {
+  for (std::size_t c = 0; c < eyes_.size(); ++c) {
+    const auto found = looks.find(rig_.cameras[c].name);
+    if (found != looks.end()) eyes_[c].segmenter.know_looks(found->second);
+  }
 }
 
 void Pipeline::learn_from(const Observation& observation) {

@@ -290,6 +290,10 @@ Health assess(const HealthFacts& facts) {
   for (const auto& cause : facts.estimate.findings.causes) {
     if (!cause.estimated) found += (found.empty() ? "" : "; ") + cause.text();
   }
+  // What a file should say is named although it is taken into account.
+  for (const auto& cause : facts.estimate.findings.causes) {
+    if (cause.estimated && cause.effect == "distortion") health.sentence += "; taken into account: " + cause.sentence;
+  }
   if (!found.empty() && health.level != HealthLevel::kStale) {
     health.sentence += "; the pictures ask for: " + found;
     health.level = std::max(health.level, HealthLevel::kWarn);

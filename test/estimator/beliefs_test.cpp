@@ -46,6 +46,22 @@ TEST_F(BeliefsOfOwnRobot, PaperModeEstimatesTheArmAlone) {
   EXPECT_GT(read(load()).state.size(), 7u);
 }
 
+TEST_F(BeliefsOfOwnRobot, ALensNobodyCalibratedIsEstimated) {
+  const auto sd = [&](const std::vector<std::string>& overrides) {
+    const auto beliefs = read(load(overrides));
+    const Belief* lens = find(beliefs.state, "distortion");
+    return lens == nullptr ? 0.0 : lens->sd.at(0);
+  };
+  EXPECT_EQ(sd({}), 0.0) << "that of the simulator says that there is none";
+  EXPECT_EQ(sd({"cameras.left.distortion=unknown"}), 0.2);
+  EXPECT_EQ(sd({"cameras.left.distortion=[-0.3, 0, 0, 0, 0]"}), 0.01);
+  EXPECT_EQ(sd({"cameras.left.distortion=[-0.3, 0, 0, 0, 0]", "cameras.right.distortion=unknown"}), 0.2);
+  EXPECT_EQ(sd({"cameras.left.distortion=unknown", "estimator.state.distortion.sd=0.05"}), 0.05)
+      << "what the configuration believes goes first";
+  EXPECT_EQ(sd({"cameras.left.distortion=unknown", "estimator.state.distortion.sd=0"}), 0.0);
+  EXPECT_EQ(sd({"cameras.left.distortion=unknown", "estimator.mode=paper"}), 0.0);
+}
+
 TEST_F(BeliefsOfOwnRobot, OfTheHeadOnlyWhatMovesBothEyes) {
   const auto beliefs = read(load({"estimator.state.head_offset.sd_deg=2"}));
   for (const char* joint : {"neck_pitch", "neck_roll", "neck_yaw", "eyes_tilt"}) {

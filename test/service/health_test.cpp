@@ -98,6 +98,16 @@ TEST(Health, EncodersLateButUsed) {
   expect(facts, HealthLevel::kWarn, "encoders late by 140 ms");
 }
 
+TEST(Health, ALensThatIsTakenIntoAccountIsNamed) {
+  HealthFacts facts = well();
+  Finding lens;
+  lens.effect = "distortion";
+  lens.sentence = "the lens bends the picture inwards (k1) by -0.30 more than configured";
+  lens.estimated = true;
+  facts.estimate.findings.causes = {lens};
+  expect(facts, HealthLevel::kOk, "taken into account: the lens bends the picture inwards (k1) by -0.30");
+}
+
 TEST(Health, EncodersTooLateToBeUsed) {
   HealthFacts facts = well();
   facts.estimated_since_last = 0;
