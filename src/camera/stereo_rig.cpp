@@ -5,6 +5,7 @@
 #include <set>
 
 #include "bodyschema/camera/lens_knowledge.hpp"
+#include "bodyschema/camera/shutter.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 
@@ -104,6 +105,7 @@ CameraModel read_camera(const Configuration& section, const std::string& name) {
   k.fy = section.number("fy", kMinFocal, kMaxFocal);
   k.cx = section.number("cx", -kMaxSide, 2 * kMaxSide);
   k.cy = section.number("cy", -kMaxSide, 2 * kMaxSide);
+  static_cast<void>(shutter_of(section));  // checked with the rest; what moves while rows are read out is a belief
   if (lens_knowledge(section) == LensKnowledge::kCalibrated) {
     const auto distortion = section.numbers("distortion");
     std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "bodyschema/camera/lens_knowledge.hpp"
+#include "bodyschema/camera/shutter.hpp"
 
 namespace bodyschema {
 
@@ -98,6 +99,17 @@ std::optional<Belief> lens_belief(const Configuration& configuration, const Ster
   return Belief{"distortion", {}, {sd}};
 }
 
+/// Of how long pictures take to be read out, where no camera's configuration says so.
+std::optional<Belief> shutter_belief(const Configuration& configuration, const StereoRig& rig) {
+  if (configuration.section("estimator").section("state").has("rolling_shutter")) return std::nullopt;
+  double sd_s = 0.0;
+  for (const auto& camera : rig.cameras) {
+    sd_s = std::max(sd_s, shutter_of(configuration.section("cameras").section(camera.name)).sd_s);
+  }
+  if (sd_s == 0.0) return std::nullopt;
+  return Belief{"rolling_shutter", {}, {sd_s}};
+}
+
 Beliefs Beliefs::from(const Configuration& configuration, const JointRoles& roles, const StereoRig& rig,
                       const EstimatorOptions& options) {
   Beliefs beliefs;
@@ -108,6 +120,7 @@ Beliefs Beliefs::from(const Configuration& configuration, const JointRoles& role
     beliefs.state.push_back(std::move(belief));
   }
   if (auto lens = lens_belief(configuration, rig)) beliefs.state.push_back(std::move(*lens));
+  if (auto shutter = shutter_belief(configuration, rig)) beliefs.state.push_back(std::move(*shutter));
   beliefs.tolerances = read_beliefs(configuration.section("robot").section("tolerances"), roles);
   for (const char* section : {"estimator", "robot"}) {
     const char* key = section == std::string("robot") ? "tolerances" : "state";

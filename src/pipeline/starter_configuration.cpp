@@ -447,7 +447,7 @@ class Starter {
     const auto& k = camera.k;
     text += fmt::format(
         "    width: {}\n    height: {}\n    fx: {:.8g}{}\n    fy: {:.8g}\n    cx: {:.8g}\n    cy: {:.8g}\n"
-        "    distortion: {}\n",
+        "    distortion: {}\n    readout_ms: unknown             # of a rolling shutter; 0: all rows at once\n",
         k.width, k.height, k.fx,
         camera.source.empty() ? o_.focal_px > 0.0 ? "" : "                   # a guess" : "  # " + camera.source, k.fy,
         k.cx, k.cy, lens_of(camera));

@@ -62,6 +62,14 @@ TEST_F(BeliefsOfOwnRobot, ALensNobodyCalibratedIsEstimated) {
   EXPECT_EQ(sd({"cameras.left.distortion=unknown", "estimator.mode=paper"}), 0.0);
 }
 
+TEST_F(BeliefsOfOwnRobot, HowLongPicturesAreReadOutIsEstimatedWhereNobodyKnows) {
+  EXPECT_EQ(find(read(load()).state, "rolling_shutter"), nullptr);
+  EXPECT_EQ(find(read(load({"cameras.left.readout_ms=20"})).state, "rolling_shutter"), nullptr);
+  const auto beliefs = read(load({"cameras.left.readout_ms=unknown"}));
+  ASSERT_NE(find(beliefs.state, "rolling_shutter"), nullptr);
+  EXPECT_NEAR(find(beliefs.state, "rolling_shutter")->sd.at(0), 0.015, 1e-12);
+}
+
 TEST_F(BeliefsOfOwnRobot, OfTheHeadOnlyWhatMovesBothEyes) {
   const auto beliefs = read(load({"estimator.state.head_offset.sd_deg=2"}));
   for (const char* joint : {"neck_pitch", "neck_roll", "neck_yaw", "eyes_tilt"}) {

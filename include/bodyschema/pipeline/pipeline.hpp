@@ -146,6 +146,7 @@ class Pipeline {
   Beliefs beliefs_;
   std::vector<Eye> eyes_;  ///< those of the other thread while it looks ahead
   std::vector<PictureChange> changes_;
+  std::vector<double> readouts_s_;  ///< of each camera, as configured
   BackgroundWatch background_watch_;
   std::vector<double> background_turned_rad_;
   Estimator estimator_;
