@@ -462,13 +462,14 @@ class Starter {
         "vision:\n"
         "  method: {}                # or {}: "
         "docs/calibrate_my_robot.md\n"
+        "  looks_file: looks.json      # the robot's colours, which a service keeps for its next start (auto)\n"
         "bus:\n"
         "  channel_prefix: {}\n",
         masks_     ? "given"
         : learned_ ? "learned_background"
-                   : "statistics",
-        masks_     ? "statistics, without masks"
-        : learned_ ? "statistics, where the cameras move"
+                   : "auto",
+        masks_     ? "auto, without masks"
+        : learned_ ? "auto, where the cameras move"
                    : "single_colour, learned_background",
         yaml(o_.channel_prefix));
     text += state_yaml();

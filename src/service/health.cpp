@@ -192,7 +192,7 @@ std::string turned_away(const HealthFacts& f) {
   if (turned_rad <= 0.0) return "";
   return fmt::format(
       "the head has turned by {:.1f} deg from where the background was learned, masks are wrong: set "
-      "vision.method: statistics",
+      "vision.method: auto",
       degrees(turned_rad));
 }
 

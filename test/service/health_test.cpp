@@ -80,7 +80,7 @@ TEST(Health, TheHeadHasTurnedFromItsBackground) {
   facts.cameras[1].background_turned_rad = 0.21;
   expect(facts, HealthLevel::kWarn,
          "the head has turned by 12.0 deg from where the background was learned, masks are wrong: set "
-         "vision.method: statistics");
+         "vision.method: auto");
   facts.estimate.state = EstimatorState::kDiverged;
   expect(facts, HealthLevel::kError, "diverged: ");
   expect(facts, HealthLevel::kError, "; the head has turned by 12.0 deg");
