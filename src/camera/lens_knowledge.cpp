@@ -1,7 +1,5 @@
 #include "bodyschema/camera/lens_knowledge.hpp"
 
-#include <algorithm>
-
 #include "bodyschema/core/error.hpp"
 
 namespace bodyschema {
@@ -28,8 +26,7 @@ LensKnowledge lens_knowledge(const Configuration& camera) {
   const auto numbers = camera.numbers("distortion");
   constexpr std::size_t kCoefficients = 5;
   if (numbers.size() != kCoefficients) camera.fail("distortion", kExpected);
-  const bool zero = std::all_of(numbers.begin(), numbers.end(), [](double d) { return d == 0.0; });
-  return zero ? LensKnowledge::kNone : LensKnowledge::kCalibrated;
+  return LensKnowledge::kCalibrated;
 }
 
 double lens_sd(LensKnowledge knowledge) {

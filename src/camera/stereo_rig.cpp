@@ -105,7 +105,7 @@ CameraModel read_camera(const Configuration& section, const std::string& name) {
   k.fy = section.number("fy", kMinFocal, kMaxFocal);
   k.cx = section.number("cx", -kMaxSide, 2 * kMaxSide);
   k.cy = section.number("cy", -kMaxSide, 2 * kMaxSide);
-  static_cast<void>(shutter_of(section));  // checked with the rest; what moves while rows are read out is a belief
+  static_cast<void>(readout_s(section));  // checked with the rest; what moves while rows are read out is a belief
   if (lens_knowledge(section) == LensKnowledge::kCalibrated) {
     const auto distortion = section.numbers("distortion");
     std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());

@@ -99,15 +99,10 @@ std::optional<Belief> lens_belief(const Configuration& configuration, const Ster
   return Belief{"distortion", {}, {sd}};
 }
 
-/// Of how long pictures take to be read out, where no camera's configuration says so.
-std::optional<Belief> shutter_belief(const Configuration& configuration, const StereoRig& rig) {
-  if (configuration.section("estimator").section("state").has("rolling_shutter")) return std::nullopt;
-  double sd_s = 0.0;
-  for (const auto& camera : rig.cameras) {
-    sd_s = std::max(sd_s, shutter_of(configuration.section("cameras").section(camera.name)).sd_s);
-  }
-  if (sd_s == 0.0) return std::nullopt;
-  return Belief{"rolling_shutter", {}, {sd_s}};
+/// Whether the configuration says how long the pictures of every camera are read out.
+bool shutters_known(const Configuration& cameras, const StereoRig& rig) {
+  return std::all_of(rig.cameras.begin(), rig.cameras.end(),
+                     [&](const CameraModel& camera) { return readout_s(cameras.section(camera.name)).has_value(); });
 }
 
 Beliefs Beliefs::from(const Configuration& configuration, const JointRoles& roles, const StereoRig& rig,
@@ -120,7 +115,9 @@ Beliefs Beliefs::from(const Configuration& configuration, const JointRoles& role
     beliefs.state.push_back(std::move(belief));
   }
   if (auto lens = lens_belief(configuration, rig)) beliefs.state.push_back(std::move(*lens));
-  if (auto shutter = shutter_belief(configuration, rig)) beliefs.state.push_back(std::move(*shutter));
+  if (shutters_known(configuration.section("cameras"), rig)) {
+    std::erase_if(beliefs.state, [](const Belief& b) { return b.effect == "rolling_shutter"; });
+  }
   beliefs.tolerances = read_beliefs(configuration.section("robot").section("tolerances"), roles);
   for (const char* section : {"estimator", "robot"}) {
     const char* key = section == std::string("robot") ? "tolerances" : "state";

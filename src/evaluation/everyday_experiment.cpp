@@ -98,9 +98,7 @@ EverydayFrame frame_of(const Estimate& estimate, const simulator::SimulatedFrame
 std::vector<EverydayFrame> play(const ExperimentContext& context, const Job& job) {
   // A configuration of its own: they are read by one thread.
   // One method throughout, that nobody has to choose; --set vision.method compares others.
-  // Nor does anybody know how long the cameras take to read a picture out.
-  std::vector<std::string> overrides = {"vision.method=auto", "cameras.left.readout_ms=unknown",
-                                        "cameras.right.readout_ms=unknown"};
+  std::vector<std::string> overrides = {"vision.method=auto"};
   overrides.insert(overrides.end(), context.options.overrides.begin(), context.options.overrides.end());
   overrides.push_back("filter.seed=" + std::to_string(job.seed * 1000003u + 17u));
   overrides.emplace_back("silhouette.threads=1");

@@ -31,7 +31,7 @@ StereoRig corrected(const StereoRig& rig, const std::optional<ErrorModel>& model
 
 std::vector<double> readouts_of(const Configuration& cameras, const StereoRig& rig) {
   std::vector<double> readouts_s;
-  for (const auto& camera : rig.cameras) readouts_s.push_back(shutter_of(cameras.section(camera.name)).readout_s);
+  for (const auto& camera : rig.cameras) readouts_s.push_back(readout_s(cameras.section(camera.name)).value_or(0.0));
   return readouts_s;
 }
 
@@ -91,7 +91,7 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
     if (lens_knowledge(configuration.section("cameras").section(camera.name)) == LensKnowledge::kUnknown) {
       spdlog::warn(
           "camera '{}' has no distortion in the configuration: how its lens bends pictures (k1) is estimated beside the "
-          "offsets, which takes longer and tells them less well; set cameras.{}.distortion, to none where pictures "
+          "offsets, which takes longer and tells them less well; set cameras.{}.distortion, to zeros where pictures "
           "come straightened",
           camera.name, camera.name);
     }

@@ -420,7 +420,7 @@ class Starter {
   [[nodiscard]] std::string lens_of(const StarterCamera& camera) const {
     const bool bends = std::any_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d != 0.0; });
     if (bends) return fmt::format("[{:.8g}]", fmt::join(camera.distortion, ", "));
-    return o_.rectified ? "none" : "unknown             # k1 is estimated; none: pictures come straightened";
+    return o_.rectified ? "[0, 0, 0, 0, 0]" : "unknown             # k1 is estimated; zeros: pictures come straightened";
   }
 
   [[nodiscard]] std::string camera_yaml(std::size_t c) const {

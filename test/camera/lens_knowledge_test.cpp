@@ -16,7 +16,7 @@ TEST(LensKnowledge, IsWhatTheConfigurationSays) {
   EXPECT_EQ(of(""), LensKnowledge::kUnknown);
   EXPECT_EQ(of(", distortion: unknown"), LensKnowledge::kUnknown);
   EXPECT_EQ(of(", distortion: none"), LensKnowledge::kNone);
-  EXPECT_EQ(of(", distortion: [0, 0, 0, 0, 0]"), LensKnowledge::kNone);
+  EXPECT_EQ(of(", distortion: [0, 0, 0, 0, 0]"), LensKnowledge::kCalibrated);
   EXPECT_EQ(of(", distortion: [0, 0, 0, 0, 0.01]"), LensKnowledge::kCalibrated);
 }
 

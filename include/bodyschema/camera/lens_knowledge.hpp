@@ -6,8 +6,8 @@ namespace bodyschema {
 
 /// How well the configuration knows how a lens bends its pictures.
 enum class LensKnowledge {
-  kNone,        ///< `distortion: none`, or five zeros: it does not bend them, or they come straightened
-  kCalibrated,  ///< five numbers that somebody measured
+  kNone,        ///< `distortion: none`: it does not bend them at all, as of a simulator
+  kCalibrated,  ///< five numbers that somebody measured; zeros, where pictures come straightened
   kUnknown,     ///< `distortion: unknown`, or left out: nobody calibrated it
 };
 

@@ -1,16 +1,13 @@
 #pragma once
 
+#include <optional>
+
 #include "bodyschema/core/configuration.hpp"
 
 namespace bodyschema {
 
-/// What the configuration knows of how a camera reads its rows out.
-struct Shutter {
-  double readout_s = 0.0;  ///< the last row is exposed this much later than the first; 0: all at once
-  double sd_s = 0.0;       ///< standard deviation that is believed of it
-};
-
-/// Of a camera's section: `readout_ms`, a number, `unknown`, or left out: all rows at once. Throws ConfigurationError.
-Shutter shutter_of(const Configuration& camera);
+/// How much later the last row of a camera's pictures is exposed than the first, s (rolling shutter): `readout_ms` of
+/// its section; 0: all rows at once. Absent where that is left out or `unknown`. Throws ConfigurationError.
+std::optional<double> readout_s(const Configuration& camera);
 
 }  // namespace bodyschema
