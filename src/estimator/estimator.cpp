@@ -10,6 +10,7 @@
 #include <numeric>
 #include <optional>
 
+#include "bodyschema/camera/bent_silhouette.hpp"
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "bodyschema/evidence/distributions.hpp"
 #include "bodyschema/filter/hammoude.hpp"
@@ -723,6 +724,14 @@ struct Estimator::Impl {
   }
 
   /// The state that an estimate reports.
+  /// The silhouette of parts placed by a state, as the lens shows it.
+  [[nodiscard]] BinaryMask drawn(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera, const Exposure& exposure,
+                                 const Eigen::VectorXd& x) {
+    Corrections corrections;
+    model.corrections(exposure, x, corrections);
+    return bent_silhouette(scorer.render(X_CB, camera), rig.cameras[camera].intrinsics, corrections.camera.k1);
+  }
+
   [[nodiscard]] Eigen::VectorXd state_of(const Estimate& estimate) const {
     Eigen::VectorXd x = model.state().prior_mean();
     x.head(joints) = estimate.offset_rad;
@@ -868,15 +877,16 @@ BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::
   std::vector<Eigen::Isometry3f> X_CB(impl_->model.part_count());
   const Exposure exposure = impl_->model.preview(observation.cameras[camera]->joints, camera);
   (corrected ? impl_->model.project(exposure, impl_->state) : impl_->model.project_nominal(exposure)).parts(X_CB);
-  return impl_->scorer.render(X_CB, camera);
+  return corrected ? impl_->drawn(X_CB, camera, exposure, impl_->state) : impl_->scorer.render(X_CB, camera);
 }
 
 BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::size_t camera,
                                            const Estimate& estimate) {
   std::vector<Eigen::Isometry3f> X_CB(impl_->model.part_count());
   const Exposure exposure = impl_->model.preview(observation.cameras[camera]->joints, camera);
-  impl_->model.project(exposure, impl_->state_of(estimate)).parts(X_CB);
-  return impl_->scorer.render(X_CB, camera);
+  const Eigen::VectorXd x = impl_->state_of(estimate);
+  impl_->model.project(exposure, x).parts(X_CB);
+  return impl_->drawn(X_CB, camera, exposure, x);
 }
 
 Pose Estimator::hand_pose(const Exposure& exposure, bool corrected) {

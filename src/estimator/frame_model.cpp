@@ -116,6 +116,7 @@ void FrameModel::corrections(const Exposure& exposure, const Eigen::VectorXd& x,
   } else {
     out.clear();
   }
+  out.qdot = exposure.at.qdot;
   for (std::size_t e = 0; e < state_.model().size(); ++e) {
     const Effect& effect = std::as_const(state_).model()[e];
     if (!effect.has_memory()) effect.apply(exposure.at, out);

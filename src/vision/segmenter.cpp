@@ -521,6 +521,14 @@ void Segmenter::adapt(const Image& image, const BinaryMask& mask, const Predicte
   self.learned.update(image, &self.robot, false);
 }
 
+const RobotLooks& Segmenter::looks() const {
+  return impl_->looks;
+}
+
+void Segmenter::know_looks(RobotLooks looks) {
+  impl_->looks = std::move(looks);
+}
+
 void Segmenter::camera_turned() {
   impl_->turned = true;
 }
@@ -692,6 +700,7 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
     sure.fill(false);
   }
   const BackgroundModel* background = holds ? &local : nullptr;
+  if (looks.channels != channels) looks = {};
   const bool everywhere = reach_px >= ColourEvidence::kEverywhere_px * unit;
   evidence.separate(seen, *predicted.silhouette, reach_px, looks, background, sure, robot);
   components.remove_small(robot, setup.min_component_px);

@@ -94,6 +94,11 @@ class OutlineMeasurement {
  private:
   void find_motions(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera,
                     std::span<const std::uint32_t> active);
+  /// How links move while rows are read out; nothing where no row is another one's time, or nothing moves.
+  void find_shutter_motion(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
+                           std::size_t camera, std::span<const std::uint32_t> active);
+  /// Moves a point to where its row saw it.
+  void roll(const Corrections& corrections, const PinholeIntrinsics& k, OutlinePoint& point) const;
   /// @param edges  null: every point is where it is predicted
   void compare(const ObservedEdges* edges, const Corrections& corrections, std::size_t camera,
                const OutlineSearch& search, OutlineEvidence& out);
@@ -108,6 +113,7 @@ class OutlineMeasurement {
   std::vector<Pose> links_;  ///< of the prediction
   /// Velocity of a point (p_C, 1) of a link per unit of an active coordinate: [coordinate][link].
   std::vector<Eigen::Matrix<double, 3, 4>> motion_;
+  std::vector<Eigen::Matrix<double, 3, 4>> shutter_;  ///< the same per second, by link; empty: they rest
   std::vector<OutlinePoint> points_;
   Eigen::MatrixXd rows_;
 };
