@@ -7,9 +7,9 @@ namespace bodyschema {
 namespace {
 
 // How often an edge is found where the robot's is, and where something else hides it.
-constexpr double kFound = 0.97, kFoundOdd = 0.5;
+constexpr double kFound = 0.985, kFoundOdd = 0.5;
 // Share of outlines that something else hides, before a picture.
-constexpr double kOdd = 0.05;
+constexpr double kOdd = 0.1;
 // One sample alone does not decide: log odds.
 constexpr double kMostEvidence = 4.0;
 // How much more likely neighbours are alike than not: log odds, each of some four.
@@ -56,9 +56,9 @@ void OddPieces::find(std::span<OutlineSample> samples, double sd_px, double spac
   evidence_.resize(samples.size());
   belief_.resize(samples.size());
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    evidence_[i] = std::log(kOdd / (1.0 - kOdd)) +
-                   std::clamp(log_odds(samples[i].residual_px, sd_px, search_px), -kMostEvidence, kMostEvidence);
-    belief_[i] = std::tanh(0.5 * evidence_[i]);
+    const double own = log_odds(samples[i].residual_px, sd_px, search_px);
+    evidence_[i] = std::log(kOdd / (1.0 - kOdd)) + std::clamp(own, -kMostEvidence, kMostEvidence);
+    belief_[i] = std::tanh(0.5 * own);  // what neighbours say first is what they saw, not what is usual
   }
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     for (const auto i : in_order_) {
