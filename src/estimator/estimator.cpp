@@ -84,7 +84,7 @@ const char* to_string(FrameVerdict verdict) {
   return "unknown";
 }
 
-std::string Hidden::text() const {
+std::string HiddenShare::text() const {
   constexpr double kWorthAWord = 0.15;
   std::string text;
   if (hand >= kWorthAWord) text = fmt::format("{:.0f} % of the hand is hidden", 100.0 * hand);
@@ -700,6 +700,7 @@ struct Estimator::Impl {
                fitter.knows_shape() && estimate.hand_sd_m < estimate.hand_sd_limit_m) {
       current = EstimatorState::kConverged;
     }
+    // Known by the memory alone, whatever it claims: nobody sees whether it still holds.
     if (hidden.hand > limits::kMostHidden || (hidden_only && !near)) current = EstimatorState::kOccluded;
   }
 
@@ -855,7 +856,7 @@ struct Estimator::Impl {
   double alternative_s = 0.0;
   OutlineFitter fitter;
   Occlusion occlusion;
-  Hidden hidden;             ///< in the last frame
+  HiddenShare hidden;             ///< in the last frame
   bool hidden_only = false;  ///< the last frame contradicts by what is hidden alone
   double hand_sd_m = 1.0;    ///< as last reported
 

@@ -14,7 +14,7 @@ inline constexpr double kMaxStep_rad = 0.2;
 /// Physical. px of a 320x240 picture: by less than this no picture tells something else's edge from the robot's.
 inline constexpr double kLeastOdd_px = 0.4;
 /// Physical. Share of the hand's outline; of a hand that is hidden by more too little is seen to claim where it is now.
-inline constexpr double kMostHidden = 0.6;
+inline constexpr double kMostHidden = 0.8;
 /// Physical. px of a 320x240 picture: what masks show this far beside a robot that is known as well as this is not the
 /// robot.
 inline constexpr double kForeign_px = 4.0;

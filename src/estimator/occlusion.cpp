@@ -54,8 +54,8 @@ void Occlusion::learn(const Frame& frame, const Eigen::VectorXd& x, double hand_
   held_.learn(views);
 }
 
-Hidden Occlusion::hidden(const FrameEvidence& seen) const {
-  Hidden hidden;
+HiddenShare Occlusion::hidden(const FrameEvidence& seen) const {
+  HiddenShare hidden;
   double hand = 0.0, hand_gone = 0.0, robot = 0.0, robot_gone = 0.0;
   for (const auto& samples : seen.samples) {
     for (const auto& sample : samples) {

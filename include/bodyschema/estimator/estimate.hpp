@@ -89,7 +89,7 @@ const char* to_string(FrameVerdict verdict);
 
 /// What other things hide of the robot in one frame: shares of the predicted outline, 0 to 1, that show the edge of
 /// something else or lie where a held thing is known to be. They are left out of the evidence.
-struct Hidden {
+struct HiddenShare {
   double hand = 0.0;   ///< of hand and fingers, all cameras; 0 where none of them is in view
   double robot = 0.0;  ///< of all that is drawn of the robot
   bool holds = false;  ///< something is known to be held: it has moved with the hand over several postures
@@ -130,7 +130,7 @@ struct Estimate {
   std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected; in one that is absent for the
                                     ///< encoders of another
   std::vector<Pose> X_CP_nominal;   ///< the same with encoders and model as they are
-  Hidden hidden;                    ///< mode best
+  HiddenShare hidden;                    ///< mode best
   LiveFindings findings;            ///< by LiveDiagnosis, where one watches
   StageTimes times;
 
