@@ -13,6 +13,8 @@ constexpr std::size_t kCubes = static_cast<std::size_t>(kSide) * kSide * kSide;
 // A picture that shows a cube as foreign counts one, one that shows background there takes twice as much away: what is
 // carried is never seen through, but a mask may miss a piece of it.
 constexpr int kForeign = 1, kBackground = -2, kMost = 8, kLeast = -8;
+// Physical. m: nothing is nearer to a camera.
+constexpr double kNearest_m = 0.05;
 // What is foreign in so many pictures more than not is held: two cameras twice, and a chance to be carved.
 constexpr int kHeld = 5;
 // Physical. The hand shows another side of itself after a turn of this much against the camera, rad, or this far away
@@ -56,7 +58,7 @@ void HeldThing::look(const View& view) {
   const auto& k = *view.camera;
   for (std::size_t cube = 0; cube < kCubes; ++cube) {
     const Eigen::Vector3d p_C = view.X_CP * centre(cube);
-    if (p_C.z() < 0.05) continue;
+    if (p_C.z() < kNearest_m) continue;
     const Eigen::Vector2d pixel = k.project(p_C);
     const double u = std::round(pixel.x()), v = std::round(pixel.y());
     if (!(u >= 0.0 && v >= 0.0 && u < k.width && v < k.height)) continue;
@@ -69,21 +71,20 @@ void HeldThing::look(const View& view) {
   }
 }
 
-void HeldThing::mark(const PinholeIntrinsics& camera, const Pose& X_CP, double margin_px, BinaryMask& out) const {
+BinaryMask HeldThing::mark(const PinholeIntrinsics& camera, const Pose& X_CP, double margin_px) {
+  BinaryMask pixels(camera.width, camera.height);
+  if (!known() || X_CP.translation().z() < kNearest_m) return pixels;
   for (const auto cube : held_) {
     const Eigen::Vector3d p_C = X_CP * centre(cube);
-    if (p_C.z() < 0.05) continue;
+    if (p_C.z() < kNearest_m) continue;
     const Eigen::Vector2d pixel = camera.project(p_C);
-    // Half the diagonal of a cube's face, and then some.
-    const double half = 0.7 * kCube_m * std::max(camera.fx, camera.fy) / p_C.z() + margin_px;
-    const int u0 = std::max(0, static_cast<int>(std::ceil(pixel.x() - half)));
-    const int u1 = std::min(camera.width - 1, static_cast<int>(std::floor(pixel.x() + half)));
-    const int v0 = std::max(0, static_cast<int>(std::ceil(pixel.y() - half)));
-    const int v1 = std::min(camera.height - 1, static_cast<int>(std::floor(pixel.y() + half)));
-    for (int v = v0; v <= v1; ++v) {
-      for (int u = u0; u <= u1; ++u) out.set(u, v);
-    }
+    const long u = std::lround(pixel.x()), v = std::lround(pixel.y());
+    if (u >= 0 && v >= 0 && u < camera.width && v < camera.height) pixels.set(static_cast<int>(u), static_cast<int>(v));
   }
+  // A cube reaches this far about its centre, whichever way it is turned.
+  const double half_px = 0.6 * kCube_m * std::max(camera.fx, camera.fy) / X_CP.translation().z() + margin_px;
+  morphology_.dilate(pixels, static_cast<int>(std::ceil(half_px)));
+  return pixels;
 }
 
 void HeldThing::forget() {

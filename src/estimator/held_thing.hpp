@@ -9,6 +9,7 @@
 #include "bodyschema/geometry/binary_mask.hpp"
 #include "bodyschema/geometry/pinhole.hpp"
 #include "bodyschema/geometry/pose.hpp"
+#include "bodyschema/vision/mask_operations.hpp"
 
 namespace bodyschema {
 
@@ -37,9 +38,9 @@ class HeldThing {
   void learn(std::span<const View> views);
   /// Whether something is held.
   [[nodiscard]] bool known() const { return !held_.empty(); }
-  /// Sets the pixels that it may cover in a picture.
+  /// The pixels that it may cover in a picture.
   /// @param margin_px  how far off the hand may be
-  void mark(const PinholeIntrinsics& camera, const Pose& X_CP, double margin_px, BinaryMask& out) const;
+  BinaryMask mark(const PinholeIntrinsics& camera, const Pose& X_CP, double margin_px);
   void forget();
 
  private:
@@ -49,6 +50,7 @@ class HeldThing {
   std::vector<std::int8_t> evidence_;  ///< per cube; empty: nothing foreign was ever seen
   std::vector<std::uint32_t> held_;    ///< cubes
   std::vector<Pose> views_;            ///< of the hand in the first camera that saw it, the last few
+  MaskMorphology morphology_;
 };
 
 }  // namespace bodyschema

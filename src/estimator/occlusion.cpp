@@ -26,8 +26,7 @@ void Occlusion::cover(Frame& frame, const Eigen::VectorXd& x, double hand_sd_m) 
     const Pose X_CP = model_.hand_pose(frame.exposures[c], x);
     if (X_CP.translation().z() <= 0.0) continue;
     const double off_px = 2.0 * k.fx * hand_sd_m / X_CP.translation().z();
-    frame.covered[c] = BinaryMask(k.width, k.height);
-    held_.mark(k, X_CP, limits::kCover_px * picture_unit(k) + off_px, frame.covered[c]);
+    frame.covered[c] = held_.mark(k, X_CP, limits::kCover_px * picture_unit(k) + off_px);
   }
 }
 

@@ -45,11 +45,7 @@ class HeldThingTest : public ::testing::Test {
     if (!held.is_new(X_CP)) return;
     held.learn(std::vector<HeldThing::View>{{&kCamera, X_CP, &mask, &valid, &robot}});
   }
-  [[nodiscard]] BinaryMask marked(int frame) const {
-    BinaryMask mask(320, 240);
-    held.mark(kCamera, hand(frame), 1.0, mask);
-    return mask;
-  }
+  [[nodiscard]] BinaryMask marked(int frame) { return held.mark(kCamera, hand(frame), 1.0); }
   HeldThing held;
 };
 
