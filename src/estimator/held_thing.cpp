@@ -1,6 +1,7 @@
 #include "held_thing.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace bodyschema {
@@ -24,6 +25,21 @@ constexpr std::size_t kViews = 12;
 // Fewer held cubes are ragged masks, not a thing: a finger's breadth each way.
 constexpr std::size_t kFewestCubes = 8;
 
+/// Whether masks show more beside the robot than one cube: less is ragged outlines.
+bool shows_something(const HeldThing::View& view) {
+  const double cube_px = kCube_m * view.camera->fx / view.X_CP.translation().z();
+  std::size_t foreign = 0;
+  for (int v = 0; v < view.mask->height(); ++v) {
+    const auto *mask = view.mask->row(v), *robot = view.robot->row(v);
+    const auto* valid = view.valid->empty() ? nullptr : view.valid->row(v);
+    for (int w = 0; w < view.mask->words_per_row(); ++w) {
+      const auto beside = mask[w] & ~robot[w] & (valid != nullptr ? valid[w] : ~std::uint64_t{0});
+      foreign += static_cast<std::size_t>(std::popcount(beside));
+    }
+  }
+  return static_cast<double>(foreign) > cube_px * cube_px;
+}
+
 }  // namespace
 
 Eigen::Vector3d HeldThing::centre(std::size_t cube) const {
@@ -43,6 +59,7 @@ bool HeldThing::is_new(const Pose& X_CP) const {
 
 void HeldThing::learn(std::span<const View> views) {
   if (views.empty()) return;
+  if (evidence_.empty() && std::none_of(views.begin(), views.end(), shows_something)) return;
   views_.push_back(views.front().X_CP);
   if (views_.size() > kViews) views_.erase(views_.begin());
   if (evidence_.empty()) evidence_.assign(kCubes, 0);
