@@ -64,6 +64,11 @@ void pack_bits(const std::uint8_t* bytes, std::size_t count, std::uint64_t* word
   }
 }
 
+/// The length that one pixel of a 320x240 picture has.
+double unit_of(int width, int height) {
+  return std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0));
+}
+
 /// What is in both.
 void intersect(BinaryMask& mask, const BinaryMask& other) {
   for (int v = 0; v < mask.height(); ++v) {
@@ -93,6 +98,8 @@ constexpr float kChiSquare1 = 3.84f, kChiSquare3 = 7.81f;
 constexpr float kEdgeShare = 0.2f;
 // From this on it is compression: colours bleed over the outline without being mixtures of both sides.
 constexpr float kCompressed = 4.0f;
+// How much further off than its outline is looked for an arm may be whose prediction is not confirmed, px.
+constexpr double kFarOff_px = 24.0;
 // Share that one picture has in what is known of the robot's colours.
 constexpr float kLookShare = 0.05f;
 
@@ -657,7 +664,7 @@ void Segmenter::Impl::forget_background() {
 
 void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryMask& valid,
                                    std::vector<std::uint8_t>& coverage, const PredictedRobot& predicted) {
-  const double unit = std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0));
+  const double unit = unit_of(width, height);
   const double reach_px = predicted.reach_px > 0.0 ? predicted.reach_px : setup.search_px * unit;
   if (beside.width() != width || beside.height() != height) {
     beside = BinaryMask(width, height);
@@ -734,6 +741,8 @@ void Segmenter::Impl::adapt_auto(const Image& image, const BinaryMask& mask, con
   for (int v = 0; v < height; ++v) {
     for (int w = 0; w < robot.words_per_row(); ++w) robot.row(v)[w] |= beside.row(v)[w];
   }
+  // A prediction that nothing has confirmed yet may be far from the arm, whose ghost would stay in the background.
+  if (!predicted.trusted) morphology.dilate(robot, static_cast<int>(kFarOff_px * unit_of(width, height)));
   constexpr int kEager = 20;
   learned.update(seen, &robot, learned.frames_seen() < kEager);
   if (predicted.silhouette != nullptr && predicted.trusted) {

@@ -248,6 +248,22 @@ TEST(AutomaticMasks, ColoursThatCompressionLetsBleedAreNoRobot) {
   EXPECT_GT(edge.found, 0.75);
 }
 
+/// The background of the first picture was learned from under the arm, too: the arm then was not seen where it had been.
+TEST(AutomaticMasks, TheArmOfTheFirstPictureLeavesNoGhost) {
+  std::mt19937 random(23);
+  Scene scene = large(Texture::kPlain);
+  Segmenter segmenter(automatic(), "left", scene.width, scene.height);
+  Output out;
+  for (int i = 0; i < 6; ++i) {
+    scene.shapes = large_hand(150.0 + 8.0 * i, 120.0);  // it comes to lie over a good part of where it was
+    const auto predicted = scene.true_mask();
+    const auto picture = scene.picture(random);
+    segmenter.segment(picture, out.mask, out.valid, out.coverage, {&predicted, 6.0, i > 2});
+    segmenter.adapt(picture, out.mask, {&predicted, 6.0, i > 2});
+    EXPECT_GT(iou(out.mask, scene.true_mask()), 0.95) << i;
+  }
+}
+
 TEST(AutomaticMasks, WithoutPredictionAndBackgroundThereIsNothingToGoBy) {
   std::mt19937 random(1);
   Scene scene;
