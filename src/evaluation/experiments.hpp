@@ -46,6 +46,7 @@ void run_reach(ExperimentContext& context);
 void run_recording(ExperimentContext& context, bool only_honesty);
 void run_real(ExperimentContext& context);
 /// @param most_logs  however many trials are asked for
+/// Throws ConfigurationError for a row that does not exist.
 void run_honesty(ExperimentContext& context, int most_logs);
 /// Throws ConfigurationError for a row that does not exist.
 void run_everyday(ExperimentContext& context);
