@@ -26,8 +26,8 @@ namespace {
 
 class Diagnoser {
  public:
-  Diagnoser(LogFit& fit, ModelSearch search, const DiagnosisOptions& options)
-      : fit_(fit), options_(options), search_(std::move(search)) {}
+  Diagnoser(LogFit& fit, ModelSearch search, const DiagnosisOptions& options, std::vector<StatedSlip> stated = {})
+      : fit_(fit), options_(options), search_(std::move(search)), stated_(std::move(stated)) {}
 
   DiagnosisReport run() {
     refuse_unusable();
@@ -126,6 +126,10 @@ class Diagnoser {
     auto slips = diagnosis::slips(log, base, report_.not_testable, search_.refits());
     std::move(slips.all.begin(), slips.all.end(), std::back_inserter(scores));
     std::move(slips.best.begin(), slips.best.end(), std::back_inserter(candidates));
+    for (auto& slip : stated_slips(fit_, log, base, stated_)) {
+      std::erase_if(candidates, [&](const Candidate& c) { return c.cause == slip.cause; });
+      candidates.push_back(std::move(slip));
+    }
     const double threshold = chance_threshold(scores, options_.level, options_.seed);
     // A look has no time for curves, but where something is about to be named that may only stand in for one.
     if (!search_.refits() &&
@@ -136,6 +140,11 @@ class Diagnoser {
     }
     asked_.reset();
     return asked_.emplace(Field{std::move(log), std::move(base), std::move(candidates), threshold});
+  }
+
+  /// What a candidate's z must reach: that of all of them, but for what others saw happen.
+  [[nodiscard]] double threshold_of(bool stated) const {
+    return stated ? normal_quantile(options_.level / static_cast<double>(stated_.size())) : report_.z_threshold;
   }
 
   void add_curves(const LogAbout& log, std::vector<Candidate>& candidates) {
@@ -174,7 +183,8 @@ class Diagnoser {
       if (take(field, *best)) {
         spdlog::debug("diagnosis: fitted, cost {:.4f}, z {:.1f}", search_.cost(), z_of_last());
         // What is large bends the very sums by which it is judged: so it is judged where it is fitted.
-        if (best->candidate->z() >= field.threshold || z_of_last() >= field.threshold) return true;
+        const double threshold = threshold_of(best->candidate->stated);
+        if (best->candidate->z() >= threshold || z_of_last() >= threshold) return true;
         search_.drop(search_.causes().size() - 1);
       }
       if (!best->candidate->generic()) refused_.push_back(cause);
@@ -206,7 +216,7 @@ class Diagnoser {
       if (first) add_bar(candidate, z);
       // One that is fitted anew may stand out then.
       const bool may_grow = search_.refits() && !candidate.generic();
-      if (z < (may_grow ? limits::kWorthATrial_z : field.threshold)) continue;
+      if (z < (may_grow ? limits::kWorthATrial_z : threshold_of(candidate.stated))) continue;
       if (candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
       if (std::find(refused_.begin(), refused_.end(), candidate.cause) != refused_.end()) continue;
       Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0, true};
@@ -253,6 +263,7 @@ class Diagnoser {
   bool take(const Field& field, const Trial& trial) {
     const auto& candidate = *trial.candidate;
     FoundCause cause{.name = candidate.cause, .variable = candidate.variable, .from = candidate.from};
+    cause.stated = candidate.stated;
     const auto [begin, end] = seen_span(fit_, field.log.at);
     cause.begin_s = begin;
     cause.duration_s = end - begin;
@@ -273,12 +284,12 @@ class Diagnoser {
       const auto [base, own, kept] = without(search_, all, search_.columns_of(c));
       const double t = base.score(own).z();
       const double gain = base.heldout().total() - with;
-      const double strength = gain > 0.0 ? t : 0.0;
+      const double strength = gain > 0.0 ? t / threshold_of(search_.causes()[c].stated) : 0.0;
       if (strength >= least) continue;
       least = strength;
       worst = c;
     }
-    if (least >= report_.z_threshold) return false;
+    if (least >= 1.0) return false;
     refused_.push_back(search_.causes()[worst].name);
     search_.drop(worst);
     return true;
@@ -329,6 +340,7 @@ class Diagnoser {
   LogFit& fit_;
   const DiagnosisOptions& options_;
   ModelSearch search_;
+  std::vector<StatedSlip> stated_;
   DiagnosisReport report_;
   double block_s_ = 0.0;
   std::optional<Field> asked_;  ///< about the present model
@@ -346,9 +358,9 @@ DiagnosisReport diagnose(LogFit& fit, const std::vector<Belief>& beliefs, const 
 
 DiagnosisReport diagnosis::look(LogFit& fit, State state, std::shared_ptr<const LinearLog> pictures,
                                 std::vector<OutlineNoise> noise, const std::vector<Belief>& tolerances,
-                                const DiagnosisOptions& options) {
+                                const DiagnosisOptions& options, const std::vector<StatedSlip>& stated) {
   ModelSearch search(fit, std::move(state), std::move(pictures), std::move(noise), tolerances, options);
-  return Diagnoser(fit, std::move(search), options).look();
+  return Diagnoser(fit, std::move(search), options, stated).look();
 }
 
 }  // namespace bodyschema

@@ -99,6 +99,17 @@ TEST(LiveDiagnosis, MeasuresALargeLatencyAndSaysWhenAJointSlipped) {
   EXPECT_TRUE(sentence.find(" UTC") != std::string::npos) << sentence;
 }
 
+/// What the estimator itself saw happen needs no second look: 10 s after a slip it is said, with its size and time.
+TEST(LiveDiagnosis, SaysWhatTheEstimatorSawSlip) {
+  const auto said = listen("slip:joint=r_elbow,value=3,at=26", 36.0);
+  ASSERT_TRUE(named(said.news.back(), "slip")) << said.per_frame.back();
+  const auto& finding = said.news.back().causes.front();
+  EXPECT_EQ(finding.joint, "r_elbow");
+  EXPECT_TRUE(finding.estimated) << "the offset follows it already";
+  EXPECT_NEAR(finding.parameters.at(0).value, 3.0, 0.3);
+  EXPECT_GT(finding.from, 0);
+}
+
 TEST(LiveDiagnosis, IsSilentAboutAHealthyRobotAndTheSameEveryTime) {
   const auto said = listen("", 32.0), again = listen("", 32.0);
   ASSERT_GE(said.news.size(), 3u);
