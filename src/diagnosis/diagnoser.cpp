@@ -176,7 +176,7 @@ class Diagnoser {
     if (round == 0) leave_out_untold(field);
     auto trials = trials_of(field, round == 0);
     for (std::size_t tried = 0; !trials.empty() && tried < limits::kMostTried; ++tried) {
-      const Trial* best = choose(trials);
+      const Trial* best = choose(field, trials);
       const auto cause = best->candidate->cause;
       spdlog::debug("diagnosis: {} {}, z {:.1f} (chance: {:.1f}), held-out gain {:.0f}", cause.text(),
                     best->candidate->variable, best->candidate->z(), field.threshold, best->gain);
@@ -241,8 +241,9 @@ class Diagnoser {
   }
 
   /// The best known cause, or a free curve where that explains much more than any known one. Of causes that explain
-  /// alike the simplest.
-  static const Trial* choose(const std::vector<Trial>& trials) {
+  /// alike the simplest; a joint moved along its link is a longer link, and what it lies aside besides is asked for
+  /// next.
+  const Trial* choose(const Field& field, const std::vector<Trial>& trials) {
     const auto known =
         std::find_if(trials.begin(), trials.end(), [](const Trial& t) { return !t.candidate->generic(); });
     const auto generic =
@@ -255,9 +256,24 @@ class Diagnoser {
       const bool simpler =
           !trial.candidate->generic() && trial.candidate->parameters.size() < best->candidate->parameters.size();
       if (!simpler || trial.gain < (1.0 - limits::kAlikeShare) * known->gain) continue;
-      if (paired_t(trial.heldout.loss, known->heldout.loss) < student_quantile(limits::kRivalTail, dof)) best = &trial;
+      const bool worse =
+          paired_t(trial.heldout.loss, known->heldout.loss) >= student_quantile(limits::kRivalTail, dof);
+      if (!worse || is_part(field, *trial.candidate, *known->candidate)) best = &trial;
     }
     return best;
+  }
+
+  /// Whether all that one cause can say another one, of more parameters, can say too.
+  bool is_part(const Field& field, const Candidate& part, const Candidate& whole) {
+    auto both = directions_of(fit_, field.log, whole);
+    const auto more = directions_of(fit_, field.log, part);
+    for (std::size_t p = 0; p < both.size(); ++p) both[p].insert(both[p].end(), more[p].begin(), more[p].end());
+    const auto S = field.base.score(added_columns(field.log, both)).S;
+    const auto n = whole.columns.size(), own = part.columns.size();
+    const Eigen::MatrixXd cross = S.bottomLeftCorner(own, n);
+    const Eigen::MatrixXd left =
+        S.bottomRightCorner(own, own) - cross * S.topLeftCorner(n, n).ldlt().solve(cross.transpose());
+    return left.diagonal().cwiseQuotient(S.diagonal().tail(own)).maxCoeff() < limits::kSameChange;
   }
 
   bool take(const Field& field, const Trial& trial) {
