@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "bodyschema/diagnosis/diagnoser.hpp"
+#include "candidates.hpp"
 
 namespace bodyschema::diagnosis {
 
@@ -12,8 +13,9 @@ namespace bodyschema::diagnosis {
 /// @param state  the model, about which they were linearised
 /// @param pictures  over all coordinates
 /// @param noise  per camera
+/// @param stated  slips that others saw happen in these pictures
 DiagnosisReport look(LogFit& fit, State state, std::shared_ptr<const LinearLog> pictures,
                      std::vector<OutlineNoise> noise, const std::vector<Belief>& tolerances,
-                     const DiagnosisOptions& options);
+                     const DiagnosisOptions& options, const std::vector<StatedSlip>& stated = {});
 
 }  // namespace bodyschema::diagnosis
