@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <thread>
 #include <utility>
@@ -17,8 +18,10 @@
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "bodyschema/evidence/outline_distance.hpp"
 #include "bodyschema/pipeline/watched_log.hpp"
+#include "beyond_model.hpp"
 #include "calibration_files.hpp"
 #include "next_posture.hpp"
+#include "raw_pictures.hpp"
 
 namespace bodyschema {
 namespace {
@@ -53,6 +56,12 @@ bool to_be_searched(const CameraModel& camera) {
   return camera.mount.knowledge == PlaceKnowledge::kUnknown;
 }
 
+/// Of pictures without masks: how far off their outlines may be, round by round, px of a 320x240 picture; first where
+/// nothing is known but what is configured, then after a fit of what moved.
+constexpr std::array kReaches = {40.0, 30.0, 20.0, 12.0, 8.0, 6.0, 5.0};
+constexpr std::array kReachesMoved = {16.0, 12.0, 8.0, 6.0, 5.0, 4.0, 4.0};
+constexpr std::size_t kRawKept = 64;  ///< observations of such a log whose pictures are looked at
+
 class Calibrator {
  public:
   Calibrator(const Configuration& configuration, const CalibrationOptions& options)
@@ -64,13 +73,20 @@ class Calibrator {
   Calibration run() {
     WatchedLog watched = watch_log(
         pipeline_,
-        {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .kept = 12, .quiet = options_.quiet}, false);
+        {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .kept = raw() ? kRawKept : 12,
+         .quiet = options_.quiet}, false);
     refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);
     log_ = &watched.pictures;
     if (!options_.quiet) bar_.emplace("calibration", 100);
-    find_cameras();
+    std::optional<RawPictures> masks;
+    if (raw()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
+    const bool still = masks && masks->by_what_moved();
+    find_cameras(still);
     LogFit fit(*log_, threads_of(options_));
-    std::optional<BatchFit> best(fitted(fit, starts_));
+    std::optional<BatchFit> best;
+    if (!masks || still) best.emplace(fitted(fit, starts_));
+    if (masks) with_better_masks(*masks, fit, best);
+    if (masks || !pipeline_.learns_background()) without_strangers(fit, best);
     progress(0.6);
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
@@ -92,11 +108,12 @@ class Calibrator {
   // --- cameras ----------------------------------------------------------------------------------
 
   /// Where cameras of which nothing is known may be: several places of the first, the best one of the second.
-  void find_cameras() {
+  /// @param moved  masks were made of what moved before them
+  void find_cameras(bool moved) {
     starts_ = {rig_};
     for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
       if (!to_be_searched(rig_.cameras[c])) continue;
-      if (pipeline_.masks_need_estimates() && !pipeline_.learns_background()) {
+      if (raw() && !moved) {
         throw DataError(
             fmt::format("{}: camera '{}' is to be found, which takes masks of the robot, and vision.method "
                         "statistics makes none before it is known where the robot is; give masks (vision.method: "
@@ -126,6 +143,58 @@ class Calibrator {
       starts_ = std::move(rigs);
       progress(0.3);
     }
+  }
+
+  // --- pictures without masks -------------------------------------------------------------------
+
+  [[nodiscard]] bool raw() const { return pipeline_.masks_need_estimates(); }
+
+  /// Masks and fit by turns, masks ever nearer to what the fit of all postures says.
+  void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
+    const auto& reaches = best ? kReachesMoved : kReaches;
+    for (const double reach_px : reaches) {
+      if (!best) {
+        masks.about(nominal(fit), reach_px);
+      } else {
+        masks.about(best->at().corrections, reach_px);
+      }
+      fit.refresh();
+      const auto x = best ? best->state().x() : Eigen::VectorXd();
+      BatchFit next = started(fit, x);
+      next.run(reach_px, {});
+      if (std::getenv("BS_DEBUG")) fmt::print("reach {} misfit {} rms {}\n", reach_px, next.misfit(), next.noise().front().sd_px());
+      best.emplace(std::move(next));
+    }
+  }
+
+  /// What the masks show beyond the model is left out: a tool, somebody's arm.
+  void without_strangers(LogFit& fit, std::optional<BatchFit>& best) {
+    if (!is_near(*best)) return;
+    const auto beyond = beyond_model(*log_, best->at().corrections);
+    if (beyond.pictures == 0) return;
+    leave_out(*log_, beyond);
+    fit.refresh();
+    const Eigen::VectorXd x = best->state().x();
+    best.emplace(started(fit, x));
+    best->run(0.0, {});
+    if (beyond.on_link.empty()) return;
+    result_.remarks.push_back("something is on " + beyond.on_link +
+                              " that the robot's model does not have: what the masks show of it is left out");
+  }
+
+  [[nodiscard]] static bool is_near(const BatchFit& batch) { return batch.noise().front().sd_px() < kNear_px; }
+
+  [[nodiscard]] BatchFit started(LogFit& fit, const Eigen::VectorXd& x) const {
+    const auto roles = log_->roles();
+    const auto beliefs = Beliefs::from(configuration_, roles, rig_, pipeline_.options());
+    BatchFit batch(fit, State(roles, beliefs.state), beliefs.tolerances, settings());
+    if (x.size() > 0) batch.start_at(x);
+    return batch;
+  }
+
+  /// Encoders and cameras as they are configured.
+  std::vector<Corrections> nominal(LogFit& fit) const {
+    return fit.predict(ErrorModel(log_->roles()), {}).corrections;
   }
 
   // --- fit --------------------------------------------------------------------------------------

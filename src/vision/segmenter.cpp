@@ -434,6 +434,15 @@ void Segmenter::learn(std::span<const Image> frames) {
   finish_learning();
 }
 
+void Segmenter::learn(std::span<const Image> frames, std::span<const BinaryMask> robots) {
+  for (const auto& frame : frames) admit(frame);
+  auto& self = *impl_;
+  if (!self.learns() || frames.empty()) return;
+  self.learned.learn_beside(frames, robots);
+  self.learned_offline = true;
+  self.selection.clear();
+}
+
 bool Segmenter::ready() const {
   if (impl_->setup.method != SegmentationMethod::kLearnedBackground) return true;
   return impl_->learned_offline || impl_->learned.frames_seen() >= impl_->setup.learning_frames;
