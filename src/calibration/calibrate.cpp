@@ -18,8 +18,10 @@
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "bodyschema/evidence/outline_distance.hpp"
 #include "bodyschema/pipeline/watched_log.hpp"
+#include "believed_outline.hpp"
 #include "beyond_model.hpp"
 #include "calibration_files.hpp"
+#include "loose_fingers.hpp"
 #include "next_posture.hpp"
 #include "raw_pictures.hpp"
 
@@ -60,6 +62,8 @@ bool to_be_searched(const CameraModel& camera) {
 /// nothing is known but what is configured, then after a fit of what moved.
 constexpr std::array kReaches = {40.0, 30.0, 20.0, 12.0, 8.0, 6.0, 5.0};
 constexpr std::array kReachesMoved = {16.0, 12.0, 8.0, 6.0, 5.0, 4.0, 4.0};
+/// Physical. Outlines that may be further off than this, px of a 320x240 picture, are looked for by what moved.
+constexpr double kRough_px = 30.0, kAnywhere_px = 1e3;
 constexpr std::size_t kRawKept = 64;  ///< observations of such a log whose pictures are looked at
 
 class Calibrator {
@@ -80,9 +84,12 @@ class Calibrator {
     if (!options_.quiet) bar_.emplace("calibration", 100);
     std::optional<RawPictures> masks;
     if (raw()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
-    const bool still = masks && masks->by_what_moved();
+    if (masks) believed_px_ = believed_px();
+    const bool still = masks && believed_px_ > kRough_px && masks->by_what_moved();
     find_cameras(still);
     LogFit fit(*log_, threads_of(options_));
+    loose_ = loose_fingers(*log_, Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options()));
+    fit.leave_out(loose_);
     std::optional<BatchFit> best;
     if (!masks || still) best.emplace(fitted(fit, starts_));
     if (masks) with_better_masks(*masks, fit, best);
@@ -149,10 +156,19 @@ class Calibrator {
 
   [[nodiscard]] bool raw() const { return pipeline_.masks_need_estimates(); }
 
+  /// How far off the robot's outlines may be by what is configured; anything where a camera is to be found.
+  [[nodiscard]] double believed_px() {
+    if (std::any_of(rig_.cameras.begin(), rig_.cameras.end(), to_be_searched)) return kAnywhere_px;
+    LogFit fit(*log_, 1);
+    const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
+    return believed_outline_sd_px(fit, State(log_->roles(), beliefs.state));
+  }
+
   /// Masks and fit by turns, masks ever nearer to what the fit of all postures says.
   void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
     const auto& reaches = best ? kReachesMoved : kReaches;
     for (const double reach_px : reaches) {
+      if (reach_px > believed_px_ && reach_px > reaches.back()) continue;
       if (!best) {
         masks.about(nominal(fit), reach_px);
       } else {
@@ -530,7 +546,7 @@ class Calibrator {
     double all = 0.0, seen = 0.0, matched = 0.0;
     OutlineEvidence evidence;
     for (std::size_t part = 0; part < links.size(); ++part) {
-      if (!shown[part]) continue;
+      if (!shown[part] || (!loose_.empty() && loose_[part])) continue;
       double own = 0.0, own_matched = 0.0;
       for (const auto p : pictures) {
         const auto& picture = log_->pictures()[p];
@@ -649,6 +665,8 @@ class Calibrator {
   StereoRig rig_;
   PictureLog* log_ = nullptr;
   std::vector<StereoRig> starts_;
+  double believed_px_ = kAnywhere_px;
+  std::vector<bool> loose_;  ///< parts that are drawn and have no say
   double ambiguity_ = 0.0;
   double only_ = kAlone;  ///< misfit of the second best place over that of the best
   Calibration result_;
