@@ -64,6 +64,15 @@ void pack_bits(const std::uint8_t* bytes, std::size_t count, std::uint64_t* word
   }
 }
 
+/// Lengths and areas of the configuration are those of a 320x240 picture: in larger ones they grow with it.
+VisionSetup in_pixels_of(VisionSetup setup, int width, int height) {
+  const double area = std::max(1.0, static_cast<double>(width) * height / (320.0 * 240.0));
+  setup.search_px = static_cast<int>(std::lround(setup.search_px * std::sqrt(area)));
+  setup.min_component_px = static_cast<int>(std::min(setup.min_component_px * area, 1e9));
+  setup.max_hole_px = static_cast<int>(std::min(setup.max_hole_px * area, 1e9));
+  return setup;
+}
+
 /// What is in both.
 void intersect(BinaryMask& mask, const BinaryMask& other) {
   for (int v = 0; v < mask.height(); ++v) {
@@ -134,7 +143,8 @@ BackgroundModel load_background(const VisionSetup& setup, const std::string& cam
 
 struct Segmenter::Impl {
   Impl(const VisionSetup& s, std::string name, int w, int h)
-      : setup(s), camera(std::move(name)), width(w), height(h), single_colour(s, w, h), learned(s, w, h),
+      : configured(s), setup(in_pixels_of(s, w, h)), camera(std::move(name)), width(w), height(h), single_colour(s, w, h),
+        learned(s, w, h),
         detected(w, h), sure(w, h), uncertain(w, h), robot(w, h),
         hits((static_cast<std::size_t>(w) + 63) / 64 * 64, 0) {}
 
@@ -170,7 +180,8 @@ struct Segmenter::Impl {
   /// How much more than elsewhere the background varies beside the robot: what compression makes of an outline.
   void measure_edge_noise(const Image& image);
 
-  VisionSetup setup;
+  VisionSetup configured;
+  VisionSetup setup;  ///< in pixels of these pictures
   std::string camera;
   int width;
   int height;
@@ -403,7 +414,7 @@ void Segmenter::admit(const Image& image) {
   impl_->check(image);
   if (impl_->channels == image.channels) return;
   if (impl_->channels != 0) {
-    impl_ = std::make_unique<Impl>(impl_->setup, impl_->camera, impl_->width, impl_->height);
+    impl_ = std::make_unique<Impl>(impl_->configured, impl_->camera, impl_->width, impl_->height);
   }
   impl_->channels = image.channels;
 }
@@ -658,7 +669,7 @@ void Segmenter::Impl::forget_background() {
 void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryMask& valid,
                                    std::vector<std::uint8_t>& coverage, const PredictedRobot& predicted) {
   const double unit = std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0));
-  const double reach_px = predicted.reach_px > 0.0 ? predicted.reach_px : setup.search_px * unit;
+  const double reach_px = predicted.reach_px > 0.0 ? predicted.reach_px : setup.search_px;
   if (beside.width() != width || beside.height() != height) {
     beside = BinaryMask(width, height);
     known = BinaryMask(width, height);
