@@ -25,7 +25,7 @@ struct OutlineFit {
     FrameEvidence evidence;
     Quadratic quadratic;
   } seen;
-  double misfit = 0.0;                            ///< chi-square: of the outline, and of x against what held it
+  double misfit = 0.0;  ///< chi-square: of the outline, and of x against what held it
 };
 
 /// Moves states onto a frame's observed outline by Gauss-Newton, held by what a memory knows. One thread.

@@ -248,7 +248,8 @@ TEST(AutomaticMasks, ColoursThatCompressionLetsBleedAreNoRobot) {
   EXPECT_GT(edge.found, 0.75);
 }
 
-/// The background of the first picture was learned from under the arm, too: the arm then was not seen where it had been.
+/// The background of the first picture was learned from under the arm, too: the arm then was not seen where it had
+/// been.
 TEST(AutomaticMasks, TheArmOfTheFirstPictureLeavesNoGhost) {
   std::mt19937 random(23);
   Scene scene = large(Texture::kPlain);
