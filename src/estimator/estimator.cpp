@@ -364,7 +364,7 @@ struct Estimator::Impl {
     }
     look_again();
     settle_on(fit);
-    if (!young() && occlusion.learn(frame, in_frame.x, hand_sd_m)) fitter.forget_shape();
+    if (!young()) occlusion.learn(frame, in_frame.x, hand_sd_m);
   }
 
   /// Nothing happened to the robot, and what is seen of it agrees with what is known: something hides the rest. The

@@ -38,8 +38,6 @@ class HeldThing {
   void learn(std::span<const View> views);
   /// Whether something is held.
   [[nodiscard]] bool known() const { return !held_.empty(); }
-  /// Cubes that are held.
-  [[nodiscard]] std::size_t size() const { return held_.size(); }
   /// The pixels that it may cover in a picture.
   /// @param margin_px  how far off the hand may be
   BinaryMask mark(const PinholeIntrinsics& camera, const Pose& X_CP, double margin_px);

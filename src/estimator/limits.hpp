@@ -22,9 +22,6 @@ inline constexpr double kMostHidden = 0.8;
 /// Physical. px of a 320x240 picture: what masks show this far beside a robot that is known as well as this is not the
 /// robot.
 inline constexpr double kForeign_px = 4.0;
-/// Physical. A held thing that is known to be so many times as large as before is another one to the outlines beside
-/// it.
-inline constexpr double kMuchMore = 1.5;
 /// Physical. px of a 320x240 picture: a held thing's map is as coarse as this, its cubes apart.
 inline constexpr double kCover_px = 1.5;
 /// Physical. px of a 320x240 picture: no picture places an outline better, and a fit that moves it by less has arrived.

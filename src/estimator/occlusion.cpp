@@ -30,7 +30,7 @@ void Occlusion::cover(Frame& frame, const Eigen::VectorXd& x, double hand_sd_m) 
   }
 }
 
-bool Occlusion::learn(const Frame& frame, const Eigen::VectorXd& x, double hand_sd_m) {
+void Occlusion::learn(const Frame& frame, const Eigen::VectorXd& x, double hand_sd_m) {
   std::vector<HeldThing::View> views;
   for (std::size_t c = 0; c < frame.seen.size(); ++c) {
     const auto* seen = frame.seen[c];
@@ -39,10 +39,10 @@ bool Occlusion::learn(const Frame& frame, const Eigen::VectorXd& x, double hand_
     const Pose X_CP = model_.hand_pose(frame.exposures[c], x);
     if (X_CP.translation().z() <= 0.0) continue;
     const double off_px = limits::kForeign_px * picture_unit(k);
-    if (3.0 * k.fx * hand_sd_m / X_CP.translation().z() > off_px) return false;
+    if (3.0 * k.fx * hand_sd_m / X_CP.translation().z() > off_px) return;
     views.push_back({&k, X_CP, &seen->mask, &seen->valid, &robot_[c]});
   }
-  if (views.empty() || !held_.is_new(views.front().X_CP)) return false;
+  if (views.empty() || !held_.is_new(views.front().X_CP)) return;
   for (std::size_t c = 0; c < frame.seen.size(); ++c) {
     if (frame.seen[c] == nullptr || frame.seen[c]->mask.empty()) continue;
     model_.project(frame.exposures[c], x).parts(X_CB_);
@@ -51,10 +51,6 @@ bool Occlusion::learn(const Frame& frame, const Eigen::VectorXd& x, double hand_
                        static_cast<int>(std::lround(limits::kForeign_px * picture_unit(rig_.cameras[c].intrinsics))));
   }
   held_.learn(views);
-  const auto cubes = static_cast<double>(held_.size());
-  if (cubes <= limits::kMuchMore * understood_) return false;
-  understood_ = cubes;
-  return true;
 }
 
 HiddenShare Occlusion::hidden(const FrameEvidence& seen) const {

@@ -21,15 +21,11 @@ class Occlusion {
   /// @param hand_sd_m  how well the hand is known
   void cover(Frame& frame, const Eigen::VectorXd& x, double hand_sd_m);
   /// Learns from a frame that shows the arm at x what masks show beside it.
-  /// @return whether much more is known to be held than was: what outlines got wrong till now was the thing's
-  bool learn(const Frame& frame, const Eigen::VectorXd& x, double hand_sd_m);
+  void learn(const Frame& frame, const Eigen::VectorXd& x, double hand_sd_m);
   /// What a frame's outlines left out.
   [[nodiscard]] HiddenShare hidden(const FrameEvidence& seen) const;
   [[nodiscard]] bool holds() const { return held_.known(); }
-  void forget() {
-    held_.forget();
-    understood_ = 0.0;
-  }
+  void forget() { held_.forget(); }
 
  private:
   FrameModel& model_;
@@ -37,7 +33,6 @@ class Occlusion {
   const StereoRig& rig_;
   std::vector<bool> of_hand_;  ///< by part
   HeldThing held_;
-  double understood_ = 0.0;  ///< cubes, when much more was last known
   MaskMorphology morphology_;
   std::vector<BinaryMask> robot_;  ///< per camera
   std::vector<Eigen::Isometry3f> X_CB_;
