@@ -127,8 +127,8 @@ struct Estimator::Impl {
         scorer(model, silhouette_model(*robot, setup), particles_only() ? nullptr : &outlines, rig.intrinsics(),
                options.silhouette, options.filter.particles),
         filter(joints, options.filter), memory(memory_layout(model.state(), considered), options.memory),
-        fitter(model, scorer, options, rig.cameras.size()), occlusion(model, scorer, rig, setup.hand_link), state(model.state().prior_mean()),
-        in_frame(memory.estimate()), stalled(joints) {
+        fitter(model, scorer, options, rig.cameras.size()), occlusion(model, scorer, rig, setup.hand_link),
+        state(model.state().prior_mean()), in_frame(memory.estimate()), stalled(joints) {
     first_guesses = filter.states();
     cloud_covariance = filter.covariance();
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
@@ -871,7 +871,7 @@ struct Estimator::Impl {
   double alternative_s = 0.0;
   OutlineFitter fitter;
   Occlusion occlusion;
-  HiddenShare hidden;             ///< in the last frame
+  HiddenShare hidden;        ///< in the last frame
   bool hidden_only = false;  ///< the last frame contradicts by what is hidden alone
   double hand_sd_m = 1.0;    ///< as last reported
 

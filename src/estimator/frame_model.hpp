@@ -25,6 +25,7 @@ struct FrameEvidence {
   std::vector<std::vector<OutlineSample>> samples;  ///< per camera: of the last look; where wanted
   [[nodiscard]] double rms_px() const { return weight > 0.0 ? std::sqrt(square / weight) : 0.0; }
   [[nodiscard]] double matched_share() const { return sampled > 0.0 ? matched / sampled : 0.0; }
+  [[nodiscard]] double odd_share() const { return sampled > 0.0 ? odd / sampled : 0.0; }
 };
 
 /// The pictures of one frame with what is known of their exposures: all that is needed to look at them again.

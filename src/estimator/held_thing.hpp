@@ -26,9 +26,9 @@ class HeldThing {
   /// One picture of a hand whose place is known.
   struct View {
     const PinholeIntrinsics* camera = nullptr;
-    Pose X_CP = Pose::Identity();        ///< hand in the camera, m
-    const BinaryMask* mask = nullptr;    ///< what is robot or thing
-    const BinaryMask* valid = nullptr;   ///< pixels that count; empty: all
+    Pose X_CP = Pose::Identity();       ///< hand in the camera, m
+    const BinaryMask* mask = nullptr;   ///< what is robot or thing
+    const BinaryMask* valid = nullptr;  ///< pixels that count; empty: all
     const BinaryMask* robot = nullptr;  ///< where the robot is predicted, and beside it as far as it may be off
   };
 

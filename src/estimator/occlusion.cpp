@@ -7,6 +7,41 @@
 
 namespace bodyschema {
 
+std::vector<OutlinePoint> without_hidden(std::span<const OutlineSample> samples, std::span<const OutlinePoint> points,
+                                         double reach_px) {
+  std::vector<std::size_t> left_out;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (samples[i].odd || samples[i].covered) left_out.push_back(i);
+  }
+  const auto beside = [&](std::size_t a, std::size_t b) {
+    return (samples[a].pixel - samples[b].pixel).squaredNorm() < reach_px * reach_px &&
+           samples[a].normal.dot(samples[b].normal) > limits::kSameSide;
+  };
+  std::vector<char> hidden(samples.size(), 0);
+  while (!left_out.empty()) {
+    std::vector<std::size_t> piece = {left_out.back()};
+    left_out.pop_back();
+    std::size_t without_edge = 0;
+    for (std::size_t next = 0; next < piece.size(); ++next) {
+      without_edge += samples[piece[next]].residual_px ? 0 : 1;
+      const auto rest = std::partition(left_out.begin(), left_out.end(),
+                                       [&](std::size_t other) { return !beside(piece[next], other); });
+      piece.insert(piece.end(), rest, left_out.end());
+      left_out.erase(rest, left_out.end());
+    }
+    if (2 * without_edge < piece.size()) continue;
+    for (const auto i : piece) hidden[i] = 1;
+  }
+  std::vector<OutlinePoint> shown;
+  auto point = points.begin();
+  for (std::size_t i = 0; i < samples.size() && point != points.end(); ++i) {
+    if (!samples[i].residual_px) continue;
+    if (hidden[i] == 0) shown.push_back(*point);
+    ++point;
+  }
+  return shown;
+}
+
 Occlusion::Occlusion(FrameModel& model, HypothesisScorer& scorer, const StereoRig& rig, const std::string& hand_link)
     : model_(model), scorer_(scorer), rig_(rig), of_hand_(model.part_count(), false), robot_(rig.cameras.size()),
       X_CB_(model.part_count()) {

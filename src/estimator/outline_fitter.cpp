@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "limits.hpp"
+#include "occlusion.hpp"
 
 namespace bodyschema {
 namespace {
@@ -59,7 +60,9 @@ void OutlineFitter::look_twice(const Frame& frame, double search_px, OutlineFit&
                    });
   fit.seen.quadratic = quadratic_of(fit.seen.evidence, fit.x, true);
   if (fit.seen.evidence.odd > 0.0) {
+    auto points = std::move(fit.points);  // these know which are odd
     look(frame, search_px, true, fit);
+    fit.points = std::move(points);
   } else {
     fit.evidence = fit.seen.evidence;
     fit.quadratic = fit.seen.quadratic;
@@ -149,17 +152,22 @@ bool OutlineFitter::fits(const FrameEvidence& evidence) const {
   return evidence.matched >= limits::kFewestPoints && lies_near(evidence);
 }
 
+std::vector<OutlinePoint> OutlineFitter::shown(const OutlineFit& fit, std::size_t camera) const {
+  return without_hidden(fit.seen.evidence.samples[camera], fit.points[camera],
+                        limits::kBeside_px * model_.picture_unit_px(camera));
+}
+
 void OutlineFitter::learn_noise(const OutlineFit& fit) {
   for (std::size_t c = 0; c < noise_.size(); ++c) {
     if (fit.evidence.cameras[c].weight > 0.0) {
-      noise_[c].add(fit.points[c], model_.picture_unit_px(c), limits::kNoisePictures);
+      noise_[c].add(shown(fit, c), model_.picture_unit_px(c), limits::kNoisePictures);
     }
   }
 }
 
 void OutlineFitter::learn_shape(const OutlineFit& fit) {
   for (std::size_t c = 0; c < noise_.size(); ++c) {
-    if (fit.evidence.cameras[c].weight > 0.0) shape_.add(fit.points[c], c, model_.picture_unit_px(c));
+    if (fit.evidence.cameras[c].weight > 0.0) shape_.add(shown(fit, c), c, model_.picture_unit_px(c));
   }
 }
 

@@ -25,7 +25,7 @@ struct OutlineFit {
     FrameEvidence evidence;
     Quadratic quadratic;
   } seen;
-  double misfit = 0.0;                            ///< chi-square: of the outline, and of x against what held it
+  double misfit = 0.0;  ///< chi-square: of the outline, and of x against what held it
 };
 
 /// Moves states onto a frame's observed outline by Gauss-Newton, held by what a memory knows. One thread.
@@ -76,6 +76,8 @@ class OutlineFitter {
   void look(const Frame& frame, double search_px, bool last, OutlineFit& fit);
   /// The last look, with odd pieces and without them.
   void look_twice(const Frame& frame, double search_px, OutlineFit& fit);
+  /// Points of a fit by which outlines are judged.
+  [[nodiscard]] std::vector<OutlinePoint> shown(const OutlineFit& fit, std::size_t camera) const;
   [[nodiscard]] Quadratic quadratic_of(const FrameEvidence& evidence, const Eigen::VectorXd& x, bool with_beside) const;
   [[nodiscard]] std::vector<OutlineSearch> searches(double search_px, bool last, bool without_odd = false) const;
 

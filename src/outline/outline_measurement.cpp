@@ -144,31 +144,31 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
       point.normal = (bend.inverse().transpose() * point.normal).normalized();
     }
     point.pixel += corrections.shapes[projection_.segment_of(point.part)].dilation_px * point.normal;
-    if (is_covered(search.covered, point.pixel)) {
-      out.covered += 1.0;
-      samples_.push_back({point.part, point.pixel, point.normal, std::nullopt, true});
-      continue;
-    }
+    const bool covered = is_covered(search.covered, point.pixel);
     const auto distance =
         edges != nullptr ? edges->find(point.pixel, point.normal, reach_px) : std::optional<double>(0.0);
-    out.sampled += 1.0;
     const double r = distance.value_or(0.0);
-    out.misfit += distance ? r * r * damping(r, misfit_px) : misfit_px * misfit_px;
     const bool found = distance && std::abs(r) <= search_px;
-    samples_.push_back({point.part, point.pixel, point.normal, found ? distance : std::nullopt});
-    if (!found) {
-      out.cost += robust_px * robust_px;
-      continue;
+    samples_.push_back({point.part, point.pixel, point.normal, found ? distance : std::nullopt, covered});
+    if (covered) {
+      out.covered += 1.0;
+    } else {
+      out.sampled += 1.0;
+      out.misfit += distance ? r * r * damping(r, misfit_px) : misfit_px * misfit_px;
+      if (!found) out.cost += robust_px * robust_px;
     }
+    if (!found) continue;
     const double share = damping(r, robust_px);
     point.residual_px = r;
     point.weight = factor * share * share;
+    point.odd = covered;
+    points_.push_back(point);
+    if (covered) continue;
+    out.matched += 1.0;
     out.cost += r * r * share;
     out.square += point.weight * r * r;
     out.weight += point.weight;
-    points_.push_back(point);
   }
-  out.matched = static_cast<double>(points_.size());
   if (search.odd_sd_px > 0.0) leave_out_odd(search, unit, out);
 }
 

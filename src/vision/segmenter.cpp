@@ -105,6 +105,8 @@ constexpr float kBesideFrom_px = 2.0f, kBesideTo_px = 8.0f;
 constexpr double kQuantile = 0.95;
 constexpr float kChiSquare1 = 3.84f, kChiSquare3 = 7.81f;
 constexpr float kEdgeShare = 0.2f;
+// Levels: compression errs by less beside an outline; what differs by more there is something else than the background.
+constexpr float kMostSpoilt = 24.0f;
 // From this on it is compression: colours bleed over the outline without being mixtures of both sides.
 constexpr float kCompressed = 4.0f;
 // How much further off than its outline is looked for an arm may be whose prediction is not confirmed, px.
@@ -664,6 +666,7 @@ void Segmenter::Impl::measure_edge_noise(const Image& image) {
         const float d = static_cast<float>(image.pixel(u, v)[c]) - model.mean[i * n + c];
         square += d * d;
       }
+      if (square > static_cast<float>(n) * kMostSpoilt * kMostSpoilt) continue;  // a held thing, somebody's arm
       ratios.push_back(square * model.precision[i]);
     }
   }

@@ -34,7 +34,8 @@ class HeldThingTest : public ::testing::Test {
   }
   /// @param thing_P  where in the hand's frame the mask shows something else; in that of the camera if it does not move
   ///   with it
-  void show(int frame, const std::vector<Eigen::Vector3d>& things_P, const std::vector<Eigen::Vector3d>& things_C = {}) {
+  void show(int frame, const std::vector<Eigen::Vector3d>& things_P,
+            const std::vector<Eigen::Vector3d>& things_C = {}) {
     BinaryMask mask(320, 240), robot(320, 240);
     const Pose X_CP = hand(frame);
     draw(X_CP.translation(), 0.03, mask);

@@ -137,7 +137,7 @@ struct Estimate {
   std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected; in one that is absent for the
                                     ///< encoders of another
   std::vector<Pose> X_CP_nominal;   ///< the same with encoders and model as they are
-  HiddenShare hidden;                    ///< mode best
+  HiddenShare hidden;               ///< mode best
   LiveFindings findings;            ///< by LiveDiagnosis, where one watches
   StageTimes times;
 

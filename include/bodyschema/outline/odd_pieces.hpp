@@ -37,7 +37,7 @@ class OddPieces {
  private:
   void find_neighbours(std::span<const OutlineSample> samples, double reach_px);
 
-  std::vector<std::uint32_t> in_order_;             ///< samples from the top of the picture down
+  std::vector<std::uint32_t> in_order_;            ///< samples from the top of the picture down
   std::vector<std::vector<std::uint32_t>> lists_;  ///< neighbours of each sample
   std::vector<double> evidence_, belief_;
 };
