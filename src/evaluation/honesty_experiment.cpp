@@ -292,8 +292,8 @@ std::vector<TrialRecord> run_jobs(const ExperimentContext& context, const Config
   for (const auto& job : jobs) seeds.push_back(job.seed);
   return run_trials(context, "honesty: one error each", seeds,
                     [&](std::uint64_t seed) {
-                      const auto job = std::find_if(jobs.begin(), jobs.end(),
-                                                    [&](const Job& one) { return one.seed == seed; });
+                      const auto job =
+                          std::find_if(jobs.begin(), jobs.end(), [&](const Job& one) { return one.seed == seed; });
                       auto random = random_of(seed);
                       TrialSetting setting = honesty_setting(context, estimator, random);
                       job->row->add(setting, random, job->twice ? 2.0 : 1.0);

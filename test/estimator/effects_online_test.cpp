@@ -180,7 +180,8 @@ TEST_F(EffectsOnline, WhatAnExtendedModelLeavesOpenIsInTheOffsets) {
 /// A robot that nobody has measured: its axes lie beside where the URDF has them, which offsets and lengths make up for
 /// in every posture a little. No disagreement shows it.
 TEST_F(EffectsOnline, AxesBesideTheirPlaceAreWithinTheTolerancesOfAnUnmeasuredRobot) {
-  const auto file = Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/honesty.yaml");
+  const auto file =
+      Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/honesty.yaml");
   const Beliefs wary = Beliefs::from(file, roles_, rig_, options_);
   Beliefs sure = wary;
   std::erase_if(sure.tolerances, [](const Belief& b) { return b.effect.starts_with("axis_"); });

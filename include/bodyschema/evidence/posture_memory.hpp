@@ -62,14 +62,14 @@ struct Innovation {
 /// the test of a new one come from the same sums.
 ///
 /// A block is one posture of the arm, or a quarter of a second of motion. It counts as one frame: what the model gets
-/// wrong in a posture it gets wrong in all pictures of it, so that more of them make nothing surer. While the arm stands
-/// it says what its frames say on average, so that one frame's noise is not taken for the arm's; of motion the first
-/// frame speaks. A posture that comes again takes the place of what it said before. Every block is linearised about one
-/// state, and again when
-/// the estimate has moved on: quadratics from different places claim to know directions that no picture tells (Huang et
-/// al., 2010, on the consistency of filters for simultaneous localisation and mapping). What blocks disagree about
-/// beyond their pictures' noise is learned as an error of every posture, in the joints' angles (a variance component,
-/// by MacKay's update of its evidence, 1992). At most `most_blocks` are kept. Not thread-safe.
+/// wrong in a posture it gets wrong in all pictures of it, so that more of them make nothing surer. While the arm
+/// stands it says what its frames say on average, so that one frame's noise is not taken for the arm's; of motion the
+/// first frame speaks. A posture that comes again takes the place of what it said before. Every block is linearised
+/// about one state, and again when the estimate has moved on: quadratics from different places claim to know directions
+/// that no picture tells (Huang et al., 2010, on the consistency of filters for simultaneous localisation and mapping).
+/// What blocks disagree about beyond their pictures' noise is learned as an error of every posture, in the joints'
+/// angles (a variance component, by MacKay's update of its evidence, 1992). At most `most_blocks` are kept. Not
+/// thread-safe.
 class PostureMemory {
  public:
   PostureMemory(MemoryLayout layout, const MemoryOptions& options);
@@ -132,10 +132,10 @@ class PostureMemory {
   struct Block {
     std::uint64_t number = 0;
     double begin_s = 0.0, end_s = 0.0;
-    Eigen::VectorXd q;   ///< of its first frame
-    Quadratic pictures;  ///< mean over its frames; once linearised anew, of the first ...
-    Eigen::VectorXd x;   ///< ... about this state
-    double frames = 1.0;  ///< that this is the mean of
+    Eigen::VectorXd q;                       ///< of its first frame
+    Quadratic pictures;                      ///< mean over its frames; once linearised anew, of the first ...
+    Eigen::VectorXd x;                       ///< ... about this state
+    double frames = 1.0;                     ///< that this is the mean of
     mutable std::optional<Quadratic> say{};  ///< with the posture's own error; nothing: not worked out yet
     void average(const Quadratic& frame);
   };
