@@ -323,15 +323,17 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
 }
 
 std::vector<Candidate> stated_slips(LogFit& fit, const LogAbout& log, const BlockRegression& base,
-                                    const std::vector<StatedSlip>& stated) {
+                                    const std::vector<Microseconds>& times) {
   std::vector<Candidate> list;
-  for (const auto& slip : stated) {
-    const CauseName cause{"slip", slip.joint, ""};
-    if (std::find(log.found.begin(), log.found.end(), cause) != log.found.end()) continue;
-    Candidate candidate{.cause = cause, .variable = {}, .parameters = {0}, .from = slip.from, .stated = true};
-    candidate.columns = added_columns(log, directions_of(fit, log, candidate));
-    candidate.scores = base.score(candidate.columns);
-    list.push_back(std::move(candidate));
+  for (const auto time : times) {
+    for (Eigen::Index j = 0; j < log.state.joints(); ++j) {
+      const CauseName cause{"slip", log.state.parameters()[static_cast<std::size_t>(j)].name, ""};
+      if (std::find(log.found.begin(), log.found.end(), cause) != log.found.end()) continue;
+      Candidate candidate{.cause = cause, .variable = {}, .parameters = {0}, .from = time, .stated = true};
+      candidate.columns = added_columns(log, directions_of(fit, log, candidate));
+      candidate.scores = base.score(candidate.columns);
+      list.push_back(std::move(candidate));
+    }
   }
   return list;
 }

@@ -76,14 +76,10 @@ struct Slips {
 Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<NotTestable>& untestable,
             bool at_every_picture = true);
 
-/// A slip that others saw happen: joint and time are not looked for.
-struct StatedSlip {
-  std::string joint;
-  Microseconds from = 0;
-};
-/// Scored. Joints that are found already are left out.
+/// A slip of every arm joint at times at which others saw that something happened, scored. Joints that are found
+/// already are left out.
 std::vector<Candidate> stated_slips(LogFit& fit, const LogAbout& log, const BlockRegression& base,
-                                    const std::vector<StatedSlip>& stated);
+                                    const std::vector<Microseconds>& times);
 
 /// Whether a cause would stand out of a log, with this threshold of z, before it is larger than on any robot.
 bool is_told(const Candidate& candidate, const JointRoles& roles, double threshold);

@@ -26,8 +26,8 @@ namespace {
 
 class Diagnoser {
  public:
-  Diagnoser(LogFit& fit, ModelSearch search, const DiagnosisOptions& options, std::vector<StatedSlip> stated = {})
-      : fit_(fit), options_(options), search_(std::move(search)), stated_(std::move(stated)) {}
+  Diagnoser(LogFit& fit, ModelSearch search, const DiagnosisOptions& options, std::vector<Microseconds> changes = {})
+      : fit_(fit), options_(options), search_(std::move(search)), changes_(std::move(changes)) {}
 
   DiagnosisReport run() {
     refuse_unusable();
@@ -126,10 +126,7 @@ class Diagnoser {
     auto slips = diagnosis::slips(log, base, report_.not_testable, search_.refits());
     std::move(slips.all.begin(), slips.all.end(), std::back_inserter(scores));
     std::move(slips.best.begin(), slips.best.end(), std::back_inserter(candidates));
-    for (auto& slip : stated_slips(fit_, log, base, stated_)) {
-      std::erase_if(candidates, [&](const Candidate& c) { return c.cause == slip.cause; });
-      candidates.push_back(std::move(slip));
-    }
+    add_stated(log, base, candidates);
     const double threshold = chance_threshold(scores, options_.level, options_.seed);
     // A look has no time for curves, but where something is about to be named that may only stand in for one.
     if (!search_.refits() &&
@@ -142,9 +139,21 @@ class Diagnoser {
     return asked_.emplace(Field{std::move(log), std::move(base), std::move(candidates), threshold});
   }
 
+  /// Slips that others saw happen, where they stand out for themselves.
+  void add_stated(const LogAbout& log, const BlockRegression& base, std::vector<Candidate>& candidates) {
+    if (changes_.empty()) return;
+    auto slips = stated_slips(fit_, log, base, changes_);
+    if (stated_count_ == 0) stated_count_ = slips.size();
+    for (auto& slip : slips) {
+      if (slip.z() < threshold_of(true)) continue;
+      std::erase_if(candidates, [&](const Candidate& c) { return c.cause == slip.cause; });
+      candidates.push_back(std::move(slip));
+    }
+  }
+
   /// What a candidate's z must reach: that of all of them, but for what others saw happen.
   [[nodiscard]] double threshold_of(bool stated) const {
-    return stated ? normal_quantile(options_.level / static_cast<double>(stated_.size())) : report_.z_threshold;
+    return stated ? normal_quantile(options_.level / static_cast<double>(stated_count_)) : report_.z_threshold;
   }
 
   void add_curves(const LogAbout& log, std::vector<Candidate>& candidates) {
@@ -256,8 +265,7 @@ class Diagnoser {
       const bool simpler =
           !trial.candidate->generic() && trial.candidate->parameters.size() < best->candidate->parameters.size();
       if (!simpler || trial.gain < (1.0 - limits::kAlikeShare) * known->gain) continue;
-      const bool worse =
-          paired_t(trial.heldout.loss, known->heldout.loss) >= student_quantile(limits::kRivalTail, dof);
+      const bool worse = paired_t(trial.heldout.loss, known->heldout.loss) >= student_quantile(limits::kRivalTail, dof);
       if (!worse || is_part(field, *trial.candidate, *known->candidate)) best = &trial;
     }
     return best;
@@ -356,7 +364,8 @@ class Diagnoser {
   LogFit& fit_;
   const DiagnosisOptions& options_;
   ModelSearch search_;
-  std::vector<StatedSlip> stated_;
+  std::vector<Microseconds> changes_;  ///< seen by others
+  std::size_t stated_count_ = 0;       ///< of slips then, at first
   DiagnosisReport report_;
   double block_s_ = 0.0;
   std::optional<Field> asked_;  ///< about the present model
@@ -374,9 +383,9 @@ DiagnosisReport diagnose(LogFit& fit, const std::vector<Belief>& beliefs, const 
 
 DiagnosisReport diagnosis::look(LogFit& fit, State state, std::shared_ptr<const LinearLog> pictures,
                                 std::vector<OutlineNoise> noise, const std::vector<Belief>& tolerances,
-                                const DiagnosisOptions& options, const std::vector<StatedSlip>& stated) {
+                                const DiagnosisOptions& options, const std::vector<Microseconds>& changes) {
   ModelSearch search(fit, std::move(state), std::move(pictures), std::move(noise), tolerances, options);
-  return Diagnoser(fit, std::move(search), options, stated).look();
+  return Diagnoser(fit, std::move(search), options, changes).look();
 }
 
 }  // namespace bodyschema

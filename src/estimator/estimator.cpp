@@ -148,7 +148,6 @@ struct Estimator::Impl {
     now_s = seconds(observation.utime);
     frame = model.take(observation, state);
     changed.clear();
-    slipped.reset();
     cameras_swapped = contradicted = near = hidden_only = false;
     hidden = {};
     if (!particles_only()) occlusion.cover(frame, state, hand_sd_m);
@@ -534,8 +533,8 @@ struct Estimator::Impl {
     if (released.size() == 1 && released[0] < joints) {
       const double step = better.fit.x[released[0]] - state[released[0]];
       stalled.stepped(released[0], step);
-      slipped = SlippedJoint{joint_names[static_cast<std::size_t>(released[0])], step};
-      changed = fmt::format("{} slipped by {:.1f} deg", slipped->joint, degrees(step));
+      changed =
+          fmt::format("{} slipped by {:.1f} deg", joint_names[static_cast<std::size_t>(released[0])], degrees(step));
     } else if (!young()) {
       changed = better.hypothesis.what;
     }
@@ -688,7 +687,6 @@ struct Estimator::Impl {
     estimate.outline_sd_px = fitter.noise().front().sd_px();
     estimate.outline_alike = fitter.noise().front().correlated_points();
     estimate.changed = changed;
-    estimate.slipped = slipped;
     if (const auto joint = stalled.joint(); joint >= 0) {
       estimate.stalled_joint = joint_names[static_cast<std::size_t>(joint)];
       estimate.stalled_motion_rad = stalled.moved_rad();
@@ -890,7 +888,6 @@ struct Estimator::Impl {
   bool near = false;          ///< the last frame's outlines lie near what is reported
   bool cameras_swapped = false;
   std::string changed;
-  std::optional<SlippedJoint> slipped;  ///< where that is a slip
   Eigen::MatrixXd first_guesses;  ///< of the joint offsets: the first particles
   EyeOrder eye_order;
   StalledEncoders stalled;

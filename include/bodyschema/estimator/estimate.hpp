@@ -69,12 +69,6 @@ struct Finding {
   [[nodiscard]] std::string text() const;
 };
 
-/// A joint whose offset was taken to have stepped in this frame.
-struct SlippedJoint {
-  std::string joint;
-  double offset_step_rad = 0.0;  ///< of the offset: encoder = true + offset
-};
-
 /// What was found beside the state, as of the last look at it; a look every few seconds.
 struct LiveFindings {
   Microseconds utime = 0;    ///< of the newest picture that was looked at; 0: none yet
@@ -127,7 +121,6 @@ struct Estimate {
   double outline_sd_px = 0.0;       ///< of one residual of the outlines, measured; px of a 320x240 picture
   double outline_alike = 0.0;       ///< how many neighbouring outline points err as one; measured
   std::string changed;              ///< what was taken to have changed in this frame: "r_elbow slipped by 4.9 deg"
-  std::optional<SlippedJoint> slipped{};  ///< the same, where that is a slip
   std::string misfit;               ///< in kModelMisfit: what is wrong by more than believed possible, and what to do
   std::string stalled_joint;        ///< its encoder stands although the pictures show it move;
                                     ///< empty: none. The state is never kConverged then
