@@ -5,9 +5,10 @@
 
 namespace bodyschema {
 
-double believed_outline_sd_px(LogFit& fit, const State& state) {
+double believed_outline_sd_px(LogFit& fit, const State& state, const std::vector<bool>& left_out) {
   constexpr std::size_t kPictures = 12;
-  constexpr OutlineSearch kSearch{.search_px = 6.0, .spacing_px = 6.0, .robust_px = 3.0};
+  OutlineSearch search{.search_px = 6.0, .spacing_px = 6.0, .robust_px = 3.0};
+  for (const bool out : left_out) search.part_weight.push_back(out ? 0.0 : 1.0);
   std::vector<ParameterRef> refs;
   for (const auto& parameter : state.parameters()) refs.push_back(parameter.ref);
   const auto coordinates = fit.moved_by(state.model(), refs);
@@ -19,7 +20,7 @@ double believed_outline_sd_px(LogFit& fit, const State& state) {
   OutlineEvidence expected;
   double sum = 0.0, weight = 0.0;
   for (std::size_t p = 0; p < pictures.size(); p += step) {
-    fit.measurement().expect(pictures[p].joints.q, at.corrections[p], pictures[p].camera, coordinates, kSearch,
+    fit.measurement().expect(pictures[p].joints.q, at.corrections[p], pictures[p].camera, coordinates, search,
                              expected);
     const double unit = picture_unit(fit.log().rig().cameras[pictures[p].camera].intrinsics);
     for (Eigen::Index k = 0; k < state.size(); ++k) {

@@ -84,11 +84,12 @@ class Calibrator {
     if (!options_.quiet) bar_.emplace("calibration", 100);
     std::optional<RawPictures> masks;
     if (raw()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
+    loose_ = loose_fingers(*log_, Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options()));
     if (masks) believed_px_ = believed_px();
-    const bool still = masks && believed_px_ > kRough_px && masks->by_what_moved();
+    if (std::getenv("BS_DEBUG")) fmt::print("believed {} px\n", believed_px_);
+    const bool still = masks && believed_px_ > kRough_px && masks->by_what_moved() && most_moved();
     find_cameras(still);
     LogFit fit(*log_, threads_of(options_));
-    loose_ = loose_fingers(*log_, Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options()));
     fit.leave_out(loose_);
     std::optional<BatchFit> best;
     if (!masks || still) best.emplace(fitted(fit, starts_));
@@ -156,12 +157,19 @@ class Calibrator {
 
   [[nodiscard]] bool raw() const { return pipeline_.masks_need_estimates(); }
 
+  /// Whether what moved is most of the robot: of an arm that rests the whole time it shows nothing.
+  [[nodiscard]] bool most_moved() const {
+    const auto shown = log_->parts_shown();
+    return static_cast<double>(std::count(shown.begin(), shown.end(), true)) >=
+           kLeastSeen * static_cast<double>(shown.size());
+  }
+
   /// How far off the robot's outlines may be by what is configured; anything where a camera is to be found.
   [[nodiscard]] double believed_px() {
     if (std::any_of(rig_.cameras.begin(), rig_.cameras.end(), to_be_searched)) return kAnywhere_px;
     LogFit fit(*log_, 1);
     const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
-    return believed_outline_sd_px(fit, State(log_->roles(), beliefs.state));
+    return believed_outline_sd_px(fit, State(log_->roles(), beliefs.state), loose_);
   }
 
   /// Masks and fit by turns, masks ever nearer to what the fit of all postures says.

@@ -16,7 +16,7 @@ namespace bodyschema {
 struct DrawnPicture {
   std::int64_t episode = 0;
   std::size_t row = 0;                  ///< of its table of joint angles, and picture of its video
-  std::vector<Eigen::Vector2d> left{};  ///< points on edges of the left arm, px, about one every 4
+  std::vector<Eigen::Vector2d> left{};  ///< points on edges of the left arm, px, about one every 8
   std::vector<Eigen::Vector2d> right{};
 };
 

@@ -95,7 +95,7 @@ void HumanoidView::write_figure(const DrawnPicture& drawn, const std::map<std::s
     for (std::size_t i = 0; i + 1 < points->size(); ++i) {
       const Eigen::Vector2d& a = (*points)[i];
       const Eigen::Vector2d& b = (*points)[i + 1];
-      constexpr double kGap_px = 8.0;  // edges are drawn in steps of 4; what is farther is the next edge
+      constexpr double kGap_px = 14.0;  // edges are drawn in steps of 8; what is farther is the next edge
       if ((b - a).norm() > kGap_px) continue;
       for (int s = 0; s <= 8; ++s) {
         const Eigen::Vector2d p = a + (b - a) * s / 8.0;
