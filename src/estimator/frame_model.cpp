@@ -116,6 +116,7 @@ void FrameModel::corrections(const Exposure& exposure, const Eigen::VectorXd& x,
   } else {
     out.clear();
   }
+  out.qdot = exposure.at.qdot;
   for (std::size_t e = 0; e < state_.model().size(); ++e) {
     const Effect& effect = std::as_const(state_).model()[e];
     if (!effect.has_memory()) effect.apply(exposure.at, out);
@@ -188,7 +189,8 @@ void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::sp
   const Eigen::Index n = state_.size() + beside_count();
   out.cameras.resize(frame.seen.size());
   out.cost.assign(frame.seen.size(), 0.0);
-  out.sampled = out.matched = out.square = out.weight = 0.0;
+  out.sampled = out.matched = out.square = out.weight = out.odd = out.covered = 0.0;
+  out.samples.assign(with_beside ? frame.seen.size() : 0, {});
   for (std::size_t c = 0; c < frame.seen.size(); ++c) {
     auto& evidence = out.cameras[c];
     evidence.A.setZero(n, n);
@@ -200,7 +202,12 @@ void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::sp
     const auto& exposure = frame.exposures[c];
     find_directions(exposure, x, with_beside);
     corrections(exposure, x, scratch_);
-    measurement_.linearise(ObservedEdges(*seen, k), exposure.at.encoder, scratch_, c, active_, search[c], evidence_);
+    OutlineSearch beside = search[c];
+    if (c < frame.covered.size()) beside.covered = &frame.covered[c];
+    measurement_.linearise(ObservedEdges(*seen, k), exposure.at.encoder, scratch_, c, active_, beside, evidence_);
+    if (with_beside) out.samples[c].assign(measurement_.samples().begin(), measurement_.samples().end());
+    out.odd += evidence_.odd;
+    out.covered += evidence_.covered;
     out.sampled += evidence_.sampled;
     out.matched += evidence_.matched;
     const double unit2 = picture_unit(k) * picture_unit(k);

@@ -10,6 +10,21 @@
 #include "bodyschema/search/search_level.hpp"
 
 namespace bodyschema {
+namespace {
+
+/// Takes pixels out of those that count; an empty `valid` is all of them.
+void leave_out(const BinaryMask& pixels, BinaryMask& valid) {
+  if (pixels.empty()) return;
+  if (valid.empty()) {
+    valid = BinaryMask(pixels.width(), pixels.height());
+    valid.fill(true);
+  }
+  for (int v = 0; v < valid.height(); ++v) {
+    for (int w = 0; w < valid.words_per_row(); ++w) valid.row(v)[w] &= ~pixels.row(v)[w];
+  }
+}
+
+}  // namespace
 
 HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes,
                                    const SilhouetteModel* outlines, std::vector<PinholeIntrinsics> cameras,
@@ -49,6 +64,7 @@ bool HypothesisScorer::observe(const Observation& observation, const Frame& fram
     if (present) {
       observed_[c].mask = observation.cameras[c]->mask;
       observed_[c].valid = observation.cameras[c]->valid;
+      if (c < frame.covered.size()) leave_out(frame.covered[c], observed_[c].valid);
       seen_px += static_cast<double>(observed_[c].mask.count());
       pixels += static_cast<double>(cameras_[c].width) * static_cast<double>(cameras_[c].height);
       camera_mask_ |= 1u << c;
