@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "bodyschema/estimator/estimator.hpp"
+#include "occlusion.hpp"
 #include "outline/own_robot.hpp"
 #include "outline/synthetic_reach.hpp"
 
@@ -153,6 +154,41 @@ TEST_F(OcclusionOnOwnRobot, ASlipIsNotTakenForSomethingThatHides) {
   for (int frame = 40; frame < 50; ++frame) estimate = estimator_->step(other.observe(posture(frame), frame * 100'000));
   EXPECT_NEAR(estimate.offset_rad(5), slipped(5), radians(0.5));
   EXPECT_LT(estimate.hidden.hand, 0.1);
+}
+
+/// A straight flank, 3 px a sample, of which [10, 20) was left out; points for what was found.
+struct Flank {
+  explicit Flank(bool edges_there) {
+    for (int i = 0; i < 30; ++i) {
+      OutlineSample sample{0, {100.0 + 3.0 * i, 100.0}, {0.0, -1.0}, 0.1};
+      sample.odd = i >= 10 && i < 20;
+      if (sample.odd && !edges_there && i % 5 != 0) sample.residual_px.reset();
+      if (sample.odd && sample.residual_px) sample.residual_px = 3.0;
+      samples.push_back(sample);
+      if (!sample.residual_px) continue;
+      OutlinePoint point;
+      point.pixel = sample.pixel;
+      point.odd = sample.odd;
+      point.residual_px = *sample.residual_px;
+      points.push_back(point);
+    }
+  }
+  std::vector<OutlineSample> samples;
+  std::vector<OutlinePoint> points;
+};
+
+TEST(WithoutHidden, WhatHasNoEdgeNearSaysNothingOfTheModel) {
+  const Flank hidden(false);
+  const auto shown = without_hidden(hidden.samples, hidden.points, 7.0);
+  EXPECT_EQ(hidden.points.size(), 22u);
+  EXPECT_EQ(shown.size(), 20u);
+  for (const auto& point : shown) EXPECT_FALSE(point.odd);
+}
+
+/// A hand of another make runs beside the model's for long pieces: that must not pass for something that hides.
+TEST(WithoutHidden, AnEdgeThatRunsBesideThePredictionIsTheModelsError) {
+  const Flank beside(true);
+  EXPECT_EQ(without_hidden(beside.samples, beside.points, 7.0).size(), 30u);
 }
 
 }  // namespace
