@@ -16,7 +16,8 @@ using Paint = std::function<void(int frame, std::size_t camera, CameraObservatio
 
 class OcclusionOnOwnRobot : public OwnRobot {
  protected:
-  OcclusionOnOwnRobot() : reach_(robot_, setup_, rig_, paper_offsets_rad()) {
+  OcclusionOnOwnRobot()
+      : reach_(robot_, setup_, rig_, paper_offsets_rad()), projection_(robot_, setup_, rig_, reach_.roles()) {
     options_ = EstimatorOptions::from(configuration_);
     options_.silhouette.engine = "contour";
     Beliefs beliefs;
@@ -64,9 +65,17 @@ class OcclusionOnOwnRobot : public OwnRobot {
   [[nodiscard]] Paint before_hand(double radius_px, double aside_px) {
     return [this, radius_px, aside_px](int frame, std::size_t camera, CameraObservation& seen) {
       const auto& k = rig_.cameras[camera].intrinsics;
-      const Eigen::Vector3d p_C = reach_.true_hand(posture(frame), camera) * Eigen::Vector3d(0.0, 0.0, 0.06);
+      const Eigen::Vector3d p_C = middle_of_hand(frame, camera);
       paint_disc(seen, k.project(p_C) + Eigen::Vector2d(aside_px, 0.0), radius_px, false);
     };
+  }
+  /// Between the hand's base and its fingertips.
+  [[nodiscard]] Eigen::Vector3d middle_of_hand(int frame, std::size_t camera) {
+    projection_.place(posture(frame), reach_.roles().no_corrections(), camera);
+    Eigen::Vector3d tips = Eigen::Vector3d::Zero();
+    for (const auto& X_CT : projection_.fingertips()) tips += X_CT.translation();
+    tips /= static_cast<double>(projection_.fingertips().size());
+    return 0.5 * (projection_.hand().translation() + tips);
   }
   static void paint_disc(CameraObservation& seen, const Eigen::Vector2d& centre, double radius_px, bool robot) {
     for (int v = 0; v < seen.mask.height(); ++v) {
@@ -77,6 +86,7 @@ class OcclusionOnOwnRobot : public OwnRobot {
   }
 
   SyntheticReach reach_;
+  RobotProjection projection_;
   EstimatorOptions options_;
   std::unique_ptr<Estimator> estimator_;
 };
@@ -94,7 +104,7 @@ TEST_F(OcclusionOnOwnRobot, AnOpenHandBeforeAWallHidesNothing) {
 TEST_F(OcclusionOnOwnRobot, WhatHidesHalfTheHandIsLeftOutAndSaid) {
   follow(0, 40);
   for (int frame = 40; frame < 55; ++frame) {
-    const Estimate estimate = step(frame, before_hand(22.0, 14.0));
+    const Estimate estimate = step(frame, before_hand(22.0, 18.0));
     EXPECT_GT(estimate.hidden.hand, 0.15) << frame;
     EXPECT_NE(estimate.hidden.text().find("of the hand is hidden"), std::string::npos) << frame;
     EXPECT_NE(estimate.state, EstimatorState::kDiverged) << frame;
