@@ -61,21 +61,17 @@ class OcclusionOnOwnRobot : public OwnRobot {
       paint_disc(seen, k.project(p_C), k.fx * radius_m / p_C.z(), true);
     };
   }
-  /// Something before the hand that is taken for background, its middle this far beside the hand's in the picture.
-  [[nodiscard]] Paint before_hand(double radius_px, double aside_px) {
-    return [this, radius_px, aside_px](int frame, std::size_t camera, CameraObservation& seen) {
+  /// Something before the hand that is taken for background, on the way from its base (0) to its fingertips (1).
+  [[nodiscard]] Paint before_hand(double radius_px, double along) {
+    return [this, radius_px, along](int frame, std::size_t camera, CameraObservation& seen) {
+      projection_.place(posture(frame), reach_.roles().no_corrections(), camera);
+      const Eigen::Vector3d base = projection_.hand().translation();
+      Eigen::Vector3d tips = Eigen::Vector3d::Zero();
+      for (const auto& X_CT : projection_.fingertips()) tips += X_CT.translation();
+      tips /= static_cast<double>(projection_.fingertips().size());
       const auto& k = rig_.cameras[camera].intrinsics;
-      const Eigen::Vector3d p_C = middle_of_hand(frame, camera);
-      paint_disc(seen, k.project(p_C) + Eigen::Vector2d(aside_px, 0.0), radius_px, false);
+      paint_disc(seen, k.project(base + along * (tips - base)), radius_px, false);
     };
-  }
-  /// Between the hand's base and its fingertips.
-  [[nodiscard]] Eigen::Vector3d middle_of_hand(int frame, std::size_t camera) {
-    projection_.place(posture(frame), reach_.roles().no_corrections(), camera);
-    Eigen::Vector3d tips = Eigen::Vector3d::Zero();
-    for (const auto& X_CT : projection_.fingertips()) tips += X_CT.translation();
-    tips /= static_cast<double>(projection_.fingertips().size());
-    return 0.5 * (projection_.hand().translation() + tips);
   }
   static void paint_disc(CameraObservation& seen, const Eigen::Vector2d& centre, double radius_px, bool robot) {
     for (int v = 0; v < seen.mask.height(); ++v) {
@@ -104,7 +100,7 @@ TEST_F(OcclusionOnOwnRobot, AnOpenHandBeforeAWallHidesNothing) {
 TEST_F(OcclusionOnOwnRobot, WhatHidesHalfTheHandIsLeftOutAndSaid) {
   follow(0, 40);
   for (int frame = 40; frame < 55; ++frame) {
-    const Estimate estimate = step(frame, before_hand(22.0, 18.0));
+    const Estimate estimate = step(frame, before_hand(30.0, 1.0));
     EXPECT_GT(estimate.hidden.hand, 0.15) << frame;
     EXPECT_NE(estimate.hidden.text().find("of the hand is hidden"), std::string::npos) << frame;
     EXPECT_NE(estimate.state, EstimatorState::kDiverged) << frame;
@@ -120,7 +116,7 @@ TEST_F(OcclusionOnOwnRobot, AHiddenHandIsOccludedAndRightAgainAtOnce) {
   const Estimate before = follow(0, 40);
   ASSERT_EQ(before.state, EstimatorState::kConverged);
   for (int frame = 40; frame < 60; ++frame) {
-    const Estimate estimate = step(frame, before_hand(60.0, 0.0));
+    const Estimate estimate = step(frame, before_hand(90.0, 0.6));
     EXPECT_EQ(estimate.state, EstimatorState::kOccluded) << frame;
     EXPECT_TRUE(estimate.offset_rad.isApprox(before.offset_rad, 0.05)) << frame;
   }
