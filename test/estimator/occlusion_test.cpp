@@ -99,7 +99,7 @@ TEST_F(OcclusionOnOwnRobot, AnOpenHandBeforeAWallHidesNothing) {
 
 TEST_F(OcclusionOnOwnRobot, WhatHidesHalfTheHandIsLeftOutAndSaid) {
   follow(0, 40);
-  for (int frame = 40; frame < 55; ++frame) {
+  for (int frame = 40; frame < 50; ++frame) {
     const Estimate estimate = step(frame, before_hand(30.0, 1.0));
     EXPECT_GT(estimate.hidden.hand, 0.15) << frame;
     EXPECT_NE(estimate.hidden.text().find("of the hand is hidden"), std::string::npos) << frame;
@@ -107,22 +107,22 @@ TEST_F(OcclusionOnOwnRobot, WhatHidesHalfTheHandIsLeftOutAndSaid) {
     EXPECT_EQ(estimate.changed, "") << frame;
     EXPECT_LT(error_mm(estimate, frame), 1.5) << frame;
   }
-  const Estimate after = follow(55, 58);
+  const Estimate after = follow(50, 53);
   EXPECT_EQ(after.state, EstimatorState::kConverged);
-  EXPECT_LT(error_mm(after, 57), 0.5);
+  EXPECT_LT(error_mm(after, 52), 0.5);
 }
 
 TEST_F(OcclusionOnOwnRobot, AHiddenHandIsOccludedAndRightAgainAtOnce) {
   const Estimate before = follow(0, 40);
   ASSERT_EQ(before.state, EstimatorState::kConverged);
-  for (int frame = 40; frame < 60; ++frame) {
+  for (int frame = 40; frame < 50; ++frame) {
     const Estimate estimate = step(frame, before_hand(90.0, 0.6));
     EXPECT_EQ(estimate.state, EstimatorState::kOccluded) << frame;
     EXPECT_TRUE(estimate.offset_rad.isApprox(before.offset_rad, 0.05)) << frame;
   }
-  const Estimate after = follow(60, 62);
+  const Estimate after = follow(50, 52);
   EXPECT_EQ(after.state, EstimatorState::kConverged);
-  EXPECT_LT(error_mm(after, 61), 0.5);
+  EXPECT_LT(error_mm(after, 51), 0.5);
 }
 
 TEST_F(OcclusionOnOwnRobot, AThingInTheHandFromTheFirstPictureOnIsLearned) {
