@@ -185,7 +185,7 @@ struct Flank {
 
 TEST(WithoutHidden, WhatHasNoEdgeNearSaysNothingOfTheModel) {
   const Flank hidden(false);
-  const auto shown = without_hidden(hidden.samples, hidden.points, 7.0);
+  const auto shown = without_hidden(hidden.samples, hidden.points, 7.0, 1.0);
   EXPECT_EQ(hidden.points.size(), 22u);
   EXPECT_EQ(shown.size(), 20u);
   for (const auto& point : shown) EXPECT_FALSE(point.odd);
@@ -194,7 +194,16 @@ TEST(WithoutHidden, WhatHasNoEdgeNearSaysNothingOfTheModel) {
 /// A hand of another make runs beside the model's for long pieces: that must not pass for something that hides.
 TEST(WithoutHidden, AnEdgeThatRunsBesideThePredictionIsTheModelsError) {
   const Flank beside(true);
-  EXPECT_EQ(without_hidden(beside.samples, beside.points, 7.0).size(), 30u);
+  EXPECT_EQ(without_hidden(beside.samples, beside.points, 7.0, 1.0).size(), 30u);
+}
+
+TEST(WithoutHidden, EdgesThatCrossThePredictionAreOtherThings) {
+  Flank crossing(true);
+  for (int i = 10; i < 20; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    crossing.samples[k].residual_px = crossing.points[k].residual_px = i - 14.5;
+  }
+  EXPECT_EQ(without_hidden(crossing.samples, crossing.points, 7.0, 1.0).size(), 20u);
 }
 
 }  // namespace
