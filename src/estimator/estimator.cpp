@@ -10,10 +10,12 @@
 #include <numeric>
 #include <optional>
 
+#include "bodyschema/camera/bent_silhouette.hpp"
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "bodyschema/evidence/distributions.hpp"
 #include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/filter/particle_filter.hpp"
+#include "bodyschema/search/search_level.hpp"
 #include "explanations.hpp"
 #include "eye_order.hpp"
 #include "frame_model.hpp"
@@ -119,9 +121,11 @@ struct Estimator::Impl {
       : options(estimator_options), setup(robot_setup), rig(stereo_rig),
         state_at_first(without_offsets(known), beliefs.state),
         considered(Considered::beside(state_at_first, beliefs.tolerances)),
-        model(robot, setup, rig, known.roles(), state_at_first, considered.effects), joints(model.state().joints()),
-        scorer(model, silhouette_model(*robot, setup), rig.intrinsics(), options.silhouette, options.filter.particles,
-               !particles_only()),
+        outlines(particles_only() ? silhouette_model(*robot, setup)
+                                  : outline_level(silhouette_model(*robot, setup), rig.intrinsics())),
+        model(robot, setup, rig, known.roles(), state_at_first, considered.effects, &outlines), joints(model.state().joints()),
+        scorer(model, silhouette_model(*robot, setup), particles_only() ? nullptr : &outlines, rig.intrinsics(),
+               options.silhouette, options.filter.particles),
         filter(joints, options.filter), memory(memory_layout(model.state(), considered), options.memory),
         fitter(model, scorer, options, rig.cameras.size()), occlusion(model, scorer, rig, setup.hand_link),
         state(model.state().prior_mean()), in_frame(memory.estimate()), stalled(joints) {
@@ -769,6 +773,14 @@ struct Estimator::Impl {
   }
 
   /// The state that an estimate reports.
+  /// The silhouette of parts placed by a state, as the lens shows it.
+  [[nodiscard]] BinaryMask drawn(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera, const Exposure& exposure,
+                                 const Eigen::VectorXd& x) {
+    Corrections corrections;
+    model.corrections(exposure, x, corrections);
+    return bent_silhouette(scorer.render(X_CB, camera), rig.cameras[camera].intrinsics, corrections.camera.k1);
+  }
+
   [[nodiscard]] Eigen::VectorXd state_of(const Estimate& estimate) const {
     Eigen::VectorXd x = model.state().prior_mean();
     x.head(joints) = estimate.offset_rad;
@@ -840,6 +852,7 @@ struct Estimator::Impl {
   StereoRig rig;
   State state_at_first;
   Considered considered;
+  SilhouetteModel outlines;  ///< what outlines and pictures to look at are drawn from
   FrameModel model;
   Frame frame;                           ///< the last one; its observation is gone once `step` has returned
   Eigen::Index joints;                   ///< estimated ones; the first entries of a state
@@ -918,15 +931,16 @@ BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::
   std::vector<Eigen::Isometry3f> X_CB(impl_->model.part_count());
   const Exposure exposure = impl_->model.preview(observation.cameras[camera]->joints, camera);
   (corrected ? impl_->model.project(exposure, impl_->state) : impl_->model.project_nominal(exposure)).parts(X_CB);
-  return impl_->scorer.render(X_CB, camera);
+  return corrected ? impl_->drawn(X_CB, camera, exposure, impl_->state) : impl_->scorer.render(X_CB, camera);
 }
 
 BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::size_t camera,
                                            const Estimate& estimate) {
   std::vector<Eigen::Isometry3f> X_CB(impl_->model.part_count());
   const Exposure exposure = impl_->model.preview(observation.cameras[camera]->joints, camera);
-  impl_->model.project(exposure, impl_->state_of(estimate)).parts(X_CB);
-  return impl_->scorer.render(X_CB, camera);
+  const Eigen::VectorXd x = impl_->state_of(estimate);
+  impl_->model.project(exposure, x).parts(X_CB);
+  return impl_->drawn(X_CB, camera, exposure, x);
 }
 
 Pose Estimator::hand_pose(const Exposure& exposure, bool corrected) {

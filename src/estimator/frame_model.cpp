@@ -19,8 +19,9 @@ bool Frame::exposed() const {
 }
 
 FrameModel::FrameModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
-                       const JointRoles& roles, State state, const ErrorModel& beside)
-    : roles_(roles), rig_(rig), state_(std::move(state)), measurement_(robot, setup, rig, roles), track_(robot, setup),
+                       const JointRoles& roles, State state, const ErrorModel& beside, const SilhouetteModel* drawn)
+    : roles_(roles), rig_(rig), state_(std::move(state)),
+      measurement_(robot, setup, rig, roles, drawn != nullptr ? *drawn : silhouette_model(*robot, setup)), track_(robot, setup),
       probes_(state_.model(), refs_of(state_), measurement_.coordinates()),
       beside_(beside, fitted_parameters(beside), measurement_.coordinates()),
       settled_(rig.cameras.size(), roles.no_corrections()), scratch_(roles.no_corrections()), nothing_(scratch_),
@@ -115,6 +116,7 @@ void FrameModel::corrections(const Exposure& exposure, const Eigen::VectorXd& x,
   } else {
     out.clear();
   }
+  out.qdot = exposure.at.qdot;
   for (std::size_t e = 0; e < state_.model().size(); ++e) {
     const Effect& effect = std::as_const(state_).model()[e];
     if (!effect.has_memory()) effect.apply(exposure.at, out);

@@ -43,8 +43,9 @@ struct Frame {
 /// (`beside`): their values stay zero, but what they would change is asked for. One thread.
 class FrameModel {
  public:
+  /// @param drawn  meshes that outlines are taken from; null: the robot's own
   FrameModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
-             const JointRoles& roles, State state, const ErrorModel& beside);
+             const JointRoles& roles, State state, const ErrorModel& beside, const SilhouetteModel* drawn = nullptr);
 
   /// Shows the next observation's encoder samples to the effects. The observation must live as long as its frame.
   /// @param x  the state believed in, under which gravity acts on the arm

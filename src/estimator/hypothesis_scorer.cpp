@@ -27,13 +27,13 @@ void leave_out(const BinaryMask& pixels, BinaryMask& valid) {
 }  // namespace
 
 HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes,
-                                   std::vector<PinholeIntrinsics> cameras, const SilhouetteOptions& options,
-                                   std::size_t slots, bool for_search)
+                                   const SilhouetteModel* outlines, std::vector<PinholeIntrinsics> cameras,
+                                   const SilhouetteOptions& options, std::size_t slots)
     : model_(model), cameras_(std::move(cameras)), observed_(cameras_.size()), coarse_(cameras_.size()), slots_(slots),
       X_CB_((slots + 1) * cameras_.size() * model.part_count()), counts_(slots * cameras_.size()),
       distances_(static_cast<Eigen::Index>(slots)), one_distance_(1) {
   const std::size_t at_once = slots * cameras_.size();
-  if (!for_search) {
+  if (outlines == nullptr) {
     full_ = make_silhouette_scorer(silhouettes, cameras_,
                                    fastest_engine(silhouettes, cameras_, options, at_once, engine_reason_));
     scorer_ = full_.get();
@@ -46,7 +46,7 @@ HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& sil
   // For pictures to look at and specks: the processor is quick enough.
   SilhouetteOptions full = options;
   full.engine = "contour";
-  full_ = make_silhouette_scorer(silhouettes, cameras_, full);
+  full_ = make_silhouette_scorer(*outlines, cameras_, full);
   scorer_ = search_.get();
   std::size_t triangles = 0, drawn = 0;
   for (const auto& part : silhouettes.parts) triangles += part.triangles.size();

@@ -19,6 +19,20 @@ bool moves_links(Kind kind) {
          kind == Kind::kRigTurn || kind == Kind::kCameraShift || kind == Kind::kCameraTurn;
 }
 
+/// When a row is exposed, from the middle one's time on, as a share of the read-out.
+double row_time(double v, const PinholeIntrinsics& k) {
+  return (v - 0.5 * (k.height - 1)) / std::max(1, k.height - 1);
+}
+
+/// Motion of a body from X0 to X, per unit: (p, 1) of the frame to velocity.
+Eigen::Matrix<double, 3, 4> motion_between(const Pose& X0, const Pose& X, double step) {
+  Eigen::Matrix<double, 3, 4> motion;
+  const Eigen::Matrix3d W = (X.linear() - X0.linear()) * X0.linear().transpose() / step;
+  motion.leftCols<3>() = W;
+  motion.col(3) = (X.translation() - X0.translation()) / step - W * X0.translation();
+  return motion;
+}
+
 /// Share of a residual's square that counts.
 double damping(double r, double scale) {
   return scale * scale / (r * r + scale * scale);
@@ -44,8 +58,12 @@ void OutlineEvidence::clear(Eigen::Index coordinates) {
 
 OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
                                        const StereoRig& rig, const JointRoles& roles)
+    : OutlineMeasurement(robot, setup, rig, roles, silhouette_model(*robot, setup)) {}
+
+OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
+                                       const StereoRig& rig, const JointRoles& roles, const SilhouetteModel& drawn)
     : coordinates_(roles), projection_(robot, setup, rig, roles), moved_(robot, setup, rig, roles),
-      extractor_(silhouette_model(*robot, setup), rig.intrinsics()), probe_(roles.no_corrections()),
+      extractor_(drawn, rig.intrinsics()), probe_(roles.no_corrections()),
       X_CB_(projection_.part_count()) {}
 
 void OutlineMeasurement::linearise(const ObservedEdges& edges, const Eigen::Ref<const Eigen::VectorXd>& q,
@@ -54,6 +72,7 @@ void OutlineMeasurement::linearise(const ObservedEdges& edges, const Eigen::Ref<
                                    OutlineEvidence& out) {
   out.clear(static_cast<Eigen::Index>(active.size()));
   projection_.place(q, corrections, camera);
+  find_shutter_motion(q, corrections, camera, active);
   compare(&edges, corrections, camera, search, out);
   if (points_.empty() || active.empty()) return;
   find_motions(q, corrections, camera, active);
@@ -65,10 +84,35 @@ void OutlineMeasurement::expect(const Eigen::Ref<const Eigen::VectorXd>& q, cons
                                 OutlineEvidence& out) {
   out.clear(static_cast<Eigen::Index>(active.size()));
   projection_.place(q, corrections, camera);
+  find_shutter_motion(q, corrections, camera, active);
   compare(nullptr, corrections, camera, search, out);
   if (points_.empty() || active.empty()) return;
   find_motions(q, corrections, camera, active);
   differentiate(corrections, projection_.intrinsics(camera), active, out);
+}
+
+void OutlineMeasurement::find_shutter_motion(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
+                                             std::size_t camera, std::span<const std::uint32_t> active) {
+  shutter_.clear();
+  constexpr double kStep_s = 1e-5, kRest_rad_s = 1e-4;
+  const bool asked = std::any_of(active.begin(), active.end(),
+                                 [&](std::uint32_t i) { return coordinates_[i].kind == Kind::kReadout; });
+  if (!asked && corrections.camera.readout_s == 0.0) return;
+  if (corrections.qdot.size() != q.size() || corrections.qdot.cwiseAbs().maxCoeff() < kRest_rad_s) return;
+  moved_.place(q + kStep_s * corrections.qdot, corrections, camera);
+  for (std::size_t l = 0; l < projection_.links().size(); ++l) {
+    shutter_.push_back(motion_between(projection_.links()[l], moved_.links()[l], kStep_s));
+  }
+}
+
+void OutlineMeasurement::roll(const Corrections& corrections, const PinholeIntrinsics& k, OutlinePoint& point) const {
+  if (shutter_.empty() || corrections.camera.readout_s == 0.0) return;
+  const double time_s = corrections.camera.readout_s * row_time(point.pixel.y(), k);
+  const Eigen::Vector3d p_C = point.p_C + time_s * (shutter_[point.part] * point.p_C.homogeneous());
+  const Eigen::Array2d focal = Eigen::Array2d(k.fx, k.fy) * (1.0 + corrections.camera.focal_scale);
+  const Eigen::Vector2d step = p_C.head<2>() / p_C.z() - point.p_C.head<2>() / point.p_C.z();
+  point.pixel += (focal * step.array()).matrix();
+  point.p_C = p_C;
 }
 
 void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& corrections, std::size_t camera,
@@ -91,6 +135,7 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
     point.p_C = unwarp * predicted.p_C.cast<double>();
     point.pixel = predicted.pixel.cast<double>();
     point.normal = predicted.normal.cast<double>();
+    roll(corrections, k, point);
     if (k1 != 0.0) {
       const Eigen::Vector2d x = point.p_C.head<2>() / point.p_C.z();
       point.pixel += (k1 * x.squaredNorm() * focal * x.array()).matrix();
@@ -160,11 +205,7 @@ void OutlineMeasurement::find_motions(const Eigen::Ref<const Eigen::VectorXd>& q
     number = value;
     for (std::size_t l = 0; l < links_.size(); ++l) {
       // d(X X0^-1)/d coordinate: a twist acting on points of the camera's frame.
-      const Pose& X = moved_.links()[l];
-      const Eigen::Matrix3d W = (X.linear() - links_[l].linear()) * links_[l].linear().transpose() / kStep;
-      auto& motion = motion_[i * links_.size() + l];
-      motion.leftCols<3>() = W;
-      motion.col(3) = (X.translation() - links_[l].translation()) / kStep - W * links_[l].translation();
+      motion_[i * links_.size() + l] = motion_between(links_[l], moved_.links()[l], kStep);
     }
   }
 }
@@ -198,6 +239,9 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
         case Kind::kFocal: g = bent * n_f.dot(x) / (1.0 + corrections.camera.focal_scale); break;
         case Kind::kCx: g = point.normal.x(); break;
         case Kind::kCy: g = point.normal.y(); break;
+        case Kind::kReadout:
+          if (!shutter_.empty()) g = by_p.dot(shutter_[point.part] * p_C) * row_time(point.pixel.y(), k);
+          break;
         case Kind::kK1: g = n_f.dot(x) * x.squaredNorm(); break;
         case Kind::kScale:
           if (own) {

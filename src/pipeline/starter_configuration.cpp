@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 constexpr double kGuessedFieldOfView_rad = 1.05;       // 60 deg across, a common camera
 constexpr double kPairSd_deg = 0.1, kPairSd_mm = 1.0;  // of a stereo pair that was calibrated as one
 /// Physical: joined by arrival, pictures come late by some frames; a lens that nobody measured bends by as much.
-constexpr double kLag_sd_ms = 60.0, kLens_sd = 0.05;
+constexpr double kLag_sd_ms = 60.0;
 
 bool among(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -416,6 +416,13 @@ class Starter {
     return text;
   }
 
+  /// A calibration that found nothing is rarely one: k1 is estimated then, unless pictures are said to come straight.
+  [[nodiscard]] std::string lens_of(const StarterCamera& camera) const {
+    const bool bends = std::any_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d != 0.0; });
+    if (bends) return fmt::format("[{:.8g}]", fmt::join(camera.distortion, ", "));
+    return o_.rectified ? "[0, 0, 0, 0, 0]" : "unknown             # k1 is estimated; zeros: pictures come straightened";
+  }
+
   [[nodiscard]] std::string camera_yaml(std::size_t c) const {
     const StarterCamera& camera = cameras_[c];
     std::string text = fmt::format("  {}:\n", yaml(camera.name));
@@ -440,10 +447,10 @@ class Starter {
     const auto& k = camera.k;
     text += fmt::format(
         "    width: {}\n    height: {}\n    fx: {:.8g}{}\n    fy: {:.8g}\n    cx: {:.8g}\n    cy: {:.8g}\n"
-        "    distortion: [{:.8g}]\n",
+        "    distortion: {}\n    readout_ms: unknown             # of a rolling shutter; 0: all rows at once\n",
         k.width, k.height, k.fx,
         camera.source.empty() ? o_.focal_px > 0.0 ? "" : "                   # a guess" : "  # " + camera.source, k.fy,
-        k.cx, k.cy, fmt::join(camera.distortion, ", "));
+        k.cx, k.cy, lens_of(camera));
     return text;
   }
 
@@ -455,13 +462,14 @@ class Starter {
         "vision:\n"
         "  method: {}                # or {}: "
         "docs/calibrate_my_robot.md\n"
+        "  looks_file: looks.json      # the robot's colours, which a service keeps for its next start (auto)\n"
         "bus:\n"
         "  channel_prefix: {}\n",
         masks_     ? "given"
         : learned_ ? "learned_background"
-                   : "statistics",
-        masks_     ? "statistics, without masks"
-        : learned_ ? "statistics, where the cameras move"
+                   : "auto",
+        masks_     ? "auto, without masks"
+        : learned_ ? "auto, where the cameras move"
                    : "single_colour, learned_background",
         yaml(o_.channel_prefix));
     text += state_yaml();
@@ -479,15 +487,9 @@ class Starter {
 
   /// What may be wrong in this recording besides what may be on any robot.
   [[nodiscard]] std::string state_yaml() const {
-    const bool straight = std::any_of(cameras_.begin(), cameras_.end(), [](const StarterCamera& camera) {
-      return std::all_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d == 0.0; });
-    });
     std::string text;
     if (moving_) {
       text += fmt::format("    latency: {{sd_ms: {}}}             # pictures against encoders\n", kLag_sd_ms);
-    }
-    if (straight && !o_.rectified && cameras_.size() == 1) {
-      text += fmt::format("    distortion: {{sd: {}}}           # a lens without any is none\n", kLens_sd);
     }
     return text.empty() ? text : "estimator:\n  state:\n" + text;
   }

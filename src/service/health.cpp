@@ -192,7 +192,7 @@ std::string turned_away(const HealthFacts& f) {
   if (turned_rad <= 0.0) return "";
   return fmt::format(
       "the head has turned by {:.1f} deg from where the background was learned, masks are wrong: set "
-      "vision.method: statistics",
+      "vision.method: auto",
       degrees(turned_rad));
 }
 
@@ -296,6 +296,10 @@ Health assess(const HealthFacts& facts) {
   std::string found;
   for (const auto& cause : facts.estimate.findings.causes) {
     if (!cause.estimated) found += (found.empty() ? "" : "; ") + cause.text();
+  }
+  // What a file should say is named although it is taken into account.
+  for (const auto& cause : facts.estimate.findings.causes) {
+    if (cause.estimated && cause.effect == "distortion") health.sentence += "; taken into account: " + cause.sentence;
   }
   if (!found.empty() && health.level != HealthLevel::kStale) {
     health.sentence += "; the pictures ask for: " + found;

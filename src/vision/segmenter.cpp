@@ -69,6 +69,15 @@ double unit_of(int width, int height) {
   return std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0));
 }
 
+/// Lengths and areas of the configuration are those of a 320x240 picture: in larger ones they grow with it.
+VisionSetup in_pixels_of(VisionSetup setup, int width, int height) {
+  const double unit = std::max(1.0, unit_of(width, height)), area = unit * unit;
+  setup.search_px = static_cast<int>(std::lround(setup.search_px * unit));
+  setup.min_component_px = static_cast<int>(std::min(setup.min_component_px * area, 1e9));
+  setup.max_hole_px = static_cast<int>(std::min(setup.max_hole_px * area, 1e9));
+  return setup;
+}
+
 /// What is in both.
 void intersect(BinaryMask& mask, const BinaryMask& other) {
   for (int v = 0; v < mask.height(); ++v) {
@@ -143,7 +152,8 @@ BackgroundModel load_background(const VisionSetup& setup, const std::string& cam
 
 struct Segmenter::Impl {
   Impl(const VisionSetup& s, std::string name, int w, int h)
-      : setup(s), camera(std::move(name)), width(w), height(h), single_colour(s, w, h), learned(s, w, h),
+      : configured(s), setup(in_pixels_of(s, w, h)), camera(std::move(name)), width(w), height(h), single_colour(s, w, h),
+        learned(s, w, h),
         detected(w, h), sure(w, h), uncertain(w, h), robot(w, h),
         hits((static_cast<std::size_t>(w) + 63) / 64 * 64, 0) {}
 
@@ -179,7 +189,8 @@ struct Segmenter::Impl {
   /// How much more than elsewhere the background varies beside the robot: what compression makes of an outline.
   void measure_edge_noise(const Image& image);
 
-  VisionSetup setup;
+  VisionSetup configured;
+  VisionSetup setup;  ///< in pixels of these pictures
   std::string camera;
   int width;
   int height;
@@ -412,7 +423,7 @@ void Segmenter::admit(const Image& image) {
   impl_->check(image);
   if (impl_->channels == image.channels) return;
   if (impl_->channels != 0) {
-    impl_ = std::make_unique<Impl>(impl_->setup, impl_->camera, impl_->width, impl_->height);
+    impl_ = std::make_unique<Impl>(impl_->configured, impl_->camera, impl_->width, impl_->height);
   }
   impl_->channels = image.channels;
 }
@@ -434,6 +445,15 @@ void Segmenter::finish_learning() {
 void Segmenter::learn(std::span<const Image> frames) {
   for (const auto& frame : frames) learn_from(frame);
   finish_learning();
+}
+
+void Segmenter::learn(std::span<const Image> frames, std::span<const BinaryMask> robots) {
+  for (const auto& frame : frames) admit(frame);
+  auto& self = *impl_;
+  if (!self.learns() || frames.empty()) return;
+  self.learned.learn_beside(frames, robots);
+  self.learned_offline = true;
+  self.selection.clear();
 }
 
 bool Segmenter::ready() const {
@@ -530,6 +550,14 @@ void Segmenter::adapt(const Image& image, const BinaryMask& mask, const Predicte
   self.learned.update(image, &self.robot, false);
 }
 
+const RobotLooks& Segmenter::looks() const {
+  return impl_->looks;
+}
+
+void Segmenter::know_looks(RobotLooks looks) {
+  impl_->looks = std::move(looks);
+}
+
 void Segmenter::camera_turned() {
   impl_->turned = true;
 }
@@ -624,7 +652,7 @@ bool Segmenter::Impl::background_holds(const Image& image) {
 void Segmenter::Impl::measure_edge_noise(const Image& image) {
   const BackgroundModel& model = learned.model();
   const auto n = static_cast<std::size_t>(channels);
-  const auto unit = static_cast<float>(std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0)));
+  const auto unit = static_cast<float>(unit_of(width, height));
   const PixelBox& box = evidence.box();
   ratios.clear();
   for (int v = box.v0; v <= box.v1; ++v) {
@@ -660,7 +688,7 @@ void Segmenter::Impl::forget_background() {
 void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryMask& valid,
                                    std::vector<std::uint8_t>& coverage, const PredictedRobot& predicted) {
   const double unit = unit_of(width, height);
-  const double reach_px = predicted.reach_px > 0.0 ? predicted.reach_px : setup.search_px * unit;
+  const double reach_px = predicted.reach_px > 0.0 ? predicted.reach_px : setup.search_px;
   if (beside.width() != width || beside.height() != height) {
     beside = BinaryMask(width, height);
     known = BinaryMask(width, height);
@@ -702,6 +730,7 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
     sure.fill(false);
   }
   const BackgroundModel* background = holds ? &local : nullptr;
+  if (looks.channels != channels) looks = {};
   const bool everywhere = reach_px >= ColourEvidence::kEverywhere_px * unit;
   evidence.separate(seen, *predicted.silhouette, reach_px, looks, background, sure, robot);
   components.remove_small(robot, setup.min_component_px);

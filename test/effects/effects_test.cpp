@@ -251,6 +251,17 @@ TEST(CameraSkew, OnlyTheRightPictureIsLater) {
   EXPECT_NEAR(dq_deg(corrections(*effect, 20.0, at), kElbow), 0.6, 1e-12);
 }
 
+TEST(RollingShutter, IsOfTheCamerasItNames) {
+  const auto r = roles();
+  auto at = instant(r);
+  EXPECT_NEAR(corrections(*make_effect("rolling_shutter", {}, r), 20.0, at).camera.readout_s, 0.020, 1e-15);
+  ASSERT_GT(r.cameras.size(), 1u);
+  const auto second = make_effect("rolling_shutter", {"", r.cameras[1]}, r);
+  EXPECT_EQ(corrections(*second, 20.0, at).camera.readout_s, 0.0);
+  at.camera = 1;
+  EXPECT_NEAR(corrections(*second, 20.0, at).camera.readout_s, 0.020, 1e-15);
+}
+
 TEST(Geometry, LengthTiltAndHeadGoWhereTheyBelong) {
   const auto r = roles();
   const auto at = instant(r);

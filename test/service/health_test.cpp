@@ -80,7 +80,7 @@ TEST(Health, TheHeadHasTurnedFromItsBackground) {
   facts.cameras[1].background_turned_rad = 0.21;
   expect(facts, HealthLevel::kWarn,
          "the head has turned by 12.0 deg from where the background was learned, masks are wrong: set "
-         "vision.method: statistics");
+         "vision.method: auto");
   facts.estimate.state = EstimatorState::kDiverged;
   expect(facts, HealthLevel::kError, "diverged: ");
   expect(facts, HealthLevel::kError, "; the head has turned by 12.0 deg");
@@ -96,6 +96,16 @@ TEST(Health, EncodersLateButUsed) {
   HealthFacts facts = well();
   facts.encoder_lag_ms = 140.0;
   expect(facts, HealthLevel::kWarn, "encoders late by 140 ms");
+}
+
+TEST(Health, ALensThatIsTakenIntoAccountIsNamed) {
+  HealthFacts facts = well();
+  Finding lens;
+  lens.effect = "distortion";
+  lens.sentence = "the lens bends the picture inwards (k1) by -0.30 more than configured";
+  lens.estimated = true;
+  facts.estimate.findings.causes = {lens};
+  expect(facts, HealthLevel::kOk, "taken into account: the lens bends the picture inwards (k1) by -0.30");
 }
 
 TEST(Health, EncodersTooLateToBeUsed) {

@@ -75,6 +75,9 @@ class OutlineMeasurement {
  public:
   OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
                      const JointRoles& roles);
+  /// @param drawn  the rendered links' meshes as outlines are taken from, one per mesh of the robot
+  OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                     const JointRoles& roles, const SilhouetteModel& drawn);
 
   [[nodiscard]] const Coordinates& coordinates() const { return coordinates_; }
   [[nodiscard]] RobotProjection& projection() { return projection_; }
@@ -102,6 +105,11 @@ class OutlineMeasurement {
  private:
   void find_motions(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera,
                     std::span<const std::uint32_t> active);
+  /// How links move while rows are read out; nothing where no row is another one's time, or nothing moves.
+  void find_shutter_motion(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
+                           std::size_t camera, std::span<const std::uint32_t> active);
+  /// Moves a point to where its row saw it.
+  void roll(const Corrections& corrections, const PinholeIntrinsics& k, OutlinePoint& point) const;
   /// @param edges  null: every point is where it is predicted
   void compare(const ObservedEdges* edges, const Corrections& corrections, std::size_t camera,
                const OutlineSearch& search, OutlineEvidence& out);
@@ -118,6 +126,7 @@ class OutlineMeasurement {
   std::vector<Pose> links_;  ///< of the prediction
   /// Velocity of a point (p_C, 1) of a link per unit of an active coordinate: [coordinate][link].
   std::vector<Eigen::Matrix<double, 3, 4>> motion_;
+  std::vector<Eigen::Matrix<double, 3, 4>> shutter_;  ///< the same per second, by link; empty: they rest
   std::vector<OutlinePoint> points_;
   std::vector<OutlineSample> samples_;
   OddPieces odd_pieces_;

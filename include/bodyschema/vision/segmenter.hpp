@@ -9,6 +9,7 @@
 #include "bodyschema/geometry/binary_mask.hpp"
 #include "bodyschema/geometry/image.hpp"
 #include "bodyschema/vision/background_model.hpp"
+#include "bodyschema/vision/robot_looks.hpp"
 #include "bodyschema/vision/vision_setup.hpp"
 
 namespace bodyschema {
@@ -67,6 +68,10 @@ class Segmenter {
   /// Offline: learns the background from frames in which the robot moves or is absent.
   /// Replaces what was known. No effect for a given picture.
   void learn(std::span<const Image> frames);
+  /// The same where it is known about where the robot is in each frame: that is not learned from, and what is left of
+  /// few frames is enough, a background that two of them show.
+  /// @param robots  one per frame, of the picture's size
+  void learn(std::span<const Image> frames, std::span<const BinaryMask> robots);
   /// The same for frames that come one by one: any number, in order, then `finish_learning`.
   /// A bounded selection is kept in which every stretch of movement has its share.
   void learn_from(const Image& frame);
@@ -86,6 +91,10 @@ class Segmenter {
   void adapt(const Image& image, const BinaryMask& mask, const PredictedRobot& predicted = {});
   /// `auto`: the camera has turned since the background was learned; that is forgotten unless it looks the same.
   void camera_turned();
+
+  /// `auto`: the robot's colours as learned, or as told: those of an earlier run, of pictures with as many channels.
+  [[nodiscard]] const RobotLooks& looks() const;
+  void know_looks(RobotLooks looks);
 
   /// The background as now known; empty before anything is.
   [[nodiscard]] const BackgroundModel& background() const;
