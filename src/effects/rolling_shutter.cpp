@@ -19,12 +19,10 @@ EffectKind rolling_shutter() {
                 for (std::size_t c = 0; c < roles.cameras.size(); ++c) {
                   if (roles.cameras[c] == target.source) own[c] = true;
                 }
-                return plain(
-                    "rolling_shutter", target, {in_ms("readout", 10.0)},
-                    [own](Parameters p, const Instant& at, Corrections& c) {
-                      if (at.camera < own.size() && own[at.camera]) c.camera.readout_s += p[0].value;
-                    },
-                    Follows::kMotion);
+                return plain("rolling_shutter", target, {in_ms("readout", 10.0)},
+                             [own](Parameters p, const Instant& at, Corrections& c) {
+                               if (at.camera < own.size() && own[at.camera]) c.camera.readout_s += p[0].value;
+                             });
               },
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {

@@ -7,7 +7,7 @@ namespace bodyschema {
 VisionSetup VisionSetup::from(const Configuration& vision) {
   VisionSetup setup;
   const auto method =
-      vision.choice_or("method", "learned_background",
+      vision.choice_or("method", "auto",
                        {"auto", "single_colour", "background_picture", "learned_background", "statistics", "given"});
   if (method == "auto") setup.method = SegmentationMethod::kAuto;
   if (method == "single_colour") setup.method = SegmentationMethod::kSingleColour;
