@@ -25,7 +25,8 @@ class LooksFile : public testing::Test {
  protected:
   void SetUp() override {
     const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / fs::path(std::string("looks_") + info->name() + "_" + std::to_string(getpid()));
+    folder_ =
+        fs::temp_directory_path() / fs::path(std::string("looks_") + info->name() + "_" + std::to_string(getpid()));
     fs::create_directories(folder_);
   }
   void TearDown() override {
