@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <thread>
 #include <utility>
@@ -17,8 +18,12 @@
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "bodyschema/evidence/outline_distance.hpp"
 #include "bodyschema/pipeline/watched_log.hpp"
+#include "believed_outline.hpp"
+#include "beyond_model.hpp"
 #include "calibration_files.hpp"
+#include "loose_fingers.hpp"
 #include "next_posture.hpp"
+#include "raw_pictures.hpp"
 
 namespace bodyschema {
 namespace {
@@ -53,6 +58,14 @@ bool to_be_searched(const CameraModel& camera) {
   return camera.mount.knowledge == PlaceKnowledge::kUnknown;
 }
 
+/// Of pictures without masks: how far off their outlines may be, round by round, px of a 320x240 picture; first where
+/// nothing is known but what is configured, then after a fit of what moved.
+constexpr std::array kReaches = {40.0, 30.0, 20.0, 12.0, 8.0, 6.0, 5.0};
+constexpr std::array kReachesMoved = {16.0, 12.0, 8.0, 6.0, 5.0, 4.0, 4.0};
+/// Physical. Outlines that may be further off than this, px of a 320x240 picture, are looked for by what moved.
+constexpr double kRough_px = 30.0, kAnywhere_px = 1e3;
+constexpr std::size_t kRawKept = 64;  ///< observations of such a log whose pictures are looked at
+
 class Calibrator {
  public:
   Calibrator(const Configuration& configuration, const CalibrationOptions& options)
@@ -64,13 +77,24 @@ class Calibrator {
   Calibration run() {
     WatchedLog watched = watch_log(
         pipeline_,
-        {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .kept = 12, .quiet = options_.quiet}, false);
+        {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .kept = raw() ? kRawKept : 12,
+         .quiet = options_.quiet}, false);
     refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);
     log_ = &watched.pictures;
     if (!options_.quiet) bar_.emplace("calibration", 100);
-    find_cameras();
+    std::optional<RawPictures> masks;
+    if (raw()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
+    loose_ = loose_fingers(*log_, Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options()));
+    if (masks) believed_px_ = believed_px();
+    if (std::getenv("BS_DEBUG")) fmt::print("believed {} px\n", believed_px_);
+    const bool still = masks && believed_px_ > kRough_px && masks->by_what_moved() && most_moved();
+    find_cameras(still);
     LogFit fit(*log_, threads_of(options_));
-    std::optional<BatchFit> best(fitted(fit, starts_));
+    fit.leave_out(loose_);
+    std::optional<BatchFit> best;
+    if (!masks || still) best.emplace(fitted(fit, starts_));
+    if (masks) with_better_masks(*masks, fit, best);
+    if (masks || !pipeline_.learns_background()) without_strangers(fit, best);
     progress(0.6);
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
@@ -92,11 +116,12 @@ class Calibrator {
   // --- cameras ----------------------------------------------------------------------------------
 
   /// Where cameras of which nothing is known may be: several places of the first, the best one of the second.
-  void find_cameras() {
+  /// @param moved  masks were made of what moved before them
+  void find_cameras(bool moved) {
     starts_ = {rig_};
     for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
       if (!to_be_searched(rig_.cameras[c])) continue;
-      if (pipeline_.masks_need_estimates() && !pipeline_.learns_background()) {
+      if (raw() && !moved) {
         throw DataError(
             fmt::format("{}: camera '{}' is to be found, which takes masks of the robot, and vision.method "
                         "statistics makes none before it is known where the robot is; give masks (vision.method: "
@@ -126,6 +151,74 @@ class Calibrator {
       starts_ = std::move(rigs);
       progress(0.3);
     }
+  }
+
+  // --- pictures without masks -------------------------------------------------------------------
+
+  [[nodiscard]] bool raw() const { return pipeline_.masks_need_estimates(); }
+
+  /// Whether what moved is most of the robot: of an arm that rests the whole time it shows nothing.
+  [[nodiscard]] bool most_moved() const {
+    const auto shown = log_->parts_shown();
+    return static_cast<double>(std::count(shown.begin(), shown.end(), true)) >=
+           kLeastSeen * static_cast<double>(shown.size());
+  }
+
+  /// How far off the robot's outlines may be by what is configured; anything where a camera is to be found.
+  [[nodiscard]] double believed_px() {
+    if (std::any_of(rig_.cameras.begin(), rig_.cameras.end(), to_be_searched)) return kAnywhere_px;
+    LogFit fit(*log_, 1);
+    const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
+    return believed_outline_sd_px(fit, State(log_->roles(), beliefs.state), loose_);
+  }
+
+  /// Masks and fit by turns, masks ever nearer to what the fit of all postures says.
+  void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
+    const auto& reaches = best ? kReachesMoved : kReaches;
+    for (const double reach_px : reaches) {
+      if (reach_px > believed_px_ && reach_px > reaches.back()) continue;
+      if (!best) {
+        masks.about(nominal(fit), reach_px);
+      } else {
+        masks.about(best->at().corrections, reach_px);
+      }
+      fit.refresh();
+      const auto x = best ? best->state().x() : Eigen::VectorXd();
+      BatchFit next = started(fit, x);
+      next.run(reach_px, {});
+      if (std::getenv("BS_DEBUG")) fmt::print("reach {} misfit {} rms {}\n", reach_px, next.misfit(), next.noise().front().sd_px());
+      best.emplace(std::move(next));
+    }
+  }
+
+  /// What the masks show beyond the model is left out: a tool, somebody's arm.
+  void without_strangers(LogFit& fit, std::optional<BatchFit>& best) {
+    if (!is_near(*best)) return;
+    const auto beyond = beyond_model(*log_, best->at().corrections);
+    if (beyond.pictures == 0) return;
+    leave_out(*log_, beyond);
+    fit.refresh();
+    const Eigen::VectorXd x = best->state().x();
+    best.emplace(started(fit, x));
+    best->run(0.0, {});
+    if (beyond.on_link.empty()) return;
+    result_.remarks.push_back("something is on " + beyond.on_link +
+                              " that the robot's model does not have: what the masks show of it is left out");
+  }
+
+  [[nodiscard]] static bool is_near(const BatchFit& batch) { return batch.noise().front().sd_px() < kNear_px; }
+
+  [[nodiscard]] BatchFit started(LogFit& fit, const Eigen::VectorXd& x) const {
+    const auto roles = log_->roles();
+    const auto beliefs = Beliefs::from(configuration_, roles, rig_, pipeline_.options());
+    BatchFit batch(fit, State(roles, beliefs.state), beliefs.tolerances, settings());
+    if (x.size() > 0) batch.start_at(x);
+    return batch;
+  }
+
+  /// Encoders and cameras as they are configured.
+  std::vector<Corrections> nominal(LogFit& fit) const {
+    return fit.predict(ErrorModel(log_->roles()), {}).corrections;
   }
 
   // --- fit --------------------------------------------------------------------------------------
@@ -461,7 +554,7 @@ class Calibrator {
     double all = 0.0, seen = 0.0, matched = 0.0;
     OutlineEvidence evidence;
     for (std::size_t part = 0; part < links.size(); ++part) {
-      if (!shown[part]) continue;
+      if (!shown[part] || (!loose_.empty() && loose_[part])) continue;
       double own = 0.0, own_matched = 0.0;
       for (const auto p : pictures) {
         const auto& picture = log_->pictures()[p];
@@ -580,6 +673,8 @@ class Calibrator {
   StereoRig rig_;
   PictureLog* log_ = nullptr;
   std::vector<StereoRig> starts_;
+  double believed_px_ = kAnywhere_px;
+  std::vector<bool> loose_;  ///< parts that are drawn and have no say
   double ambiguity_ = 0.0;
   double only_ = kAlone;  ///< misfit of the second best place over that of the best
   Calibration result_;

@@ -38,6 +38,12 @@ double damping(double r, double scale) {
   return scale * scale / (r * r + scale * scale);
 }
 
+bool is_covered(const BinaryMask* covered, const Eigen::Vector2d& pixel) {
+  if (covered == nullptr || covered->empty()) return false;
+  const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
+  return u >= 0 && v >= 0 && u < covered->width() && v < covered->height() && covered->at(u, v);
+}
+
 }  // namespace
 
 double picture_unit(const PinholeIntrinsics& k) {
@@ -47,13 +53,17 @@ double picture_unit(const PinholeIntrinsics& k) {
 void OutlineEvidence::clear(Eigen::Index coordinates) {
   A.setZero(coordinates, coordinates);
   b.setZero(coordinates);
-  square = weight = cost = misfit = sampled = matched = 0.0;
+  square = weight = cost = misfit = sampled = matched = covered = odd = 0.0;
 }
 
 OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
                                        const StereoRig& rig, const JointRoles& roles)
+    : OutlineMeasurement(robot, setup, rig, roles, silhouette_model(*robot, setup)) {}
+
+OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
+                                       const StereoRig& rig, const JointRoles& roles, const SilhouetteModel& drawn)
     : coordinates_(roles), projection_(robot, setup, rig, roles), moved_(robot, setup, rig, roles),
-      extractor_(silhouette_model(*robot, setup), rig.intrinsics()), probe_(roles.no_corrections()),
+      extractor_(drawn, rig.intrinsics()), probe_(roles.no_corrections()),
       X_CB_(projection_.part_count()) {}
 
 void OutlineMeasurement::linearise(const ObservedEdges& edges, const Eigen::Ref<const Eigen::VectorXd>& q,
@@ -116,6 +126,7 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
   const Eigen::Array2d focal = Eigen::Array2d(k.fx, k.fy) * (1.0 + corrections.camera.focal_scale);
   projection_.parts(X_CB_);
   points_.clear();
+  samples_.clear();
   for (const auto& predicted : extractor_.extract(X_CB_, camera, static_cast<float>(unit * search.spacing_px))) {
     const double factor = search.part_weight.empty() ? 1.0 : search.part_weight[predicted.part];
     if (factor <= 0.0) continue;
@@ -133,24 +144,49 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
       point.normal = (bend.inverse().transpose() * point.normal).normalized();
     }
     point.pixel += corrections.shapes[projection_.segment_of(point.part)].dilation_px * point.normal;
+    const bool covered = is_covered(search.covered, point.pixel);
     const auto distance =
         edges != nullptr ? edges->find(point.pixel, point.normal, reach_px) : std::optional<double>(0.0);
-    out.sampled += 1.0;
     const double r = distance.value_or(0.0);
-    out.misfit += distance ? r * r * damping(r, misfit_px) : misfit_px * misfit_px;
-    if (!distance || std::abs(r) > search_px) {
-      out.cost += robust_px * robust_px;
-      continue;
+    const bool found = distance && std::abs(r) <= search_px;
+    samples_.push_back({point.part, point.pixel, point.normal, found ? distance : std::nullopt, covered});
+    if (covered) {
+      out.covered += 1.0;
+    } else {
+      out.sampled += 1.0;
+      out.misfit += distance ? r * r * damping(r, misfit_px) : misfit_px * misfit_px;
+      if (!found) out.cost += robust_px * robust_px;
     }
+    if (!found) continue;
     const double share = damping(r, robust_px);
     point.residual_px = r;
     point.weight = factor * share * share;
+    point.odd = covered;
+    points_.push_back(point);
+    if (covered) continue;
+    out.matched += 1.0;
     out.cost += r * r * share;
     out.square += point.weight * r * r;
     out.weight += point.weight;
-    points_.push_back(point);
   }
-  out.matched = static_cast<double>(points_.size());
+  if (search.odd_sd_px > 0.0) leave_out_odd(search, unit, out);
+}
+
+void OutlineMeasurement::leave_out_odd(const OutlineSearch& search, double unit_px, OutlineEvidence& out) {
+  odd_pieces_.find(samples_, unit_px * search.odd_sd_px, unit_px * search.spacing_px, unit_px * search.search_px);
+  const double robust_px = unit_px * search.robust_px;
+  auto point = points_.begin();  // one for every sample that was found, in their order
+  for (const auto& sample : samples_) {
+    out.odd += sample.odd;
+    if (!sample.residual_px) continue;
+    OutlinePoint& own = *point++;
+    if (!sample.odd) continue;
+    own.odd = true;
+    const double r = own.residual_px;
+    out.cost += robust_px * robust_px - r * r * damping(r, robust_px);
+    out.square -= own.weight * r * r;
+    out.weight -= own.weight;
+  }
 }
 
 void OutlineMeasurement::find_motions(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
@@ -182,6 +218,10 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
   const Eigen::Vector2d focal = Eigen::Vector2d(k.fx, k.fy) * (1.0 + corrections.camera.focal_scale);
   for (Eigen::Index p = 0; p < n; ++p) {
     const auto& point = points_[static_cast<std::size_t>(p)];
+    if (point.odd) {
+      rows_.col(p).setZero();
+      continue;
+    }
     const double iz = 1.0 / point.p_C.z();
     const Eigen::Vector2d x = point.p_C.head<2>() * iz;
     const double bent = 1.0 + k1 * x.squaredNorm();

@@ -239,7 +239,7 @@ class Replay {
     if (last_.state == EstimatorState::kConverged) {
       converged_ = last_;
       frames_since_ = 0;
-    } else if (last_.state == EstimatorState::kConverging) {
+    } else if (last_.state == EstimatorState::kConverging || last_.state == EstimatorState::kOccluded) {
       ++frames_since_;
     } else if (last_.state == EstimatorState::kDiverged || last_.state == EstimatorState::kModelMisfit) {
       converged_.reset();
@@ -344,6 +344,7 @@ class Replay {
       case EstimatorState::kHandNotInView:
         return last_view_ ? "the arm had left the pictures; the offsets are of before" : "the arm is in no picture";
       case EstimatorState::kModelMisfit: return last_.misfit;
+      case EstimatorState::kOccluded: return "something hides too much of the hand";
       case EstimatorState::kLearningBackground: return "it holds too few pictures to learn the background from";
       default: return "the offsets have not settled: " + missed_limits() + "; do not use them yet";
     }

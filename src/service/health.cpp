@@ -210,6 +210,9 @@ std::optional<std::string> warning(const HealthFacts& f) {
     return std::string("learning the background: keep the arm out of view or moving");
   }
   if (f.estimate.state == EstimatorState::kHandNotInView) return std::string("hand not in view");
+  if (f.estimate.state == EstimatorState::kOccluded) {
+    return std::string("occluded: too little of the hand is seen to say where it is; the offsets are kept");
+  }
   if (f.estimate.state == EstimatorState::kModelMisfit) {
     return "do not use the offsets: " + f.estimate.misfit;
   }
@@ -284,6 +287,10 @@ Health assess(const HealthFacts& facts) {
   if (const std::string turned = turned_away(facts);
       !turned.empty() && health.sentence != turned && health.level != HealthLevel::kStale) {
     health.sentence += "; " + turned;
+  }
+  // What is left out of the evidence is said beside what the rest gives.
+  if (const std::string hidden = facts.estimate.hidden.text(); !hidden.empty() && health.level <= HealthLevel::kWarn) {
+    health.sentence += "; " + hidden;
   }
   // What is wrong beside the offsets is said beside whatever is said of them.
   std::string found;

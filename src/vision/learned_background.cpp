@@ -324,6 +324,74 @@ void LearnedBackground::learn(std::span<const Image> frames, float noise_sd) {
   frames_seen_ = static_cast<int>(frames.size());
 }
 
+/// The colour that most of the frames without the robot have at each pixel: the mean about the one with most others
+/// within the noise.
+template <int kChannels>
+void LearnedBackground::agree_row(std::span<const Image> frames, std::span<const BinaryMask> robots, int v) {
+  constexpr std::size_t kFewestSightings = 2;
+  const float gate = 2.0f * gate_squared(kChannels) * model_.noise_sd * model_.noise_sd;  // of a difference of two
+  std::vector<const std::uint8_t*> seen;
+  const auto near = [gate](const std::uint8_t* a, const std::uint8_t* b) {
+    float distance = 0.0f;
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      const float d = static_cast<float>(a[c]) - static_cast<float>(b[c]);
+      distance += d * d;
+    }
+    return distance <= gate;
+  };
+  for (int u = 0; u < model_.width; ++u) {
+    const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(model_.width) + static_cast<std::size_t>(u);
+    seen.clear();
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+      if (!robots[k].at(u, v)) seen.push_back(frames[k].pixel(u, v));
+    }
+    support_[i] = 0;
+    std::size_t most = 0;
+    const std::uint8_t* middle = nullptr;
+    for (const auto* a : seen) {
+      const auto count = static_cast<std::size_t>(
+          std::count_if(seen.begin(), seen.end(), [&](const std::uint8_t* b) { return near(a, b); }));
+      if (count <= most) continue;
+      most = count;
+      middle = a;
+    }
+    if (most < kFewestSightings || 2 * most <= seen.size()) continue;
+    std::array<float, kChannels> sum{};
+    float squares = 0.0f;
+    for (const auto* b : seen) {
+      if (!near(middle, b)) continue;
+      for (std::size_t c = 0; c < kChannels; ++c) {
+        sum[c] += static_cast<float>(b[c]);
+        squares += static_cast<float>(b[c]) * static_cast<float>(b[c]);
+      }
+    }
+    const auto n = static_cast<float>(most);
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      model_.mean[i * kChannels + c] = sum[c] / n;
+      squares -= sum[c] * sum[c] / n;
+    }
+    support_[i] = static_cast<std::uint16_t>(most);
+    variance_[i] = std::max(squares, 0.0f) / (kChannels * (n - 1.0f));
+  }
+}
+
+void LearnedBackground::learn_beside(std::span<const Image> frames, std::span<const BinaryMask> robots) {
+  start(frames.front());
+  if (setup_.noise_levels <= 0.0) {
+    std::vector<float> noise = {kLeastNoiseSd};
+    for (std::size_t k = 1; k < frames.size(); ++k) noise.push_back(noise_between(frames[k - 1], frames[k]));
+    std::sort(noise.begin(), noise.end());
+    model_.noise_sd = noise[noise.size() / 2];
+  }
+  for (int v = 0; v < model_.height; ++v) {
+    model_.channels == 1 ? agree_row<1>(frames, robots, v) : agree_row<3>(frames, robots, v);
+  }
+  const int configured = std::exchange(setup_.min_sightings, 2);  // as many as agree at least
+  for (std::size_t i = 0; i < support_.size(); ++i) set_precision(i);
+  setup_.min_sightings = configured;
+  frames_seen_ = static_cast<int>(frames.size());
+}
+
 template <int kChannels>
 void LearnedBackground::update_row(const Image& frame, int v, const BinaryMask* robot) {
   const auto begin = static_cast<std::size_t>(v) * static_cast<std::size_t>(model_.width);
@@ -390,6 +458,7 @@ void LearnedBackground::update(const Image& frame, const BinaryMask* robot, bool
     // The first two frames give the noise, without which nothing can be compared.
     if (first_.empty()) {
       first_ = frame;
+      first_robot_ = robot != nullptr ? *robot : BinaryMask();
       return;
     }
     model_.noise_sd = noise_between(first_, frame);
@@ -397,8 +466,9 @@ void LearnedBackground::update(const Image& frame, const BinaryMask* robot, bool
     if (setup_.method == SegmentationMethod::kAuto) model_.noise_sd = std::min(model_.noise_sd, noise_of(frame));
     const Image first = std::move(first_);
     first_ = Image{};
+    const BinaryMask* covered = first_robot_.empty() ? nullptr : &first_robot_;
     for (int v = 0; v < model_.height; ++v) {
-      model_.channels == 1 ? update_row<1>(first, v, nullptr) : update_row<3>(first, v, nullptr);
+      model_.channels == 1 ? update_row<1>(first, v, covered) : update_row<3>(first, v, covered);
     }
     innovation_sum_ = innovation_count_ = 0.0;
   }

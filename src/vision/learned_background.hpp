@@ -56,6 +56,10 @@ class LearnedBackground {
 
   /// @param frames  at most FrameSelection::kCapacity
   void learn(std::span<const Image> frames, float noise_sd);
+  /// From a few frames in which it is known about where the robot is: what two frames and most of those that do not
+  /// have the robot there agree about.
+  /// @param robots  one per frame: pixels that are not learned from
+  void learn_beside(std::span<const Image> frames, std::span<const BinaryMask> robots);
 
   /// @param robot  pixels that must not be learned from; null: none
   /// @param full   every pixel; otherwise only every eighth row, in turn, as upkeep
@@ -81,6 +85,8 @@ class LearnedBackground {
   void choose(std::size_t frame_count, const std::vector<Candidates>& candidates,
               std::vector<std::uint8_t>& choice) const;
   template <int kChannels>
+  void agree_row(std::span<const Image> frames, std::span<const BinaryMask> robots, int v);
+  template <int kChannels>
   void average_row(std::span<const Image> frames, int v, const std::vector<Candidates>& candidates,
                    const std::vector<std::uint8_t>& choice);
   void set_precision(std::size_t i);
@@ -89,6 +95,7 @@ class LearnedBackground {
   BackgroundModel model_;
   int frames_seen_ = 0;
   Image first_;                         // until the second frame gives the noise
+  BinaryMask first_robot_;              // where it must not be learned from; empty: nowhere
   std::vector<std::uint16_t> support_;  // sightings of the background
   std::vector<float> variance_;         // of one channel around the background
   std::vector<float> rival_;            // another colour, channels interleaved

@@ -64,10 +64,15 @@ void pack_bits(const std::uint8_t* bytes, std::size_t count, std::uint64_t* word
   }
 }
 
+/// The length that one pixel of a 320x240 picture has.
+double unit_of(int width, int height) {
+  return std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0));
+}
+
 /// Lengths and areas of the configuration are those of a 320x240 picture: in larger ones they grow with it.
 VisionSetup in_pixels_of(VisionSetup setup, int width, int height) {
-  const double area = std::max(1.0, static_cast<double>(width) * height / (320.0 * 240.0));
-  setup.search_px = static_cast<int>(std::lround(setup.search_px * std::sqrt(area)));
+  const double unit = std::max(1.0, unit_of(width, height)), area = unit * unit;
+  setup.search_px = static_cast<int>(std::lround(setup.search_px * unit));
   setup.min_component_px = static_cast<int>(std::min(setup.min_component_px * area, 1e9));
   setup.max_hole_px = static_cast<int>(std::min(setup.max_hole_px * area, 1e9));
   return setup;
@@ -100,8 +105,12 @@ constexpr float kBesideFrom_px = 2.0f, kBesideTo_px = 8.0f;
 constexpr double kQuantile = 0.95;
 constexpr float kChiSquare1 = 3.84f, kChiSquare3 = 7.81f;
 constexpr float kEdgeShare = 0.2f;
+// Levels: compression errs by less beside an outline; what differs by more there is something else than the background.
+constexpr float kMostSpoilt = 24.0f;
 // From this on it is compression: colours bleed over the outline without being mixtures of both sides.
 constexpr float kCompressed = 4.0f;
+// How much further off than its outline is looked for an arm may be whose prediction is not confirmed, px.
+constexpr double kFarOff_px = 24.0;
 // Share that one picture has in what is known of the robot's colours.
 constexpr float kLookShare = 0.05f;
 
@@ -437,6 +446,15 @@ void Segmenter::learn(std::span<const Image> frames) {
   finish_learning();
 }
 
+void Segmenter::learn(std::span<const Image> frames, std::span<const BinaryMask> robots) {
+  for (const auto& frame : frames) admit(frame);
+  auto& self = *impl_;
+  if (!self.learns() || frames.empty()) return;
+  self.learned.learn_beside(frames, robots);
+  self.learned_offline = true;
+  self.selection.clear();
+}
+
 bool Segmenter::ready() const {
   if (impl_->setup.method != SegmentationMethod::kLearnedBackground) return true;
   return impl_->learned_offline || impl_->learned.frames_seen() >= impl_->setup.learning_frames;
@@ -633,7 +651,7 @@ bool Segmenter::Impl::background_holds(const Image& image) {
 void Segmenter::Impl::measure_edge_noise(const Image& image) {
   const BackgroundModel& model = learned.model();
   const auto n = static_cast<std::size_t>(channels);
-  const auto unit = static_cast<float>(std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0)));
+  const auto unit = static_cast<float>(unit_of(width, height));
   const PixelBox& box = evidence.box();
   ratios.clear();
   for (int v = box.v0; v <= box.v1; ++v) {
@@ -647,6 +665,7 @@ void Segmenter::Impl::measure_edge_noise(const Image& image) {
         const float d = static_cast<float>(image.pixel(u, v)[c]) - model.mean[i * n + c];
         square += d * d;
       }
+      if (square > static_cast<float>(n) * kMostSpoilt * kMostSpoilt) continue;  // a held thing, somebody's arm
       ratios.push_back(square * model.precision[i]);
     }
   }
@@ -667,7 +686,7 @@ void Segmenter::Impl::forget_background() {
 
 void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryMask& valid,
                                    std::vector<std::uint8_t>& coverage, const PredictedRobot& predicted) {
-  const double unit = std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0));
+  const double unit = unit_of(width, height);
   const double reach_px = predicted.reach_px > 0.0 ? predicted.reach_px : setup.search_px;
   if (beside.width() != width || beside.height() != height) {
     beside = BinaryMask(width, height);
@@ -744,6 +763,8 @@ void Segmenter::Impl::adapt_auto(const Image& image, const BinaryMask& mask, con
   for (int v = 0; v < height; ++v) {
     for (int w = 0; w < robot.words_per_row(); ++w) robot.row(v)[w] |= beside.row(v)[w];
   }
+  // A prediction that nothing has confirmed yet may be far from the arm, whose ghost would stay in the background.
+  if (!predicted.trusted) morphology.dilate(robot, static_cast<int>(kFarOff_px * unit_of(width, height)));
   constexpr int kEager = 20;
   learned.update(seen, &robot, learned.frames_seen() < kEager);
   if (predicted.silhouette != nullptr && predicted.trusted) {

@@ -68,6 +68,10 @@ class Segmenter {
   /// Offline: learns the background from frames in which the robot moves or is absent.
   /// Replaces what was known. No effect for a given picture.
   void learn(std::span<const Image> frames);
+  /// The same where it is known about where the robot is in each frame: that is not learned from, and what is left of
+  /// few frames is enough, a background that two of them show.
+  /// @param robots  one per frame, of the picture's size
+  void learn(std::span<const Image> frames, std::span<const BinaryMask> robots);
   /// The same for frames that come one by one: any number, in order, then `finish_learning`.
   /// A bounded selection is kept in which every stretch of movement has its share.
   void learn_from(const Image& frame);

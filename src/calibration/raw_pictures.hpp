@@ -1,0 +1,40 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "bodyschema/observation/corrections.hpp"
+#include "bodyschema/evidence/picture_log.hpp"
+#include "bodyschema/vision/segmenter.hpp"
+
+namespace bodyschema {
+
+/// Masks of pictures that come without, made anew each time the robot is known better. What stands still before a still
+/// camera is known from the other postures, be they ten; what is left is judged by the colours on both sides of the
+/// predicted outline, and where these do not differ it says nothing (Segmenter, `auto`).
+class RawPictures {
+ public:
+  /// @param log  its outlines are replaced
+  /// @param kept  its pictures, as the lens's distortion leaves them; must outlive this
+  RawPictures(PictureLog& log, const VisionSetup& vision, const std::vector<Observation>& kept);
+
+  /// Masks of what moves, by what most pictures agree about, without knowing where the robot is. What never moved has no
+  /// say then (PictureLog::learned_background).
+  /// @return whether there is such a background: the cameras stood still
+  bool by_what_moved();
+  /// Masks about a prediction.
+  /// @param corrections  of every picture of the log, as LinearLog::corrections
+  /// @param reach_px  how far off the outlines may be, px of a 320x240 picture
+  void about(std::span<const Corrections> corrections, double reach_px);
+
+ private:
+  void replace(const std::vector<Observation>& seen, bool learned);
+  [[nodiscard]] std::size_t picture_of(std::size_t camera, Microseconds utime) const;
+
+  PictureLog& log_;
+  VisionSetup vision_;
+  const std::vector<Observation>& kept_;
+  std::vector<Segmenter> segmenters_;  ///< one per camera
+};
+
+}  // namespace bodyschema
