@@ -777,7 +777,7 @@ struct Estimator::Impl {
   /// The silhouette of parts placed by a state, as the lens shows it.
   [[nodiscard]] BinaryMask drawn(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera, const Exposure& exposure,
                                  const Eigen::VectorXd& x) {
-    Corrections corrections;
+    Corrections corrections = model.roles().no_corrections();
     model.corrections(exposure, x, corrections);
     return bent_silhouette(scorer.render(X_CB, camera), rig.cameras[camera].intrinsics, corrections.camera.k1);
   }
