@@ -19,6 +19,7 @@ void add_replay(CLI::App& app) {
     int overlays = 3;
     bool masks = false;
     bool learn_online = false;
+    std::string looks;
   };
   auto a = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("replay", "Run a recorded log through the estimator");
@@ -35,6 +36,8 @@ void add_replay(CLI::App& app) {
   command->add_flag("--masks", a->masks, "Write the observed masks too");
   command->add_flag("--learn-background-online", a->learn_online,
                     "Learn the background from the first pictures, as bodyschemad does, not from the whole log");
+  command->add_option("--looks", a->looks,
+                      "The robot's colours (vision.method: auto): read where the file is there, written at the end");
   a->common.add_to(*command);
   a->common.add_extended_model_to(*command);
   command->callback([a] {
@@ -50,6 +53,7 @@ void add_replay(CLI::App& app) {
     options.overlays = a->overlays;
     options.masks = a->masks;
     options.learn_background_online = a->learn_online;
+    if (!a->looks.empty()) options.looks = a->looks;
     options.watcher = [](const Pipeline& pipeline) -> ReplayOptions::Watcher {
       if (!pipeline.options().live_diagnosis) return {};
       auto live = std::make_shared<LiveDiagnosis>(pipeline, LiveDiagnosisOptions{.waits = true});

@@ -18,8 +18,10 @@
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "bodyschema/evidence/outline_distance.hpp"
 #include "bodyschema/pipeline/watched_log.hpp"
+#include "believed_outline.hpp"
 #include "beyond_model.hpp"
 #include "calibration_files.hpp"
+#include "loose_fingers.hpp"
 #include "next_posture.hpp"
 #include "raw_pictures.hpp"
 
@@ -64,8 +66,11 @@ static_assert(kReaches.size() == kReachesMoved.size());
 constexpr double kWide_px = 12.0;  ///< ... and then once more, to see whether it makes a difference
 constexpr std::array kReachesAgain = {6.0, 4.0, 4.0};
 constexpr int kMostChecks = 3;
-constexpr double kSettled_sd = 2.0;   ///< statistical
-constexpr std::size_t kRawKept = 64;  ///< observations of such a log whose pictures are looked at
+constexpr double kSettled_sd = 2.0;  ///< statistical
+/// Physical. Outlines that may be further off than this, px of a 320x240 picture, are looked for by what moved.
+constexpr double kRough_px = 30.0, kAnywhere_px = 1e3;
+constexpr double kHardlyKnown_rad = radians(3.0);  ///< ... and so are those of a camera that may be turned by more
+constexpr std::size_t kRawKept = 64;               ///< observations of such a log whose pictures are looked at
 
 class Calibrator {
  public:
@@ -87,14 +92,22 @@ class Calibrator {
     if (!options_.quiet) bar_.emplace("calibration", 100);
     std::optional<RawPictures> masks;
     if (raw()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
-    const bool still = masks && masks->cameras_stood_still();
-    if (raw() && still) masks->by_what_moved();
+    loose_ = loose_fingers(*log_, Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options()));
+    if (masks) believed_px_ = believed_px();
+    const bool rough = believed_px_ > kRough_px || hardly_known();
+    bool still = masks && rough && masks->cameras_stood_still();
+    if (still) {
+      masks->by_what_moved();
+      still = most_moved();
+    }
     find_cameras(still);
     LogFit fit(*log_, threads_of(options_));
+    fit.leave_out(loose_);
     std::optional<BatchFit> best;
-    if (!raw() || still) best.emplace(fitted(fit, starts_));
-    if (raw()) with_better_masks(*masks, fit, best);
-    if (!raw() && !pipeline_.learns_background()) without_strangers(fit, best);
+    if (!masks || still) best.emplace(fitted(fit, starts_));
+    if (masks) with_better_masks(*masks, fit, best);
+    if (masks && rough) settle(*masks, fit, best);
+    if (masks || !pipeline_.learns_background()) without_strangers(fit, best);
     progress(0.6);
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
@@ -156,11 +169,41 @@ class Calibrator {
   // --- pictures without masks -------------------------------------------------------------------
 
   [[nodiscard]] bool raw() const { return pipeline_.masks_need_estimates(); }
-  /// Masks and fit by turns, masks ever nearer to what the fit of all postures says, until it makes no difference how
-  /// far they looked: masks that are made about a prediction follow it, right or wrong, but the wider they look the
-  /// less.
+
+  /// Whether what moved is most of the robot: of an arm that rests the whole time it shows nothing.
+  [[nodiscard]] bool most_moved() const {
+    const auto shown = log_->parts_shown();
+    return static_cast<double>(std::count(shown.begin(), shown.end(), true)) >=
+           kLeastSeen * static_cast<double>(shown.size());
+  }
+
+  /// How far off the robot's outlines may be by what is configured; anything where a camera is to be found.
+  [[nodiscard]] double believed_px() {
+    if (std::any_of(rig_.cameras.begin(), rig_.cameras.end(), to_be_searched)) return kAnywhere_px;
+    LogFit fit(*log_, 1);
+    const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
+    return believed_outline_sd_px(fit, State(log_->roles(), beliefs.state), loose_);
+  }
+
+  /// Masks and fit by turns, masks ever nearer to what the fit of all postures says.
   void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
-    for (const double reach_px : best ? kReachesMoved : kReaches) with_masks_anew(masks, fit, best, reach_px);
+    const auto& reaches = best ? kReachesMoved : kReaches;
+    for (const double reach_px : reaches) {
+      if (reach_px > believed_px_ && reach_px > reaches.back()) continue;
+      with_masks_anew(masks, fit, best, reach_px);
+    }
+  }
+
+  /// Whether some camera may be turned by more than a few degrees.
+  [[nodiscard]] bool hardly_known() const {
+    return std::any_of(rig_.cameras.begin(), rig_.cameras.end(), [](const CameraModel& camera) {
+      return camera.mount.knowledge == PlaceKnowledge::kRoughly && camera.mount.sd_rad > kHardlyKnown_rad;
+    });
+  }
+
+  /// Until it makes no difference how far masks look: those that are made about a prediction follow it, right or wrong,
+  /// but the wider they look the less.
+  void settle(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
     for (int again = 0; again < kMostChecks; ++again) {
       PictureLog near = masks.about(best->at().corrections, kWide_px);
       fit.refresh();
@@ -555,7 +598,7 @@ class Calibrator {
     double all = 0.0, seen = 0.0, matched = 0.0;
     OutlineEvidence evidence;
     for (std::size_t part = 0; part < links.size(); ++part) {
-      if (!shown[part]) continue;
+      if (!shown[part] || (!loose_.empty() && loose_[part])) continue;
       double own = 0.0, own_matched = 0.0;
       for (const auto p : pictures) {
         const auto& picture = log_->pictures()[p];
@@ -683,6 +726,8 @@ class Calibrator {
   PictureLog* log_ = nullptr;
   std::vector<StereoRig> starts_;
   std::string unsettled_;  ///< a joint whose offset depends on how masks were made
+  double believed_px_ = kAnywhere_px;
+  std::vector<bool> loose_;  ///< parts that are drawn and have no say
   double ambiguity_ = 0.0;
   double only_ = kAlone;  ///< misfit of the second best place over that of the best
   Calibration result_;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "bodyschema/camera/lens_knowledge.hpp"
+#include "bodyschema/camera/shutter.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 
@@ -103,11 +105,11 @@ CameraModel read_camera(const Configuration& section, const std::string& name) {
   k.fy = section.number("fy", kMinFocal, kMaxFocal);
   k.cx = section.number("cx", -kMaxSide, 2 * kMaxSide);
   k.cy = section.number("cy", -kMaxSide, 2 * kMaxSide);
-  const auto distortion = section.numbers_or("distortion", {0, 0, 0, 0, 0});
-  if (distortion.size() != camera.distortion.size()) {
-    section.fail("distortion", "five numbers [k1, k2, p1, p2, k3]");
+  static_cast<void>(readout_s(section));  // checked with the rest; what moves while rows are read out is a belief
+  if (lens_knowledge(section) == LensKnowledge::kCalibrated) {
+    const auto distortion = section.numbers("distortion");
+    std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
   }
-  std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
   return camera;
 }
 

@@ -322,6 +322,22 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
   return result;
 }
 
+std::vector<Candidate> stated_slips(LogFit& fit, const LogAbout& log, const BlockRegression& base,
+                                    const std::vector<Microseconds>& times) {
+  std::vector<Candidate> list;
+  for (const auto time : times) {
+    for (Eigen::Index j = 0; j < log.state.joints(); ++j) {
+      const CauseName cause{"slip", log.state.parameters()[static_cast<std::size_t>(j)].name, ""};
+      if (std::find(log.found.begin(), log.found.end(), cause) != log.found.end()) continue;
+      Candidate candidate{.cause = cause, .variable = {}, .parameters = {0}, .from = time, .stated = true};
+      candidate.columns = added_columns(log, directions_of(fit, log, candidate));
+      candidate.scores = base.score(candidate.columns);
+      list.push_back(std::move(candidate));
+    }
+  }
+  return list;
+}
+
 bool is_told(const Candidate& candidate, const JointRoles& roles, double threshold) {
   const auto effect = make_effect(candidate.cause.name, {candidate.cause.joint, candidate.cause.source}, roles);
   Eigen::Index i = 0;

@@ -20,6 +20,7 @@ struct Candidate {
   std::string variable;                        ///< of a free curve: what it follows
   std::vector<std::size_t> parameters;         ///< positions among the effect's fitted parameters
   Microseconds from = 0;                       ///< of a slip: the first picture after it
+  bool stated = false;                         ///< others saw it happen: it stands for itself, not for all candidates
   std::vector<std::vector<double>> amounts{};  ///< of a free curve: [column][picture], rad of the joint
   AddedColumns columns{};
   Scores scores{};
@@ -74,6 +75,11 @@ struct Slips {
 };
 Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<NotTestable>& untestable,
             bool at_every_picture = true);
+
+/// A slip of every arm joint at times at which others saw that something happened, scored. Joints that are found
+/// already are left out.
+std::vector<Candidate> stated_slips(LogFit& fit, const LogAbout& log, const BlockRegression& base,
+                                    const std::vector<Microseconds>& times);
 
 /// Whether a cause would stand out of a log, with this threshold of z, before it is larger than on any robot.
 bool is_told(const Candidate& candidate, const JointRoles& roles, double threshold);

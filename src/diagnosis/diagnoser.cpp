@@ -26,8 +26,8 @@ namespace {
 
 class Diagnoser {
  public:
-  Diagnoser(LogFit& fit, ModelSearch search, const DiagnosisOptions& options)
-      : fit_(fit), options_(options), search_(std::move(search)) {}
+  Diagnoser(LogFit& fit, ModelSearch search, const DiagnosisOptions& options, std::vector<Microseconds> changes = {})
+      : fit_(fit), options_(options), search_(std::move(search)), changes_(std::move(changes)) {}
 
   DiagnosisReport run() {
     refuse_unusable();
@@ -126,6 +126,7 @@ class Diagnoser {
     auto slips = diagnosis::slips(log, base, report_.not_testable, search_.refits());
     std::move(slips.all.begin(), slips.all.end(), std::back_inserter(scores));
     std::move(slips.best.begin(), slips.best.end(), std::back_inserter(candidates));
+    add_stated(log, base, candidates);
     const double threshold = chance_threshold(scores, options_.level, options_.seed);
     // A look has no time for curves, but where something is about to be named that may only stand in for one.
     if (!search_.refits() &&
@@ -136,6 +137,23 @@ class Diagnoser {
     }
     asked_.reset();
     return asked_.emplace(Field{std::move(log), std::move(base), std::move(candidates), threshold});
+  }
+
+  /// Slips that others saw happen, where they stand out for themselves.
+  void add_stated(const LogAbout& log, const BlockRegression& base, std::vector<Candidate>& candidates) {
+    if (changes_.empty()) return;
+    auto slips = stated_slips(fit_, log, base, changes_);
+    if (stated_count_ == 0) stated_count_ = slips.size();
+    for (auto& slip : slips) {
+      if (slip.z() < threshold_of(true)) continue;
+      std::erase_if(candidates, [&](const Candidate& c) { return c.cause == slip.cause; });
+      candidates.push_back(std::move(slip));
+    }
+  }
+
+  /// What a candidate's z must reach: that of all of them, but for what others saw happen.
+  [[nodiscard]] double threshold_of(bool stated) const {
+    return stated ? normal_quantile(options_.level / static_cast<double>(stated_count_)) : report_.z_threshold;
   }
 
   void add_curves(const LogAbout& log, std::vector<Candidate>& candidates) {
@@ -167,14 +185,15 @@ class Diagnoser {
     if (round == 0) leave_out_untold(field);
     auto trials = trials_of(field, round == 0);
     for (std::size_t tried = 0; !trials.empty() && tried < limits::kMostTried; ++tried) {
-      const Trial* best = choose(trials);
+      const Trial* best = choose(field, trials);
       const auto cause = best->candidate->cause;
       spdlog::debug("diagnosis: {} {}, z {:.1f} (chance: {:.1f}), held-out gain {:.0f}", cause.text(),
                     best->candidate->variable, best->candidate->z(), field.threshold, best->gain);
       if (take(field, *best)) {
         spdlog::debug("diagnosis: fitted, cost {:.4f}, z {:.1f}", search_.cost(), z_of_last());
         // What is large bends the very sums by which it is judged: so it is judged where it is fitted.
-        if (best->candidate->z() >= field.threshold || z_of_last() >= field.threshold) return true;
+        const double threshold = threshold_of(best->candidate->stated);
+        if (best->candidate->z() >= threshold || z_of_last() >= threshold) return true;
         search_.drop(search_.causes().size() - 1);
       }
       if (!best->candidate->generic()) refused_.push_back(cause);
@@ -206,7 +225,7 @@ class Diagnoser {
       if (first) add_bar(candidate, z);
       // One that is fitted anew may stand out then.
       const bool may_grow = search_.refits() && !candidate.generic();
-      if (z < (may_grow ? limits::kWorthATrial_z : field.threshold)) continue;
+      if (z < (may_grow ? limits::kWorthATrial_z : threshold_of(candidate.stated))) continue;
       if (candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
       if (std::find(refused_.begin(), refused_.end(), candidate.cause) != refused_.end()) continue;
       Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0, true};
@@ -231,8 +250,9 @@ class Diagnoser {
   }
 
   /// The best known cause, or a free curve where that explains much more than any known one. Of causes that explain
-  /// alike the simplest.
-  static const Trial* choose(const std::vector<Trial>& trials) {
+  /// alike the simplest; a joint moved along its link is a longer link, and what it lies aside besides is asked for
+  /// next.
+  const Trial* choose(const Field& field, const std::vector<Trial>& trials) {
     const auto known =
         std::find_if(trials.begin(), trials.end(), [](const Trial& t) { return !t.candidate->generic(); });
     const auto generic =
@@ -245,14 +265,29 @@ class Diagnoser {
       const bool simpler =
           !trial.candidate->generic() && trial.candidate->parameters.size() < best->candidate->parameters.size();
       if (!simpler || trial.gain < (1.0 - limits::kAlikeShare) * known->gain) continue;
-      if (paired_t(trial.heldout.loss, known->heldout.loss) < student_quantile(limits::kRivalTail, dof)) best = &trial;
+      const bool worse = paired_t(trial.heldout.loss, known->heldout.loss) >= student_quantile(limits::kRivalTail, dof);
+      if (!worse || is_part(field, *trial.candidate, *known->candidate)) best = &trial;
     }
     return best;
+  }
+
+  /// Whether all that one cause can say another one, of more parameters, can say too.
+  bool is_part(const Field& field, const Candidate& part, const Candidate& whole) {
+    auto both = directions_of(fit_, field.log, whole);
+    const auto more = directions_of(fit_, field.log, part);
+    for (std::size_t p = 0; p < both.size(); ++p) both[p].insert(both[p].end(), more[p].begin(), more[p].end());
+    const auto S = field.base.score(added_columns(field.log, both)).S;
+    const auto n = whole.columns.size(), own = part.columns.size();
+    const Eigen::MatrixXd cross = S.bottomLeftCorner(own, n);
+    const Eigen::MatrixXd left =
+        S.bottomRightCorner(own, own) - cross * S.topLeftCorner(n, n).ldlt().solve(cross.transpose());
+    return left.diagonal().cwiseQuotient(S.diagonal().tail(own)).maxCoeff() < limits::kSameChange;
   }
 
   bool take(const Field& field, const Trial& trial) {
     const auto& candidate = *trial.candidate;
     FoundCause cause{.name = candidate.cause, .variable = candidate.variable, .from = candidate.from};
+    cause.stated = candidate.stated;
     const auto [begin, end] = seen_span(fit_, field.log.at);
     cause.begin_s = begin;
     cause.duration_s = end - begin;
@@ -273,12 +308,12 @@ class Diagnoser {
       const auto [base, own, kept] = without(search_, all, search_.columns_of(c));
       const double t = base.score(own).z();
       const double gain = base.heldout().total() - with;
-      const double strength = gain > 0.0 ? t : 0.0;
+      const double strength = gain > 0.0 ? t / threshold_of(search_.causes()[c].stated) : 0.0;
       if (strength >= least) continue;
       least = strength;
       worst = c;
     }
-    if (least >= report_.z_threshold) return false;
+    if (least >= 1.0) return false;
     refused_.push_back(search_.causes()[worst].name);
     search_.drop(worst);
     return true;
@@ -329,6 +364,8 @@ class Diagnoser {
   LogFit& fit_;
   const DiagnosisOptions& options_;
   ModelSearch search_;
+  std::vector<Microseconds> changes_;  ///< seen by others
+  std::size_t stated_count_ = 0;       ///< of slips then, at first
   DiagnosisReport report_;
   double block_s_ = 0.0;
   std::optional<Field> asked_;  ///< about the present model
@@ -346,9 +383,9 @@ DiagnosisReport diagnose(LogFit& fit, const std::vector<Belief>& beliefs, const 
 
 DiagnosisReport diagnosis::look(LogFit& fit, State state, std::shared_ptr<const LinearLog> pictures,
                                 std::vector<OutlineNoise> noise, const std::vector<Belief>& tolerances,
-                                const DiagnosisOptions& options) {
+                                const DiagnosisOptions& options, const std::vector<Microseconds>& changes) {
   ModelSearch search(fit, std::move(state), std::move(pictures), std::move(noise), tolerances, options);
-  return Diagnoser(fit, std::move(search), options).look();
+  return Diagnoser(fit, std::move(search), options, changes).look();
 }
 
 }  // namespace bodyschema

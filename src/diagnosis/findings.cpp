@@ -244,13 +244,13 @@ ModelUncertainty Findings::uncertainty() const {
 }
 
 Size Findings::size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns) {
-  return size_of(log, all, columns, values_of(search_, columns) + all.step()(columns));
+  return size_of(log, all, columns, values_of(search_, columns) + all.step()(columns), columns);
 }
 
 Size Findings::size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns,
-                       const Eigen::VectorXd& amount) {
+                       const Eigen::VectorXd& amount, const std::vector<Eigen::Index>& out) {
   // The state's own: what is considered besides is nothing that an answer could take up.
-  const auto kept = all_but(search_.state().size(), columns);
+  const auto kept = all_but(search_.state().size(), out);
   Eigen::MatrixXd H = all.precision()(kept).asDiagonal();
   Eigen::MatrixXd B = Eigen::MatrixXd::Zero(H.rows(), amount.size());
   for (const auto& block : all.parts()) {
@@ -304,7 +304,8 @@ void Findings::add_estimated(const LogAbout& log, const BlockRegression& all, co
   cause.z = scores.z();
   if (cause.z < report_.z_threshold) return;
   const Eigen::VectorXd estimate = scores.estimate();
-  const auto size = size_of(log, all, columns[best], estimate);
+  // Another joint of the head would make up for it: none is known in the model that it is held against.
+  const auto size = size_of(log, all, columns[best], estimate, out);
   if (!matters(size)) return;
   cause.hand_mm = 1e3 * size.hand_m;
   cause.outline_px = size.outline_px;

@@ -45,9 +45,9 @@ class Findings {
   /// any picture gets wrong.
   [[nodiscard]] bool matters(const Size& size) const;
   /// What columns of the base move by so much: offsets and nuisances fitted anew without them, as the answer would be
-  /// then.
+  /// then. @param out  columns, these among them, that stay where they are
   [[nodiscard]] Size size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns,
-                             const Eigen::VectorXd& amount);
+                             const Eigen::VectorXd& amount, const std::vector<Eigen::Index>& out);
   /// ... by what was found.
   [[nodiscard]] Size size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns);
   /// An effect of the state against a model that knows no effect of its kind: of joints of one kind that move the

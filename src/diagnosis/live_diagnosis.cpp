@@ -24,13 +24,15 @@ constexpr int kNice = 10;                       // of the thread: less than the 
 constexpr double kEncoderPeriod_s = 0.008;      // what has a memory needs 100 Hz; more is thinned
 constexpr std::ptrdiff_t kMostEncoders = 2000;  // samples kept beside
 constexpr std::size_t kMostWaiting = 60;        // frames kept for a look that is late
+constexpr std::size_t kMostChanges = 3;         // that slips are asked of, the last ones
 constexpr double kNoisePictures = 100.0;        // after so many a picture's noise has faded
 
 /// What a look works on.
 struct Batch {
-  std::vector<Observation> frames;  ///< new ones: masks, joints and encoders
-  Eigen::VectorXd x;                ///< what is estimated now
-  bool anew = false;                ///< what was seen before is of another time
+  std::vector<Observation> frames;    ///< new ones: masks, joints and encoders
+  std::vector<Microseconds> changes;  ///< that the estimator saw meanwhile
+  Eigen::VectorXd x;                  ///< what is estimated now
+  bool anew = false;                  ///< what was seen before is of another time
 };
 
 double thread_time_s() {
@@ -99,13 +101,15 @@ class Window {
     // k)^2.
     const double k = static_cast<double>(++looks_);
     diagnosis_.level = options_.level * 6.0 / (kPi * kPi * k * k);
-    const auto report = diagnosis::look(fit_, state_, at_, noise_, tolerances_, diagnosis_);
+    const auto report = diagnosis::look(fit_, state_, at_, noise_, tolerances_, diagnosis_, changes_);
     found.blocks = report.blocks;
     found.z_threshold = report.z_threshold;
     if (std::any_of(report.causes.begin(), report.causes.end(), [](const auto& c) { return c.implausible; })) {
       return found;  // something stands in for what is not known
     }
     for (const auto& cause : report.causes) found.causes.push_back(to_finding(cause));
+    // The offset follows already what the estimator saw slip.
+    for (auto& finding : found.causes) finding.estimated = is_slip_at_change(finding);
     for (const auto& cause : report.estimated) {
       found.causes.push_back(to_finding(cause));
       found.causes.back().estimated = true;
@@ -116,7 +120,20 @@ class Window {
   }
 
  private:
+  /// Slips are said of what the estimator saw change.
+  void remember(const std::vector<Microseconds>& changes) {
+    changes_.insert(changes_.end(), changes.begin(), changes.end());
+    const auto begin = log_.pictures().front().joints.utime;
+    std::erase_if(changes_, [&](auto time) { return time <= begin; });
+    if (changes_.size() > kMostChanges) changes_.erase(changes_.begin(), changes_.end() - kMostChanges);
+  }
+
+  [[nodiscard]] bool is_slip_at_change(const Finding& finding) const {
+    return finding.effect == "slip" && std::find(changes_.begin(), changes_.end(), finding.from) != changes_.end();
+  }
+
   void forget() {
+    changes_.clear();
     log_.forget_before(INT64_MAX);
     at_.reset();
     found_ = {};
@@ -129,6 +146,7 @@ class Window {
     for (const auto& frame : batch.frames) log_.add(frame);
     if (log_.pictures().empty() || log_.pictures().back().joints.utime <= newest) return false;
     log_.forget_before(log_.pictures().back().joints.utime - microseconds(options_.window_s));
+    remember(batch.changes);
     log_.finish();
     fit_.weigh_parts();
     std::vector<std::size_t> fresh;
@@ -213,6 +231,7 @@ class Window {
   LogFit fit_;
   std::vector<std::uint32_t> all_, joints_;  ///< coordinates; those of the arm's joints
   std::vector<OutlineNoise> noise_;
+  std::vector<Microseconds> changes_;
   std::shared_ptr<LinearLog> at_;  ///< the window about the estimate at the last look
   std::size_t looks_ = 0;
   LiveFindings found_;  ///< by the last look
@@ -226,6 +245,7 @@ struct LiveDiagnosis::Impl {
 
   bool watch(const Observation& observation, Estimate& estimate) {
     if (observation.encoders_begin_anew) begin_anew();
+    keep_change(observation, estimate);
     keep(observation, estimate);
     const bool news = answer(observation.utime);
     begin_look(observation.utime);
@@ -239,7 +259,17 @@ struct LiveDiagnosis::Impl {
     encoders.clear();
     last.clear();
     said = {};
-    kept_utime = look_utime = 0;
+    kept_utime = look_utime = change_utime = 0;
+  }
+
+  /// Remembers when the estimator took something to have changed.
+  void keep_change(const Observation& observation, const Estimate& estimate) {
+    if (estimate.changed.empty() || estimate.postures == 0) return;
+    change_utime = observation.utime;
+    for (const auto& seen : observation.cameras) {
+      if (seen) change_utime = std::min(change_utime, seen->joints.utime);
+    }
+    waiting.changes.push_back(change_utime);
   }
 
   void keep(const Observation& observation, const Estimate& estimate) {
@@ -286,7 +316,9 @@ struct LiveDiagnosis::Impl {
     LiveFindings found = looking.get();
     said = found;
     std::erase_if(said.causes, [&](const Finding& f) {
-      return std::none_of(last.begin(), last.end(), [&](const Finding& g) { return agree(f, g); });
+      // What the estimator saw happen has been seen twice.
+      const bool seen = f.estimated && f.effect == "slip";
+      return !seen && std::none_of(last.begin(), last.end(), [&](const Finding& g) { return agree(f, g); });
     });
     last = std::move(found.causes);
     return true;
@@ -297,7 +329,9 @@ struct LiveDiagnosis::Impl {
     if (look_utime == 0) first_utime = look_utime = now;
     const double period_s =
         std::clamp(options.period_share * seconds(now - first_utime), options.least_period_s, options.most_period_s);
-    if (seconds(now - look_utime) < period_s) return;
+    // What has changed is looked at as soon as some pictures tell of it.
+    const bool changed = change_utime > look_utime && seconds(now - change_utime) >= options.least_period_s;
+    if (!changed && seconds(now - look_utime) < period_s) return;
     look_utime = now;
     waiting.x = x;
     looking = worker.begin([this, batch = std::exchange(waiting, {})] {
@@ -317,7 +351,7 @@ struct LiveDiagnosis::Impl {
   Batch waiting;
   std::vector<JointSample> encoders;  ///< since the last frame that was kept
   Eigen::VectorXd x;                  ///< the estimate; empty: there was none
-  Microseconds kept_utime = 0, look_utime = 0, first_utime = 0;
+  Microseconds kept_utime = 0, look_utime = 0, first_utime = 0, change_utime = 0;
   std::vector<Finding> last;  ///< by the last look
   LiveFindings said;
   std::future<LiveFindings> looking;

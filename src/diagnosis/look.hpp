@@ -12,8 +12,9 @@ namespace bodyschema::diagnosis {
 /// @param state  the model, about which they were linearised
 /// @param pictures  over all coordinates
 /// @param noise  per camera
+/// @param changes  times at which others saw that something happened: slips then need to stand out for themselves alone
 DiagnosisReport look(LogFit& fit, State state, std::shared_ptr<const LinearLog> pictures,
                      std::vector<OutlineNoise> noise, const std::vector<Belief>& tolerances,
-                     const DiagnosisOptions& options);
+                     const DiagnosisOptions& options, const std::vector<Microseconds>& changes = {});
 
 }  // namespace bodyschema::diagnosis

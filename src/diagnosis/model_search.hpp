@@ -27,6 +27,7 @@ struct FoundCause {
   double begin_s = 0.0, duration_s = 0.0;      ///< of a drift
   std::vector<std::vector<double>> amounts{};  ///< of a free curve
   std::size_t columns = 0;                     ///< how many parameters are fitted
+  bool stated = false;                         ///< others saw it happen
   [[nodiscard]] bool generic() const { return !variable.empty(); }
 };
 

@@ -299,6 +299,7 @@ void ErrorModel::observe(const JointSample& sample) {
 
 void ErrorModel::corrections(const Instant& at, Corrections& out, bool include_offsets) const {
   out.clear();
+  out.qdot = at.qdot;
   for (const auto& effect : effects_) {
     if (include_offsets || effect->name() != "joint_offset") effect->apply(at, out);
   }

@@ -10,15 +10,18 @@
 #include <numeric>
 #include <optional>
 
+#include "bodyschema/camera/bent_silhouette.hpp"
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "bodyschema/evidence/distributions.hpp"
 #include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/filter/particle_filter.hpp"
+#include "bodyschema/search/search_level.hpp"
 #include "explanations.hpp"
 #include "eye_order.hpp"
 #include "frame_model.hpp"
 #include "hypothesis_scorer.hpp"
 #include "limits.hpp"
+#include "occlusion.hpp"
 #include "outline_fitter.hpp"
 #include "stalled_encoders.hpp"
 
@@ -68,6 +71,7 @@ const char* to_string(EstimatorState state) {
     case EstimatorState::kConverged: return "converged";
     case EstimatorState::kDiverged: return "diverged";
     case EstimatorState::kModelMisfit: return "model_misfit";
+    case EstimatorState::kOccluded: return "occluded";
   }
   return "unknown";
 }
@@ -80,6 +84,15 @@ const char* to_string(FrameVerdict verdict) {
     case FrameVerdict::kContradicts: return "contradicts";
   }
   return "unknown";
+}
+
+std::string HiddenShare::text() const {
+  constexpr double kWorthAWord = 0.15;
+  std::string text;
+  if (hand >= kWorthAWord) text = fmt::format("{:.0f} % of the hand is hidden", 100.0 * hand);
+  if (hand < kWorthAWord && robot >= kWorthAWord) text = fmt::format("{:.0f} % of the arm is hidden", 100.0 * robot);
+  if (holds) text += text.empty() ? "the hand holds something" : ", it holds something";
+  return text;
 }
 
 std::string Finding::text() const {
@@ -108,12 +121,15 @@ struct Estimator::Impl {
       : options(estimator_options), setup(robot_setup), rig(stereo_rig),
         state_at_first(without_offsets(known), beliefs.state),
         considered(Considered::beside(state_at_first, beliefs.tolerances)),
-        model(robot, setup, rig, known.roles(), state_at_first, considered.effects), joints(model.state().joints()),
-        scorer(model, silhouette_model(*robot, setup), rig.intrinsics(), options.silhouette, options.filter.particles,
-               !particles_only()),
+        outlines(particles_only() ? silhouette_model(*robot, setup)
+                                  : outline_level(silhouette_model(*robot, setup), rig.intrinsics())),
+        model(robot, setup, rig, known.roles(), state_at_first, considered.effects, &outlines),
+        joints(model.state().joints()),
+        scorer(model, silhouette_model(*robot, setup), particles_only() ? nullptr : &outlines, rig.intrinsics(),
+               options.silhouette, options.filter.particles),
         filter(joints, options.filter), memory(memory_layout(model.state(), considered), options.memory),
-        fitter(model, scorer, options, rig.cameras.size()), state(model.state().prior_mean()),
-        in_frame(memory.estimate()), stalled(joints) {
+        fitter(model, scorer, options, rig.cameras.size()), occlusion(model, scorer, rig, setup.hand_link),
+        state(model.state().prior_mean()), in_frame(memory.estimate()), stalled(joints) {
     first_guesses = filter.states();
     cloud_covariance = filter.covariance();
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
@@ -133,7 +149,9 @@ struct Estimator::Impl {
     now_s = seconds(observation.utime);
     frame = model.take(observation, state);
     changed.clear();
-    cameras_swapped = contradicted = near = false;
+    cameras_swapped = contradicted = near = hidden_only = false;
+    hidden = {};
+    if (!particles_only()) occlusion.cover(frame, state, hand_sd_m);
     best_likelihood = effective_size = rms_px = 0.0;
     verdict = FrameVerdict::kNothingKnown;
     innovation = {};
@@ -318,12 +336,16 @@ struct Estimator::Impl {
     times.filter_ms += elapsed_ms(start);
   }
 
+  /// What innovations of these degrees of freedom hardly ever exceed, in this log.
+  [[nodiscard]] double doubtful(double dof) const {
+    return chi_square_quantile(limits::kDoubt_tail, std::max(1.0, dof)) * usual();
+  }
   /// How the frame agrees with the memory that its fit was held by.
   void judge(const OutlineFit& fit) {
     near = fitter.lies_near(fit.evidence);
     innovation = memory.innovation(fit.quadratic);
     const double ratio = innovation.dof > 0.0 ? innovation.nis / innovation.dof : 0.0;
-    const double limit = chi_square_quantile(limits::kDoubt_tail, std::max(1.0, innovation.dof)) * usual();
+    const double limit = doubtful(innovation.dof);
     verdict = !near                    ? FrameVerdict::kContradicts
               : innovation.nis > limit ? FrameVerdict::kDoubtful
                                        : FrameVerdict::kAgrees;
@@ -341,12 +363,38 @@ struct Estimator::Impl {
     }
     fitter.learn_noise(fit);
     if (const auto block =
-            memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.quadratic, fit.x)) {
+            memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.seen.quadratic, fit.x)) {
       fitter.learn_shape(fit);
       keep_frame(*block);
     }
     look_again();
     settle_on(fit);
+    if (!young()) occlusion.learn(frame, in_frame.x, hand_sd_m);
+  }
+
+  /// Nothing happened to the robot, and what is seen of it agrees with what is known: something hides the rest. The
+  /// memory stays, nothing is learned.
+  bool take_for_hidden(const OutlineFit& fit) {
+    if (young()) return false;
+    hidden = occlusion.hidden(fit.seen.evidence);
+    const bool rest = fitter.rest_fits(fit.seen);
+    if (rest) {
+      const Innovation of_rest = memory.innovation(fit.seen.quadratic);
+      if (of_rest.nis > doubtful(of_rest.dof)) return false;
+      innovation = of_rest;
+    } else if (hidden.robot < limits::kMostHidden) {
+      return false;
+    }
+    hidden_only = true;
+    doubted_since_s = -1.0;
+    verdict = rest ? FrameVerdict::kAgrees : FrameVerdict::kDoubtful;
+    state = memory.estimate().x;
+    in_frame = rest ? memory.in_posture(fit.seen.quadratic) : memory.in_posture();
+    rms_px = fit.seen.evidence.rms_px();
+    near = rest;
+    best_likelihood = hammoude_likelihood(scorer.distance(in_frame.x));
+    current = EstimatorState::kConverging;
+    return true;
   }
 
   /// The first frame of every posture is kept, to be looked at again where the estimate has moved on.
@@ -385,13 +433,14 @@ struct Estimator::Impl {
     state = memory.empty() ? fit.x : memory.estimate().x;
     const PostureMemory held = contradicted || memory.empty() ? memory.beliefs() : memory;
     if (fitter.lies_near(fit.evidence)) {
-      in_frame = held.in_posture(fit.quadratic);
+      in_frame = held.in_posture(contradicted ? fit.quadratic : fit.seen.quadratic);
     } else {  // an arm that is not where outlines are has nothing to learn from how these run
       in_frame = held.in_posture();
       in_frame.x = fit.x;
     }
-    rms_px = fit.evidence.rms_px();
+    rms_px = fit.seen.evidence.rms_px();
     near = fitter.fits(fit.evidence);
+    hidden = occlusion.hidden(fit.seen.evidence);
     best_likelihood = hammoude_likelihood(scorer.distance(in_frame.x));
     current = EstimatorState::kConverging;
   }
@@ -413,6 +462,7 @@ struct Estimator::Impl {
       learn(fit);
       return;
     }
+    if (take_for_hidden(fit)) return;
     // Nothing explains it better: the memory stays, the frame is not learned from.
     if (doubted_since_s < 0.0) doubted_since_s = now_s;
     contradicted = true;
@@ -610,6 +660,8 @@ struct Estimator::Impl {
       estimate.X_CP_nominal.push_back(model.nominal_hand_pose(exposure));
       if (c == 0) estimate.hand_sd_m = std::sqrt(std::max(0.0, hand_covariance_m2(exposure).trace()));
     }
+    hand_sd_m = estimate.hand_sd_m;
+    estimate.hidden = hidden;
     estimate.weakest = weakest_direction(estimate.covariance_rad2, joint_names);
     if (!particles_only()) conclude(estimate);
     estimate.state = current;
@@ -653,6 +705,8 @@ struct Estimator::Impl {
                fitter.knows_shape() && estimate.hand_sd_m < estimate.hand_sd_limit_m) {
       current = EstimatorState::kConverged;
     }
+    // Known by the memory alone, whatever it claims: nobody sees whether it still holds.
+    if (hidden.hand > limits::kMostHidden || (hidden_only && !near)) current = EstimatorState::kOccluded;
   }
 
   /// How well the hand is to be known: as configured, or as well as this distance and these tolerances allow.
@@ -720,6 +774,14 @@ struct Estimator::Impl {
   }
 
   /// The state that an estimate reports.
+  /// The silhouette of parts placed by a state, as the lens shows it.
+  [[nodiscard]] BinaryMask drawn(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera, const Exposure& exposure,
+                                 const Eigen::VectorXd& x) {
+    Corrections corrections = model.roles().no_corrections();
+    model.corrections(exposure, x, corrections);
+    return bent_silhouette(scorer.render(X_CB, camera), rig.cameras[camera].intrinsics, corrections.camera.k1);
+  }
+
   [[nodiscard]] Eigen::VectorXd state_of(const Estimate& estimate) const {
     Eigen::VectorXd x = model.state().prior_mean();
     x.head(joints) = estimate.offset_rad;
@@ -777,6 +839,7 @@ struct Estimator::Impl {
     filter.reset(Eigen::VectorXd::Zero(joints));
     memory.forget_all();
     fitter.forget_shape();
+    occlusion.forget();
     keyframes.clear();
     alternative.reset();
     state = model.state().prior_mean();
@@ -790,6 +853,7 @@ struct Estimator::Impl {
   StereoRig rig;
   State state_at_first;
   Considered considered;
+  SilhouetteModel outlines;  ///< what outlines and pictures to look at are drawn from
   FrameModel model;
   Frame frame;                           ///< the last one; its observation is gone once `step` has returned
   Eigen::Index joints;                   ///< estimated ones; the first entries of a state
@@ -805,6 +869,10 @@ struct Estimator::Impl {
   std::optional<PostureMemory> alternative;     ///< the memory that the last change of mind cost
   double alternative_s = 0.0;
   OutlineFitter fitter;
+  Occlusion occlusion;
+  HiddenShare hidden;        ///< in the last frame
+  bool hidden_only = false;  ///< the last frame contradicts by what is hidden alone
+  double hand_sd_m = 1.0;    ///< as last reported
 
   Eigen::VectorXd state;    ///< fused over postures
   MemoryEstimate in_frame;  ///< the same with this frame's own error
@@ -864,15 +932,16 @@ BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::
   std::vector<Eigen::Isometry3f> X_CB(impl_->model.part_count());
   const Exposure exposure = impl_->model.preview(observation.cameras[camera]->joints, camera);
   (corrected ? impl_->model.project(exposure, impl_->state) : impl_->model.project_nominal(exposure)).parts(X_CB);
-  return impl_->scorer.render(X_CB, camera);
+  return corrected ? impl_->drawn(X_CB, camera, exposure, impl_->state) : impl_->scorer.render(X_CB, camera);
 }
 
 BinaryMask Estimator::predicted_silhouette(const Observation& observation, std::size_t camera,
                                            const Estimate& estimate) {
   std::vector<Eigen::Isometry3f> X_CB(impl_->model.part_count());
   const Exposure exposure = impl_->model.preview(observation.cameras[camera]->joints, camera);
-  impl_->model.project(exposure, impl_->state_of(estimate)).parts(X_CB);
-  return impl_->scorer.render(X_CB, camera);
+  const Eigen::VectorXd x = impl_->state_of(estimate);
+  impl_->model.project(exposure, x).parts(X_CB);
+  return impl_->drawn(X_CB, camera, exposure, x);
 }
 
 Pose Estimator::hand_pose(const Exposure& exposure, bool corrected) {

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+
+#include "bodyschema/camera/lens_knowledge.hpp"
+#include "bodyschema/camera/shutter.hpp"
 
 namespace bodyschema {
 
@@ -83,6 +87,28 @@ std::vector<Belief> camera_beliefs(const StereoRig& rig) {
   return list;
 }
 
+namespace {
+
+/// Of what a lens does beyond its configuration; where cameras differ, of the one that is known least. Nothing where
+/// the configuration says what to believe.
+std::optional<Belief> lens_belief(const Configuration& configuration, const StereoRig& rig) {
+  if (configuration.section("estimator").section("state").has("distortion")) return std::nullopt;
+  double sd = 0.0;
+  for (const auto& camera : rig.cameras) {
+    sd = std::max(sd, lens_sd(lens_knowledge(configuration.section("cameras").section(camera.name))));
+  }
+  if (sd == 0.0) return std::nullopt;
+  return Belief{"distortion", {}, {sd}};
+}
+
+/// Whether the configuration says how long the pictures of every camera are read out.
+bool shutters_known(const Configuration& cameras, const StereoRig& rig) {
+  return std::all_of(rig.cameras.begin(), rig.cameras.end(),
+                     [&](const CameraModel& camera) { return readout_s(cameras.section(camera.name)).has_value(); });
+}
+
+}  // namespace
+
 Beliefs Beliefs::from(const Configuration& configuration, const JointRoles& roles, const StereoRig& rig,
                       const EstimatorOptions& options) {
   Beliefs beliefs;
@@ -91,6 +117,10 @@ Beliefs Beliefs::from(const Configuration& configuration, const JointRoles& role
     std::erase_if(beliefs.state,
                   [&](const Belief& b) { return b.effect == belief.effect && b.target == belief.target; });
     beliefs.state.push_back(std::move(belief));
+  }
+  if (auto lens = lens_belief(configuration, rig)) beliefs.state.push_back(std::move(*lens));
+  if (shutters_known(configuration.section("cameras"), rig)) {
+    std::erase_if(beliefs.state, [](const Belief& b) { return b.effect == "rolling_shutter"; });
   }
   beliefs.tolerances = read_beliefs(configuration.section("robot").section("tolerances"), roles);
   for (const char* section : {"estimator", "robot"}) {

@@ -23,6 +23,11 @@ std::optional<Explanation> explain(const std::vector<Hypothesis>& hypotheses, co
                                                      : fitter.search(frame, hypothesis.starts, memory);
     // An arm that is somewhere else altogether shows so in its whole silhouette, not only in how an outline runs.
     if (anew && !fitter.clearly_nearer(fit, held)) continue;
+    // Something may hide the robot: no change explains that which leaves as much of it hidden.
+    if (!hypothesis.by_silhouette &&
+        fit.seen.evidence.odd_share() > limits::kLeastExplained * held.seen.evidence.odd_share() + limits::kFewOdd) {
+      continue;
+    }
     const double cost = fit.misfit + limits::kPerParameter * static_cast<double>(hypothesis.released.size());
     const bool silhouettes_say_so = hypothesis.by_silhouette && !fitter.fits(held.evidence);
     if (!silhouettes_say_so && (!fitter.fits(fit.evidence) || cost >= least)) continue;

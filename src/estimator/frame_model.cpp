@@ -19,9 +19,10 @@ bool Frame::exposed() const {
 }
 
 FrameModel::FrameModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
-                       const JointRoles& roles, State state, const ErrorModel& beside)
-    : roles_(roles), rig_(rig), state_(std::move(state)), measurement_(robot, setup, rig, roles), track_(robot, setup),
-      probes_(state_.model(), refs_of(state_), measurement_.coordinates()),
+                       const JointRoles& roles, State state, const ErrorModel& beside, const SilhouetteModel* drawn)
+    : roles_(roles), rig_(rig), state_(std::move(state)),
+      measurement_(robot, setup, rig, roles, drawn != nullptr ? *drawn : silhouette_model(*robot, setup)),
+      track_(robot, setup), probes_(state_.model(), refs_of(state_), measurement_.coordinates()),
       beside_(beside, fitted_parameters(beside), measurement_.coordinates()),
       settled_(rig.cameras.size(), roles.no_corrections()), scratch_(roles.no_corrections()), nothing_(scratch_),
       position_(static_cast<std::size_t>(measurement_.coordinates().size()), -1) {
@@ -115,6 +116,7 @@ void FrameModel::corrections(const Exposure& exposure, const Eigen::VectorXd& x,
   } else {
     out.clear();
   }
+  out.qdot = exposure.at.qdot;
   for (std::size_t e = 0; e < state_.model().size(); ++e) {
     const Effect& effect = std::as_const(state_).model()[e];
     if (!effect.has_memory()) effect.apply(exposure.at, out);
@@ -187,7 +189,8 @@ void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::sp
   const Eigen::Index n = state_.size() + beside_count();
   out.cameras.resize(frame.seen.size());
   out.cost.assign(frame.seen.size(), 0.0);
-  out.sampled = out.matched = out.square = out.weight = 0.0;
+  out.sampled = out.matched = out.square = out.weight = out.odd = out.covered = 0.0;
+  out.samples.assign(with_beside ? frame.seen.size() : 0, {});
   for (std::size_t c = 0; c < frame.seen.size(); ++c) {
     auto& evidence = out.cameras[c];
     evidence.A.setZero(n, n);
@@ -199,7 +202,12 @@ void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::sp
     const auto& exposure = frame.exposures[c];
     find_directions(exposure, x, with_beside);
     corrections(exposure, x, scratch_);
-    measurement_.linearise(ObservedEdges(*seen, k), exposure.at.encoder, scratch_, c, active_, search[c], evidence_);
+    OutlineSearch beside = search[c];
+    if (c < frame.covered.size()) beside.covered = &frame.covered[c];
+    measurement_.linearise(ObservedEdges(*seen, k), exposure.at.encoder, scratch_, c, active_, beside, evidence_);
+    if (with_beside) out.samples[c].assign(measurement_.samples().begin(), measurement_.samples().end());
+    out.odd += evidence_.odd;
+    out.covered += evidence_.covered;
     out.sampled += evidence_.sampled;
     out.matched += evidence_.matched;
     const double unit2 = picture_unit(k) * picture_unit(k);

@@ -21,14 +21,18 @@ struct FrameEvidence {
   double sampled = 0.0, matched = 0.0;  ///< outline points of all cameras
   double square = 0.0, weight = 0.0;    ///< of residuals, as OutlineEvidence
   std::vector<double> cost;             ///< per camera: robust cost of the whole outline
+  double odd = 0.0, covered = 0.0;      ///< outline points left out, as OutlineEvidence
+  std::vector<std::vector<OutlineSample>> samples;  ///< per camera: of the last look; where wanted
   [[nodiscard]] double rms_px() const { return weight > 0.0 ? std::sqrt(square / weight) : 0.0; }
   [[nodiscard]] double matched_share() const { return sampled > 0.0 ? matched / sampled : 0.0; }
+  [[nodiscard]] double odd_share() const { return sampled > 0.0 ? odd / sampled : 0.0; }
 };
 
 /// The pictures of one frame with what is known of their exposures: all that is needed to look at them again.
 struct Frame {
   std::vector<Exposure> exposures;             ///< per camera; where one saw nothing, another's
   std::vector<const CameraObservation*> seen;  ///< per camera; null: nothing. Not owned
+  std::vector<BinaryMask> covered;             ///< per camera: where a held thing may be; empty: nowhere
   [[nodiscard]] bool exposed() const;          ///< whether any camera saw anything
 };
 
@@ -39,8 +43,9 @@ struct Frame {
 /// (`beside`): their values stay zero, but what they would change is asked for. One thread.
 class FrameModel {
  public:
+  /// @param drawn  meshes that outlines are taken from; null: the robot's own
   FrameModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
-             const JointRoles& roles, State state, const ErrorModel& beside);
+             const JointRoles& roles, State state, const ErrorModel& beside, const SilhouetteModel* drawn = nullptr);
 
   /// Shows the next observation's encoder samples to the effects. The observation must live as long as its frame.
   /// @param x  the state believed in, under which gravity acts on the arm

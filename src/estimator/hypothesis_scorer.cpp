@@ -10,15 +10,30 @@
 #include "bodyschema/search/search_level.hpp"
 
 namespace bodyschema {
+namespace {
+
+/// Takes pixels out of those that count; an empty `valid` is all of them.
+void leave_out(const BinaryMask& pixels, BinaryMask& valid) {
+  if (pixels.empty()) return;
+  if (valid.empty()) {
+    valid = BinaryMask(pixels.width(), pixels.height());
+    valid.fill(true);
+  }
+  for (int v = 0; v < valid.height(); ++v) {
+    for (int w = 0; w < valid.words_per_row(); ++w) valid.row(v)[w] &= ~pixels.row(v)[w];
+  }
+}
+
+}  // namespace
 
 HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes,
-                                   std::vector<PinholeIntrinsics> cameras, const SilhouetteOptions& options,
-                                   std::size_t slots, bool for_search)
+                                   const SilhouetteModel* outlines, std::vector<PinholeIntrinsics> cameras,
+                                   const SilhouetteOptions& options, std::size_t slots)
     : model_(model), cameras_(std::move(cameras)), observed_(cameras_.size()), coarse_(cameras_.size()), slots_(slots),
       X_CB_((slots + 1) * cameras_.size() * model.part_count()), counts_(slots * cameras_.size()),
       distances_(static_cast<Eigen::Index>(slots)), one_distance_(1) {
   const std::size_t at_once = slots * cameras_.size();
-  if (!for_search) {
+  if (outlines == nullptr) {
     full_ = make_silhouette_scorer(silhouettes, cameras_,
                                    fastest_engine(silhouettes, cameras_, options, at_once, engine_reason_));
     scorer_ = full_.get();
@@ -31,7 +46,7 @@ HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& sil
   // For pictures to look at and specks: the processor is quick enough.
   SilhouetteOptions full = options;
   full.engine = "contour";
-  full_ = make_silhouette_scorer(silhouettes, cameras_, full);
+  full_ = make_silhouette_scorer(*outlines, cameras_, full);
   scorer_ = search_.get();
   std::size_t triangles = 0, drawn = 0;
   for (const auto& part : silhouettes.parts) triangles += part.triangles.size();
@@ -49,6 +64,7 @@ bool HypothesisScorer::observe(const Observation& observation, const Frame& fram
     if (present) {
       observed_[c].mask = observation.cameras[c]->mask;
       observed_[c].valid = observation.cameras[c]->valid;
+      if (c < frame.covered.size()) leave_out(frame.covered[c], observed_[c].valid);
       seen_px += static_cast<double>(observed_[c].mask.count());
       pixels += static_cast<double>(cameras_[c].width) * static_cast<double>(cameras_[c].height);
       camera_mask_ |= 1u << c;

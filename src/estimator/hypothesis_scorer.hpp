@@ -20,11 +20,13 @@ namespace bodyschema {
 /// thread.
 class HypothesisScorer {
  public:
+  /// @param outlines  where hypotheses are only where a search begins: what full pictures are drawn from
+  /// (outline_level);
+  ///   null: hypotheses are the estimate, and all is drawn from `silhouettes`
   /// @param slots  hypotheses that can be scored at once
-  /// @param for_search  whether hypotheses are only where a search begins
   /// Throws gl::ContextError when the engine cannot be had.
-  HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes, std::vector<PinholeIntrinsics> cameras,
-                   const SilhouetteOptions& options, std::size_t slots, bool for_search);
+  HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes, const SilhouetteModel* outlines,
+                   std::vector<PinholeIntrinsics> cameras, const SilhouetteOptions& options, std::size_t slots);
 
   /// The observation that hypotheses are compared with until the next call, and its exposures; both must live as long.
   /// A camera without a mask is not used. False when less than this share of the pictures is robot.

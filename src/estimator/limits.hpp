@@ -11,6 +11,25 @@ inline constexpr double kLeastMatched = 0.5;
 inline constexpr double kFewestPoints = 20.0;
 /// Physical. rad; Gauss-Newton goes no further at once: sines are no longer linear.
 inline constexpr double kMaxStep_rad = 0.2;
+/// Physical. px of a 320x240 picture: by less than this no picture tells something else's edge from the robot's.
+inline constexpr double kLeastOdd_px = 0.4;
+/// Physical. Of an outline: neighbours on the same flank (cosine between their normals), px of a 320x240 picture apart.
+inline constexpr double kSameSide = 0.5;
+inline constexpr double kBeside_px = 7.0;
+/// Physical. px of a 320x240 picture: what the edge of a wrong model keeps its distance from the prediction by, along a
+/// finger; those of other things cross it.
+inline constexpr double kParallel_px = 1.0;
+/// Physical. A change of the robot explains what looked hidden only if no more than this share of it looks so still ...
+inline constexpr double kLeastExplained = 0.5;
+/// ... but for this share of the outline, which noise and thin fingers leave.
+inline constexpr double kFewOdd = 0.1;
+/// Physical. Share of the hand's outline; of a hand that is hidden by more too little is seen to claim where it is now.
+inline constexpr double kMostHidden = 0.8;
+/// Physical. px of a 320x240 picture: what masks show this far beside a robot that is known as well as this is not the
+/// robot.
+inline constexpr double kForeign_px = 4.0;
+/// Physical. px of a 320x240 picture: a held thing's map is as coarse as this, its cubes apart.
+inline constexpr double kCover_px = 1.5;
 /// Physical. px of a 320x240 picture: no picture places an outline better, and a fit that moves it by less has arrived.
 inline constexpr double kSettled_px = 0.1;
 /// Computational. More steps than these towards it are not taken.

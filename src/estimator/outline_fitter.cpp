@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "limits.hpp"
+#include "occlusion.hpp"
 
 namespace bodyschema {
 namespace {
@@ -17,11 +18,12 @@ OutlineFitter::OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const 
                              std::size_t cameras)
     : model_(model), scorer_(scorer), options_(options), noise_(cameras, OutlineNoise(options.noise)) {}
 
-std::vector<OutlineSearch> OutlineFitter::searches(double search_px, bool last) const {
+std::vector<OutlineSearch> OutlineFitter::searches(double search_px, bool last, bool without_odd) const {
   std::vector<OutlineSearch> list;
   for (const auto& noise : noise_) {
     const double robust_px = last ? noise.robust_px() : std::max(noise.robust_px(), 0.5 * search_px);
     list.push_back({search_px, options_.outline_spacing_px, robust_px});
+    if (without_odd) list.back().odd_sd_px = std::max(noise.sd_px(), limits::kLeastOdd_px);
   }
   return list;
 }
@@ -32,17 +34,39 @@ void OutlineFitter::look(const Frame& frame, double search_px, bool last, Outlin
                    [&](std::size_t c, std::span<const OutlinePoint> points) {
                      if (last) fit.points[c].assign(points.begin(), points.end());
                    });
-  const auto n = fit.x.size(), all = n + (last ? model_.beside_count() : 0);
-  fit.quadratic = Quadratic::zero(all);
+  fit.quadratic = quadratic_of(fit.evidence, fit.x, last);
+}
+
+Quadratic OutlineFitter::quadratic_of(const FrameEvidence& evidence, const Eigen::VectorXd& x, bool with_beside) const {
+  const auto n = x.size(), all = n + (with_beside ? model_.beside_count() : 0);
+  Quadratic quadratic = Quadratic::zero(all);
   for (std::size_t c = 0; c < noise_.size(); ++c) {
-    const auto& seen = fit.evidence.cameras[c];
+    const auto& seen = evidence.cameras[c];
     if (seen.weight <= 0.0) continue;
     const double precision = 1.0 / noise_[c].variance_px2();
-    fit.quadratic.A += precision * seen.A.topLeftCorner(all, all);
-    fit.quadratic.b += precision * seen.b.head(all);
+    quadratic.A += precision * seen.A.topLeftCorner(all, all);
+    quadratic.b += precision * seen.b.head(all);
   }
   // About the origin of the state; what lies beside it is zero there.
-  fit.quadratic.b += fit.quadratic.A.leftCols(n) * fit.x;
+  quadratic.b += quadratic.A.leftCols(n) * x;
+  return quadratic;
+}
+
+void OutlineFitter::look_twice(const Frame& frame, double search_px, OutlineFit& fit) {
+  model_.linearise(frame, fit.x, searches(search_px, true, true), true, fit.seen.evidence,
+                   [&](std::size_t c, std::span<const OutlinePoint> points) {
+                     if (fit.points.size() != noise_.size()) fit.points.assign(noise_.size(), {});
+                     fit.points[c].assign(points.begin(), points.end());
+                   });
+  fit.seen.quadratic = quadratic_of(fit.seen.evidence, fit.x, true);
+  if (fit.seen.evidence.odd > 0.0) {
+    auto points = std::move(fit.points);  // these know which are odd
+    look(frame, search_px, true, fit);
+    fit.points = std::move(points);
+  } else {
+    fit.evidence = fit.seen.evidence;
+    fit.quadratic = fit.seen.quadratic;
+  }
 }
 
 double OutlineFitter::take_step(const Frame& frame, const PostureMemory& memory, double search_px, OutlineFit& fit) {
@@ -68,7 +92,7 @@ void OutlineFitter::refine(const Frame& frame, const PostureMemory& memory, std:
   for (int i = 0; i < more_steps && moved_px > limits::kSettled_px; ++i) {
     moved_px = take_step(frame, memory, search_px.back(), fit);
   }
-  look(frame, search_px.back(), true, fit);
+  look_twice(frame, search_px.back(), fit);
   fit.misfit = memory.distance(fit.x);
   for (std::size_t c = 0; c < noise_.size(); ++c) fit.misfit += fit.evidence.cost[c] / noise_[c].variance_px2();
 }
@@ -105,13 +129,19 @@ OutlineFit OutlineFitter::search(const Frame& frame, std::span<const Eigen::Vect
 std::optional<Quadratic> OutlineFitter::about(const Frame& frame, const Eigen::VectorXd& x) {
   OutlineFit fit;
   fit.x = x;
-  look(frame, kNear_px[std::size(kNear_px) - 1], true, fit);
+  look_twice(frame, kNear_px[std::size(kNear_px) - 1], fit);
   if (!fits(fit.evidence)) return std::nullopt;
-  return std::move(fit.quadratic);
+  return std::move(fit.seen.quadratic);
 }
 
 bool OutlineFitter::clearly_nearer(const OutlineFit& fit, const OutlineFit& other) {
   return scorer_.distance(fit.x) < limits::kNearer * scorer_.distance(other.x);
+}
+
+bool OutlineFitter::rest_fits(const OutlineFit::Seen& seen) const {
+  const FrameEvidence& evidence = seen.evidence;
+  const double left = evidence.sampled - evidence.odd;
+  return left >= limits::kFewestPoints && evidence.rms_px() < limits::kNear_px;
 }
 
 bool OutlineFitter::lies_near(const FrameEvidence& evidence) const {
@@ -122,17 +152,23 @@ bool OutlineFitter::fits(const FrameEvidence& evidence) const {
   return evidence.matched >= limits::kFewestPoints && lies_near(evidence);
 }
 
+std::vector<OutlinePoint> OutlineFitter::shown(const OutlineFit& fit, std::size_t camera) const {
+  return without_hidden(fit.seen.evidence.samples[camera], fit.points[camera],
+                        limits::kBeside_px * model_.picture_unit_px(camera),
+                        limits::kParallel_px * model_.picture_unit_px(camera));
+}
+
 void OutlineFitter::learn_noise(const OutlineFit& fit) {
   for (std::size_t c = 0; c < noise_.size(); ++c) {
     if (fit.evidence.cameras[c].weight > 0.0) {
-      noise_[c].add(fit.points[c], model_.picture_unit_px(c), limits::kNoisePictures);
+      noise_[c].add(shown(fit, c), model_.picture_unit_px(c), limits::kNoisePictures);
     }
   }
 }
 
 void OutlineFitter::learn_shape(const OutlineFit& fit) {
   for (std::size_t c = 0; c < noise_.size(); ++c) {
-    if (fit.evidence.cameras[c].weight > 0.0) shape_.add(fit.points[c], c, model_.picture_unit_px(c));
+    if (fit.evidence.cameras[c].weight > 0.0) shape_.add(shown(fit, c), c, model_.picture_unit_px(c));
   }
 }
 

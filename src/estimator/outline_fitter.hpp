@@ -20,7 +20,12 @@ struct OutlineFit {
   FrameEvidence evidence;  ///< about x
   Quadratic quadratic;     ///< the same, divided by the variance of a residual, in absolute coordinates
   std::vector<std::vector<OutlinePoint>> points;  ///< matched ones, per camera
-  double misfit = 0.0;                            ///< chi-square: of the outline, and of x against what held it
+  /// What is left of evidence and quadratic without the pieces of the outline that show something else.
+  struct Seen {
+    FrameEvidence evidence;
+    Quadratic quadratic;
+  } seen;
+  double misfit = 0.0;  ///< chi-square: of the outline, and of x against what held it
 };
 
 /// Moves states onto a frame's observed outline by Gauss-Newton, held by what a memory knows. One thread.
@@ -44,6 +49,8 @@ class OutlineFitter {
   [[nodiscard]] bool lies_near(const FrameEvidence& evidence) const;
   /// The same of enough outline to be learned from.
   [[nodiscard]] bool fits(const FrameEvidence& evidence) const;
+  /// Whether what is left of an outline without odd pieces is enough to be learned from, and lies near.
+  [[nodiscard]] bool rest_fits(const OutlineFit::Seen& seen) const;
   /// Measures the outlines' noise on what a good fit leaves.
   void learn_noise(const OutlineFit& fit);
   /// Measures what outlines get wrong alike in all postures on what the fit of a new one leaves.
@@ -67,7 +74,12 @@ class OutlineFitter {
   /// @return how far it moves the outline, px of a 320x240 picture, rms
   double take_step(const Frame& frame, const PostureMemory& memory, double search_px, OutlineFit& fit);
   void look(const Frame& frame, double search_px, bool last, OutlineFit& fit);
-  [[nodiscard]] std::vector<OutlineSearch> searches(double search_px, bool last) const;
+  /// The last look, with odd pieces and without them.
+  void look_twice(const Frame& frame, double search_px, OutlineFit& fit);
+  /// Points of a fit by which outlines are judged.
+  [[nodiscard]] std::vector<OutlinePoint> shown(const OutlineFit& fit, std::size_t camera) const;
+  [[nodiscard]] Quadratic quadratic_of(const FrameEvidence& evidence, const Eigen::VectorXd& x, bool with_beside) const;
+  [[nodiscard]] std::vector<OutlineSearch> searches(double search_px, bool last, bool without_odd = false) const;
 
   FrameModel& model_;
   HypothesisScorer& scorer_;

@@ -40,7 +40,7 @@ const std::vector<std::pair<std::string, std::string>>& experiment_names() {
        "the public recording, exact and nominal robot; always one log, paper with ten seeds (needs BODYSCHEMA_DATA)"},
       {"honesty",
        fmt::format("whether what is published can be believed although the robot is not as described; two logs a "
-                   "trial, within all at most {}",
+                   "trial (--rows), within all at most {}",
                    kHonestyLogsInAll)},
       {"real", "photographs of physical robots with offsets hidden in them, where the data is there; up to 10 trials"},
       {"everyday", fmt::format("everyday pictures, a row a condition (--rows); within `all` at most {} trials a row",
@@ -96,7 +96,7 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   if (wanted("live")) run_live(context);
   if (options.experiment == "honesty") {
     run_honesty(context, std::numeric_limits<int>::max());
-    run_recording(context, true);
+    if (options.rows.empty()) run_recording(context, true);
   }
   if (options.experiment == "all") run_honesty(context, kHonestyLogsInAll);
   if (wanted("everyday")) run_everyday(context);

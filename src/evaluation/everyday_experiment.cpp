@@ -39,7 +39,8 @@ constexpr double kWrongHand_sd = 3.0, kWrongHand_mm = 2.0, kWrongOffset_sd = 5.0
 struct Row {
   const char* name;
   const char* scene;
-  bool lens_known = false;
+  bool lens_known = false;    ///< the configuration has what the lens does
+  bool lens_unknown = false;  ///< nobody calibrated it, and the configuration says so
 };
 constexpr std::array<Row, 13> kRows = {{{"plain", "plain"},
                                         {"room", "room"},
@@ -51,7 +52,7 @@ constexpr std::array<Row, 13> kRows = {{{"plain", "plain"},
                                         {"person", "person"},
                                         {"shutter", "shutter"},
                                         {"lens", "plain", true},
-                                        {"lens_forgotten", "lens_forgotten"},
+                                        {"lens_forgotten", "lens_forgotten", false, true},
                                         {"jpeg", "jpeg"},
                                         {"all", "kitchen"}}};
 
@@ -105,6 +106,10 @@ std::vector<EverydayFrame> play(const ExperimentContext& context, const Job& job
     // The simulator draws through the lenses of its configuration; so does the estimator's then.
     overrides.emplace_back("cameras.left.distortion=[-0.3, 0, 0, 0, 0]");
     overrides.emplace_back("cameras.right.distortion=[-0.3, 0, 0, 0, 0]");
+  }
+  if (job.row->lens_unknown) {
+    overrides.emplace_back("cameras.left.distortion=unknown");
+    overrides.emplace_back("cameras.right.distortion=unknown");
   }
   const auto configuration = Configuration::load(context.recorded / job.robot / "evaluation.yaml", overrides);
   Pipeline pipeline(configuration);

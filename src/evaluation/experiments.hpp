@@ -45,7 +45,10 @@ void run_reach(ExperimentContext& context);
 /// @param only_honesty  only whether what is said of the nominal robot and of the official hand can be believed
 void run_recording(ExperimentContext& context, bool only_honesty);
 void run_real(ExperimentContext& context);
+/// A humanoid that looks at its own hands: a part of `real`.
+void run_humanoid(ExperimentContext& context);
 /// @param most_logs  however many trials are asked for
+/// Throws ConfigurationError for a row that does not exist.
 void run_honesty(ExperimentContext& context, int most_logs);
 /// Throws ConfigurationError for a row that does not exist.
 void run_everyday(ExperimentContext& context);

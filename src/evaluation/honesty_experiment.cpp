@@ -7,6 +7,8 @@
 #include <memory>
 #include <random>
 
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/core/write_file.hpp"
 #include "bodyschema/evaluation/statistics.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
@@ -203,8 +205,14 @@ std::string frames_line(const char* row, const TrialRecord& trial, const Honesty
     json["state"].push_back(to_string(trial.contestants[0].frames[f].state));
     json["hand_error_mm"].push_back(log[f].hand_error_mm ? Json(*log[f].hand_error_mm) : Json(nullptr));
     json["hand_sd_mm"].push_back(log[f].hand_sd_mm);
-    json["worst_offset_sd"].push_back(
-        log[f].offset_error_deg.cwiseQuotient(log[f].offset_sd_deg).cwiseAbs().maxCoeff());
+    const auto& error = log[f].offset_error_deg;
+    const auto& sd = log[f].offset_sd_deg;
+    json["worst_offset_sd"].push_back(error.cwiseQuotient(sd).cwiseAbs().maxCoeff());
+    json["offset_error_deg"].push_back(std::vector<double>(error.begin(), error.end()));
+    json["offset_sd_deg"].push_back(std::vector<double>(sd.begin(), sd.end()));
+    for (const auto& p : trial.contestants[0].frames[f].effects) {
+      json["effects"][p.name].push_back({p.value / p.si_per_unit, p.sd / p.si_per_unit});
+    }
   }
   return json.dump() + '\n';
 }
@@ -240,9 +248,84 @@ void add_healthy(ExperimentContext& context, const Configuration& estimator, int
   all.insert(all.end(), with.begin(), with.end());
 }
 
+/// One log with an error.
+struct Job {
+  const Row* row;
+  std::uint64_t seed;
+  bool twice;
+};
+
+constexpr const char* kHealthy = "healthy";
+
+bool wanted(const ExperimentContext& context, const std::string& row) {
+  const auto& rows = context.options.rows;
+  return rows.empty() || std::find(rows.begin(), rows.end(), row) != rows.end();
+}
+
+/// Throws ConfigurationError for a row that does not exist.
+void check_rows(const ExperimentContext& context) {
+  std::vector<std::string> names = {kHealthy};
+  for (const auto& row : kRows) names.emplace_back(row.key);
+  for (const auto& name : context.options.rows) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+    throw ConfigurationError("--rows: honesty has no row '" + name + "'; did you mean '" + nearest_name(name, names) +
+                             "'?");
+  }
+}
+
+/// Errors in turn; of each, every fourth log draws at twice the size. A log's seed does not depend on which rows are
+/// asked for.
+std::vector<Job> jobs_of(const ExperimentContext& context, std::uint64_t first, std::size_t faulty) {
+  std::vector<Job> jobs;
+  for (std::size_t t = 0; t < faulty; ++t) {
+    const Row& row = kRows[t % kRows.size()];
+    if (wanted(context, row.key)) {
+      jobs.push_back({&row, first + t, (t / kRows.size() + t) % kEveryFourth == kEveryFourth - 1});
+    }
+  }
+  return jobs;
+}
+
+std::vector<TrialRecord> run_jobs(const ExperimentContext& context, const Configuration& estimator,
+                                  const std::vector<Job>& jobs) {
+  std::vector<std::uint64_t> seeds;
+  for (const auto& job : jobs) seeds.push_back(job.seed);
+  return run_trials(context, "honesty: one error each", seeds,
+                    [&](std::uint64_t seed) {
+                      const auto job =
+                          std::find_if(jobs.begin(), jobs.end(), [&](const Job& one) { return one.seed == seed; });
+                      auto random = random_of(seed);
+                      TrialSetting setting = honesty_setting(context, estimator, random);
+                      job->row->add(setting, random, job->twice ? 2.0 : 1.0);
+                      return setting;
+                    },
+                    {{"tolerances", options_for(context, "best")}});
+}
+
+/// A line for every row; the largest of their medians of sd over error, of logs with an error at its size.
+double add_rows(ExperimentContext& context, Json& summary, const std::vector<Job>& jobs,
+                const std::vector<HonestyLog>& logs) {
+  double worst_ratio = 0.0;
+  for (const auto& row : kRows) {
+    std::vector<const HonestyLog*> of_row, at_size;
+    for (std::size_t i = 0; i < jobs.size(); ++i) {
+      if (jobs[i].row != &row) continue;
+      of_row.push_back(&logs[i]);
+      if (!jobs[i].twice) at_size.push_back(&logs[i]);
+    }
+    if (of_row.empty()) continue;
+    const auto figures = honesty_figures(of_row);
+    summary[row.key] = to_json(figures);
+    add_line(context, row.title, figures);
+    worst_ratio = std::max(worst_ratio, honesty_figures(at_size).sd_to_error_median);
+  }
+  return worst_ratio;
+}
+
 }  // namespace
 
 void run_honesty(ExperimentContext& context, int most_logs) {
+  check_rows(context);
   const Configuration estimator =
       Configuration::load(context.recorded / "icub_right/honesty.yaml", context.options.overrides);
   const auto logs = static_cast<std::size_t>(std::min(2 * context.options.trials, most_logs));
@@ -250,46 +333,23 @@ void run_honesty(ExperimentContext& context, int most_logs) {
   context.table += fmt::format("\n{:<34} {:>5} {:>10} {:>9} {:>9} {:>10} {:>9} {:>9} {:>9}\n", "honesty", "logs",
                                "converged", "wrong", "logs", "95 % hold", "else", "published", "sd/error");
   Json& summary = context.summary["honesty"];
-  std::vector<HonestyLog> all, usual, twice;
+  std::vector<HonestyLog> all, usual, twice, logs_of;
   std::string frames;
-  add_healthy(context, estimator, static_cast<int>(healthy), summary, all, frames);
-
-  // Errors in turn; of each, every fourth log draws at twice the size.
-  const auto row_of = [](std::size_t t) { return t % kRows.size(); };
-  const auto is_twice = [](std::size_t t) { return (t / kRows.size() + t) % kEveryFourth == kEveryFourth - 1; };
-  const std::uint64_t first = context.options.seed + healthy;
-  ExperimentContext beyond = context;
-  beyond.options.seed = first;
-  const auto records = run_trials(beyond, "honesty: one error each", static_cast<int>(faulty),
-                                  [&](std::uint64_t seed) {
-                                    const auto t = static_cast<std::size_t>(seed - first);
-                                    auto random = random_of(seed);
-                                    TrialSetting setting = honesty_setting(context, estimator, random);
-                                    kRows[row_of(t)].add(setting, random, is_twice(t) ? 2.0 : 1.0);
-                                    return setting;
-                                  },
-                                  {{"tolerances", options_for(context, "best")}});
-  std::vector<HonestyLog> logs_of;
-  for (std::size_t t = 0; t < records.size(); ++t) {
-    logs_of.push_back(honesty_log(records[t], 0));
-    summary["each_log"].push_back(log_json(kRows[row_of(t)].key, records[t], logs_of.back(), is_twice(t)));
-    frames += frames_line(kRows[row_of(t)].key, records[t], logs_of.back());
+  double worst_ratio = 0.0;
+  if (wanted(context, kHealthy)) {
+    add_healthy(context, estimator, static_cast<int>(healthy), summary, all, frames);
+    worst_ratio = summary[kHealthy]["sd_to_error_median"];
+  }
+  const auto jobs = jobs_of(context, context.options.seed + healthy, faulty);
+  const auto records = run_jobs(context, estimator, jobs);
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    logs_of.push_back(honesty_log(records[i], 0));
+    summary["each_log"].push_back(log_json(jobs[i].row->key, records[i], logs_of.back(), jobs[i].twice));
+    frames += frames_line(jobs[i].row->key, records[i], logs_of.back());
+    (jobs[i].twice ? twice : usual).push_back(logs_of.back());
   }
   replace_file(context.options.out / "honesty_frames.jsonl", frames);
-
-  double worst_ratio = summary["healthy"]["sd_to_error_median"];
-  for (std::size_t r = 0; r < kRows.size(); ++r) {
-    std::vector<const HonestyLog*> of_row, at_size;
-    for (std::size_t t = r; t < faulty; t += kRows.size()) {
-      of_row.push_back(&logs_of[t]);
-      if (!is_twice(t)) at_size.push_back(&logs_of[t]);
-    }
-    const auto figures = honesty_figures(of_row);
-    summary[kRows[r].key] = to_json(figures);
-    add_line(context, kRows[r].title, figures);
-    worst_ratio = std::max(worst_ratio, honesty_figures(at_size).sd_to_error_median);
-  }
-  for (std::size_t t = 0; t < faulty; ++t) (is_twice(t) ? twice : usual).push_back(logs_of[t]);
+  worst_ratio = std::max(worst_ratio, add_rows(context, summary, jobs, logs_of));
   const double with_error = honesty_figures(pointers(usual)).converged_rate;
   all.insert(all.end(), usual.begin(), usual.end());
   const auto asked = honesty_figures(pointers(all));

@@ -198,6 +198,7 @@ class RealExperiment {
         "witness: masks and depth; medians. Others' poses with the encoders as they are; ours with offsets hidden, "
         "before and after.\n";
     board();
+    run_humanoid(context_);
   }
 
  private:

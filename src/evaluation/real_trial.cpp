@@ -45,7 +45,10 @@ void copy_hiding(const fs::path& from, const fs::path& to, const Hidden& hidden,
 }  // namespace
 
 JointTable JointTable::read(const fs::path& set) {
-  const fs::path file = set / "joints.csv";
+  return read_file(set / "joints.csv");
+}
+
+JointTable JointTable::read_file(const fs::path& file) {
   std::ifstream in(file);
   if (!in) throw FileError(file.string() + ": cannot be read");
   JointTable table;

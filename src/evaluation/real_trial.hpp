@@ -17,6 +17,7 @@ struct JointTable {
   std::vector<std::vector<double>> rows;
   /// Throws FileError.
   static JointTable read(const std::filesystem::path& set);
+  static JointTable read_file(const std::filesystem::path& file);
   /// Joint angles of one row.
   [[nodiscard]] std::map<std::string, double> row(std::size_t index) const;
 };

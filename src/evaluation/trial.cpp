@@ -17,6 +17,7 @@ FrameRecord record_of(const Estimate& estimate, Estimator& estimator, const Obse
   record.state = estimate.state;
   record.offset_deg = estimate.offset_rad * (180.0 / kPi);
   record.covariance_deg2 = estimate.covariance_rad2 * (180.0 / kPi) * (180.0 / kPi);
+  record.effects = estimate.effects;
   record.likelihood = estimate.best_likelihood;
   record.total_ms = estimate.times.total_ms;
   record.hand_sd_mm = 1e3 * estimate.hand_sd_m;

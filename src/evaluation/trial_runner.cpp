@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <numeric>
 #include <random>
 #include <thread>
 
@@ -68,12 +69,20 @@ TrialSetting mismatch_setting(const ExperimentContext& context, std::uint64_t se
 std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std::string& label, int trials,
                                     const std::function<TrialSetting(std::uint64_t)>& setting_of,
                                     const std::vector<Contestant>& contestants) {
-  std::vector<TrialRecord> records(static_cast<std::size_t>(trials));
+  std::vector<std::uint64_t> seeds(static_cast<std::size_t>(trials));
+  std::iota(seeds.begin(), seeds.end(), context.options.seed);
+  return run_trials(context, label, seeds, setting_of, contestants);
+}
+
+std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std::string& label,
+                                    const std::vector<std::uint64_t>& seeds,
+                                    const std::function<TrialSetting(std::uint64_t)>& setting_of,
+                                    const std::vector<Contestant>& contestants) {
+  const auto trials = static_cast<int>(seeds.size());
+  std::vector<TrialRecord> records(seeds.size());
   // Settings are made before the work is shared out: configuration is read by one thread at a time.
   std::vector<TrialSetting> settings;
-  for (int t = 0; t < trials; ++t) {
-    settings.push_back(setting_of(context.options.seed + static_cast<std::uint64_t>(t)));
-  }
+  for (const auto seed : seeds) settings.push_back(setting_of(seed));
   constexpr std::uint64_t kStepsOfATrial = 1000;
   ProgressBar bar(label, static_cast<std::uint64_t>(trials) * kStepsOfATrial);
   std::atomic<int> next{0};
@@ -89,8 +98,7 @@ std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std:
           bar.advance(now - done);
           done = now;
         };
-        records[index] =
-            run_trial(settings[index], contestants, context.options.seed + static_cast<std::uint64_t>(t), progress);
+        records[index] = run_trial(settings[index], contestants, seeds[index], progress);
         progress(1.0);
       } catch (...) {
         const std::lock_guard lock(mutex);

@@ -27,5 +27,10 @@ TrialSetting mismatch_setting(const ExperimentContext& context, std::uint64_t se
 std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std::string& label, int trials,
                                     const std::function<TrialSetting(std::uint64_t)>& setting_of,
                                     const std::vector<Contestant>& contestants);
+/// The same with seeds that are named.
+std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std::string& label,
+                                    const std::vector<std::uint64_t>& seeds,
+                                    const std::function<TrialSetting(std::uint64_t)>& setting_of,
+                                    const std::vector<Contestant>& contestants);
 
 }  // namespace bodyschema

@@ -121,10 +121,16 @@ void LogFit::weigh_parts() {
     postures += 1.0;
   }
   const auto shown = log_.parts_shown();
-  if (postures < 2.0) return;
+  if (postures < 2.0 && left_out_.empty()) return;
   for (std::size_t l = 0; l < still.size(); ++l) {
-    part_weight_.push_back(!shown[l] ? 0.0 : still[l] ? 1.0 / postures : 1.0);
+    const bool silent = !shown[l] || (!left_out_.empty() && left_out_[l]);
+    part_weight_.push_back(silent ? 0.0 : still[l] ? 1.0 / std::max(1.0, postures) : 1.0);
   }
+}
+
+void LogFit::leave_out(std::vector<bool> parts) {
+  left_out_ = std::move(parts);
+  weigh_parts();
 }
 
 LogFit::~LogFit() = default;

@@ -306,7 +306,7 @@ ImportSummary LogBuilder::finish() {
     return all;
   }();
   const auto first_picture_lost = std::find_if(summary_.left_out.begin(), summary_.left_out.end(), [](const auto& l) {
-    return l.first.starts_with("pictures of camera ");
+    return l.first.starts_with("pictures of camera ") || l.first == "videos";
   });
   if (pictures == 0) {
     throw FileError(log_.string() + ": not written: no picture of any camera" +

@@ -27,6 +27,7 @@ auto& number(const Coordinate& coordinate, C& c) {
     case Kind::kCx: return c.camera.cx_px;
     case Kind::kCy: return c.camera.cy_px;
     case Kind::kK1: return c.camera.k1;
+    case Kind::kReadout: return c.camera.readout_s;
     case Kind::kScale: return c.shapes[at].scale;
     case Kind::kDilation: break;
   }
@@ -54,7 +55,7 @@ Coordinates::Coordinates(const JointRoles& roles) {
   for (const auto kind : {Kind::kBase, Kind::kRigShift, Kind::kRigTurn, Kind::kCameraShift, Kind::kCameraTurn}) {
     for (Eigen::Index axis = 0; axis < 3; ++axis) add(kind, axis);
   }
-  for (const auto kind : {Kind::kFocal, Kind::kCx, Kind::kCy, Kind::kK1}) add(kind, 0);
+  for (const auto kind : {Kind::kFocal, Kind::kCx, Kind::kCy, Kind::kK1, Kind::kReadout}) add(kind, 0);
   for (const auto kind : {Kind::kScale, Kind::kDilation}) {
     for (std::size_t s = 0; s < roles.segments.size(); ++s) add(kind, static_cast<Eigen::Index>(s));
   }

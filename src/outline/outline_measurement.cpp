@@ -19,9 +19,29 @@ bool moves_links(Kind kind) {
          kind == Kind::kRigTurn || kind == Kind::kCameraShift || kind == Kind::kCameraTurn;
 }
 
+/// When a row is exposed, from the middle one's time on, as a share of the read-out.
+double row_time(double v, const PinholeIntrinsics& k) {
+  return (v - 0.5 * (k.height - 1)) / std::max(1, k.height - 1);
+}
+
+/// Motion of a body from X0 to X, per unit: (p, 1) of the frame to velocity.
+Eigen::Matrix<double, 3, 4> motion_between(const Pose& X0, const Pose& X, double step) {
+  Eigen::Matrix<double, 3, 4> motion;
+  const Eigen::Matrix3d W = (X.linear() - X0.linear()) * X0.linear().transpose() / step;
+  motion.leftCols<3>() = W;
+  motion.col(3) = (X.translation() - X0.translation()) / step - W * X0.translation();
+  return motion;
+}
+
 /// Share of a residual's square that counts.
 double damping(double r, double scale) {
   return scale * scale / (r * r + scale * scale);
+}
+
+bool is_covered(const BinaryMask* covered, const Eigen::Vector2d& pixel) {
+  if (covered == nullptr || covered->empty()) return false;
+  const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
+  return u >= 0 && v >= 0 && u < covered->width() && v < covered->height() && covered->at(u, v);
 }
 
 }  // namespace
@@ -33,14 +53,17 @@ double picture_unit(const PinholeIntrinsics& k) {
 void OutlineEvidence::clear(Eigen::Index coordinates) {
   A.setZero(coordinates, coordinates);
   b.setZero(coordinates);
-  square = weight = cost = misfit = sampled = matched = 0.0;
+  square = weight = cost = misfit = sampled = matched = covered = odd = 0.0;
 }
 
 OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
                                        const StereoRig& rig, const JointRoles& roles)
+    : OutlineMeasurement(robot, setup, rig, roles, silhouette_model(*robot, setup)) {}
+
+OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
+                                       const StereoRig& rig, const JointRoles& roles, const SilhouetteModel& drawn)
     : coordinates_(roles), projection_(robot, setup, rig, roles), moved_(robot, setup, rig, roles),
-      extractor_(silhouette_model(*robot, setup), rig.intrinsics()), probe_(roles.no_corrections()),
-      X_CB_(projection_.part_count()) {}
+      extractor_(drawn, rig.intrinsics()), probe_(roles.no_corrections()), X_CB_(projection_.part_count()) {}
 
 void OutlineMeasurement::linearise(const ObservedEdges& edges, const Eigen::Ref<const Eigen::VectorXd>& q,
                                    const Corrections& corrections, std::size_t camera,
@@ -48,6 +71,7 @@ void OutlineMeasurement::linearise(const ObservedEdges& edges, const Eigen::Ref<
                                    OutlineEvidence& out) {
   out.clear(static_cast<Eigen::Index>(active.size()));
   projection_.place(q, corrections, camera);
+  find_shutter_motion(q, corrections, camera, active);
   compare(&edges, corrections, camera, search, out);
   if (points_.empty() || active.empty()) return;
   find_motions(q, corrections, camera, active);
@@ -59,10 +83,35 @@ void OutlineMeasurement::expect(const Eigen::Ref<const Eigen::VectorXd>& q, cons
                                 OutlineEvidence& out) {
   out.clear(static_cast<Eigen::Index>(active.size()));
   projection_.place(q, corrections, camera);
+  find_shutter_motion(q, corrections, camera, active);
   compare(nullptr, corrections, camera, search, out);
   if (points_.empty() || active.empty()) return;
   find_motions(q, corrections, camera, active);
   differentiate(corrections, projection_.intrinsics(camera), active, out);
+}
+
+void OutlineMeasurement::find_shutter_motion(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
+                                             std::size_t camera, std::span<const std::uint32_t> active) {
+  shutter_.clear();
+  constexpr double kStep_s = 1e-5, kRest_rad_s = 1e-4;
+  const bool asked = std::any_of(active.begin(), active.end(),
+                                 [&](std::uint32_t i) { return coordinates_[i].kind == Kind::kReadout; });
+  if (!asked && corrections.camera.readout_s == 0.0) return;
+  if (corrections.qdot.size() != q.size() || corrections.qdot.cwiseAbs().maxCoeff() < kRest_rad_s) return;
+  moved_.place(q + kStep_s * corrections.qdot, corrections, camera);
+  for (std::size_t l = 0; l < projection_.links().size(); ++l) {
+    shutter_.push_back(motion_between(projection_.links()[l], moved_.links()[l], kStep_s));
+  }
+}
+
+void OutlineMeasurement::roll(const Corrections& corrections, const PinholeIntrinsics& k, OutlinePoint& point) const {
+  if (shutter_.empty() || corrections.camera.readout_s == 0.0) return;
+  const double time_s = corrections.camera.readout_s * row_time(point.pixel.y(), k);
+  const Eigen::Vector3d p_C = point.p_C + time_s * (shutter_[point.part] * point.p_C.homogeneous());
+  const Eigen::Array2d focal = Eigen::Array2d(k.fx, k.fy) * (1.0 + corrections.camera.focal_scale);
+  const Eigen::Vector2d step = p_C.head<2>() / p_C.z() - point.p_C.head<2>() / point.p_C.z();
+  point.pixel += (focal * step.array()).matrix();
+  point.p_C = p_C;
 }
 
 void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& corrections, std::size_t camera,
@@ -76,6 +125,7 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
   const Eigen::Array2d focal = Eigen::Array2d(k.fx, k.fy) * (1.0 + corrections.camera.focal_scale);
   projection_.parts(X_CB_);
   points_.clear();
+  samples_.clear();
   for (const auto& predicted : extractor_.extract(X_CB_, camera, static_cast<float>(unit * search.spacing_px))) {
     const double factor = search.part_weight.empty() ? 1.0 : search.part_weight[predicted.part];
     if (factor <= 0.0) continue;
@@ -84,6 +134,7 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
     point.p_C = unwarp * predicted.p_C.cast<double>();
     point.pixel = predicted.pixel.cast<double>();
     point.normal = predicted.normal.cast<double>();
+    roll(corrections, k, point);
     if (k1 != 0.0) {
       const Eigen::Vector2d x = point.p_C.head<2>() / point.p_C.z();
       point.pixel += (k1 * x.squaredNorm() * focal * x.array()).matrix();
@@ -92,24 +143,49 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
       point.normal = (bend.inverse().transpose() * point.normal).normalized();
     }
     point.pixel += corrections.shapes[projection_.segment_of(point.part)].dilation_px * point.normal;
+    const bool covered = is_covered(search.covered, point.pixel);
     const auto distance =
         edges != nullptr ? edges->find(point.pixel, point.normal, reach_px) : std::optional<double>(0.0);
-    out.sampled += 1.0;
     const double r = distance.value_or(0.0);
-    out.misfit += distance ? r * r * damping(r, misfit_px) : misfit_px * misfit_px;
-    if (!distance || std::abs(r) > search_px) {
-      out.cost += robust_px * robust_px;
-      continue;
+    const bool found = distance && std::abs(r) <= search_px;
+    samples_.push_back({point.part, point.pixel, point.normal, found ? distance : std::nullopt, covered});
+    if (covered) {
+      out.covered += 1.0;
+    } else {
+      out.sampled += 1.0;
+      out.misfit += distance ? r * r * damping(r, misfit_px) : misfit_px * misfit_px;
+      if (!found) out.cost += robust_px * robust_px;
     }
+    if (!found) continue;
     const double share = damping(r, robust_px);
     point.residual_px = r;
     point.weight = factor * share * share;
+    point.odd = covered;
+    points_.push_back(point);
+    if (covered) continue;
+    out.matched += 1.0;
     out.cost += r * r * share;
     out.square += point.weight * r * r;
     out.weight += point.weight;
-    points_.push_back(point);
   }
-  out.matched = static_cast<double>(points_.size());
+  if (search.odd_sd_px > 0.0) leave_out_odd(search, unit, out);
+}
+
+void OutlineMeasurement::leave_out_odd(const OutlineSearch& search, double unit_px, OutlineEvidence& out) {
+  odd_pieces_.find(samples_, unit_px * search.odd_sd_px, unit_px * search.spacing_px, unit_px * search.search_px);
+  const double robust_px = unit_px * search.robust_px;
+  auto point = points_.begin();  // one for every sample that was found, in their order
+  for (const auto& sample : samples_) {
+    out.odd += sample.odd;
+    if (!sample.residual_px) continue;
+    OutlinePoint& own = *point++;
+    if (!sample.odd) continue;
+    own.odd = true;
+    const double r = own.residual_px;
+    out.cost += robust_px * robust_px - r * r * damping(r, robust_px);
+    out.square -= own.weight * r * r;
+    out.weight -= own.weight;
+  }
 }
 
 void OutlineMeasurement::find_motions(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
@@ -128,11 +204,7 @@ void OutlineMeasurement::find_motions(const Eigen::Ref<const Eigen::VectorXd>& q
     number = value;
     for (std::size_t l = 0; l < links_.size(); ++l) {
       // d(X X0^-1)/d coordinate: a twist acting on points of the camera's frame.
-      const Pose& X = moved_.links()[l];
-      const Eigen::Matrix3d W = (X.linear() - links_[l].linear()) * links_[l].linear().transpose() / kStep;
-      auto& motion = motion_[i * links_.size() + l];
-      motion.leftCols<3>() = W;
-      motion.col(3) = (X.translation() - links_[l].translation()) / kStep - W * links_[l].translation();
+      motion_[i * links_.size() + l] = motion_between(links_[l], moved_.links()[l], kStep);
     }
   }
 }
@@ -145,6 +217,10 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
   const Eigen::Vector2d focal = Eigen::Vector2d(k.fx, k.fy) * (1.0 + corrections.camera.focal_scale);
   for (Eigen::Index p = 0; p < n; ++p) {
     const auto& point = points_[static_cast<std::size_t>(p)];
+    if (point.odd) {
+      rows_.col(p).setZero();
+      continue;
+    }
     const double iz = 1.0 / point.p_C.z();
     const Eigen::Vector2d x = point.p_C.head<2>() * iz;
     const double bent = 1.0 + k1 * x.squaredNorm();
@@ -162,6 +238,9 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
         case Kind::kFocal: g = bent * n_f.dot(x) / (1.0 + corrections.camera.focal_scale); break;
         case Kind::kCx: g = point.normal.x(); break;
         case Kind::kCy: g = point.normal.y(); break;
+        case Kind::kReadout:
+          if (!shutter_.empty()) g = by_p.dot(shutter_[point.part] * p_C) * row_time(point.pixel.y(), k);
+          break;
         case Kind::kK1: g = n_f.dot(x) * x.squaredNorm(); break;
         case Kind::kScale:
           if (own) {

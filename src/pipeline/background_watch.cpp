@@ -79,7 +79,7 @@ std::string describe(const BackgroundTurn& turn) {
   if (turn.changed == 0) return "";
   return fmt::format(
       "the head turned by up to {:.1f} deg from where the background was learned, and the background "
-      "changed with it: masks of at least {} of {} pictures are wrong; set vision.method: statistics",
+      "changed with it: masks of at least {} of {} pictures are wrong; set vision.method: auto",
       degrees(turn.turned_rad), turn.changed, turn.pictures);
 }
 

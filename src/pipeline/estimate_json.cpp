@@ -76,6 +76,9 @@ nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
   json["postures"] = e.postures;
   json["posture_sd_deg"] = degrees(e.posture_sd_rad);
   json["outline"] = {{"stddev_px", e.outline_sd_px}, {"points_alike", e.outline_alike}};
+  if (e.hidden.robot > 0.0 || e.hidden.holds) {
+    json["hidden"] = {{"hand", e.hidden.hand}, {"robot", e.hidden.robot}, {"holds", e.hidden.holds}};
+  }
   for (const auto& finding : e.findings.causes) json["findings"].push_back(finding_json(finding));
   if (!e.changed.empty()) json["changed"] = e.changed;
   if (!e.misfit.empty()) json["misfit"] = e.misfit;

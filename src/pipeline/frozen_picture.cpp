@@ -1,6 +1,7 @@
 #include "bodyschema/pipeline/frozen_picture.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #include "bodyschema/core/digest.hpp"
@@ -9,13 +10,17 @@ namespace bodyschema {
 namespace {
 
 std::uint64_t digest_of(const Image& image) {
-  Digest digest;  // over words, as it is of every picture
+  // Over words, in four strands that the processor works on at once, as it is of every picture.
+  constexpr std::size_t kStrands = 4;
+  std::array<Digest, kStrands> strands;
+  std::array<std::uint64_t, kStrands> words{};
   std::size_t i = 0;
-  for (; i + sizeof(std::uint64_t) <= image.data.size(); i += sizeof(std::uint64_t)) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, image.data.data() + i, sizeof word);
-    digest.add_word(word);
+  for (; i + sizeof words <= image.data.size(); i += sizeof words) {
+    std::memcpy(words.data(), image.data.data() + i, sizeof words);
+    for (std::size_t s = 0; s < kStrands; ++s) strands[s].add_word(words[s]);
   }
+  Digest digest;
+  for (const Digest& strand : strands) digest.add_word(strand.value());
   digest.add(image.data.data() + i, image.data.size() - i);
   return digest.value();
 }

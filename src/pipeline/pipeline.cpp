@@ -9,6 +9,8 @@
 #include <exception>
 #include <stdexcept>
 
+#include "bodyschema/camera/lens_knowledge.hpp"
+#include "bodyschema/camera/shutter.hpp"
 #include "bodyschema/imports/joint_mapping.hpp"
 #include "bodyschema/imports/yarp_import.hpp"
 #include "bodyschema/outline/outline_measurement.hpp"
@@ -27,9 +29,16 @@ StereoRig corrected(const StereoRig& rig, const std::optional<ErrorModel>& model
   return model ? model->corrected(rig) : rig;
 }
 
-/// What of an extended model is not in the rig already, and not found anew.
+std::vector<double> readouts_of(const Configuration& cameras, const StereoRig& rig) {
+  std::vector<double> readouts_s;
+  for (const auto& camera : rig.cameras) readouts_s.push_back(readout_s(cameras.section(camera.name)).value_or(0.0));
+  return readouts_s;
+}
+
+/// What of an extended model is not in the rig already, and not found anew; and what the configuration says of
+/// shutters.
 ErrorModel effects_beside(const std::optional<ErrorModel>& model, const std::shared_ptr<const RobotModel>& robot,
-                          const RobotSetup& setup, const StereoRig& rig) {
+                          const RobotSetup& setup, const StereoRig& rig, const std::vector<double>& readouts_s) {
   ErrorModel rest(JointRoles::of(robot, setup, rig));
   for (std::size_t e = 0; model && e < model->size(); ++e) {
     const auto& effect = (*model)[e];
@@ -38,6 +47,13 @@ ErrorModel effects_beside(const std::optional<ErrorModel>& model, const std::sha
     }
   }
   if (model) rest.set_uncertainty(model->uncertainty());
+  for (std::size_t c = 0; c < readouts_s.size(); ++c) {
+    if (readouts_s[c] == 0.0) continue;
+    const EffectTarget target{"", rig.cameras.size() > 1 ? rig.cameras[c].name : ""};
+    Effect* known = rest.find("rolling_shutter", target);
+    Effect& shutter = known != nullptr ? *known : rest.add("rolling_shutter", target);
+    shutter.parameters()[0].value += readouts_s[c];
+  }
   return rest;
 }
 
@@ -62,8 +78,10 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
       error_model_(load_error_model(setup_, robot_, StereoRig::from(configuration.section("cameras")))),
       rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
       beliefs_(Beliefs::from(configuration, JointRoles::of(robot_, setup_, rig_), rig_, options_)),
-      background_watch_(robot_, links_of(rig_)), background_turned_rad_(rig_.cameras.size(), 0.0),
-      estimator_(robot_, setup_, rig_, beliefs_, options_, effects_beside(error_model_, robot_, setup_, rig_)),
+      readouts_s_(readouts_of(configuration.section("cameras"), rig_)), background_watch_(robot_, links_of(rig_)),
+      background_turned_rad_(rig_.cameras.size(), 0.0),
+      estimator_(robot_, setup_, rig_, beliefs_, options_,
+                 effects_beside(error_model_, robot_, setup_, rig_, readouts_s_)),
       configuration_hash_(configuration.hash()), model_hash_(model_hash_of(setup_, *robot_, error_model_)) {
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
@@ -73,10 +91,12 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
         !vision_.background_pictures.contains(camera.name)) {
       configuration.section("vision").section("background_pictures").fail(camera.name, "a file for each camera");
     }
-    if (!configuration.section("cameras").section(camera.name).has("distortion")) {
+    if (lens_knowledge(configuration.section("cameras").section(camera.name)) == LensKnowledge::kUnknown) {
       spdlog::warn(
-          "camera '{}' has no distortion in the configuration and is taken to have none: most lenses bend by more than "
-          "offsets are worth; set cameras.{}.distortion, to zeros where pictures come straightened",
+          "camera '{}' has no distortion in the configuration: how its lens bends pictures (k1) is estimated beside "
+          "the "
+          "offsets, which takes longer and tells them less well; set cameras.{}.distortion, to zeros where pictures "
+          "come straightened",
           camera.name, camera.name);
     }
     std::optional<Undistorter> undistorter;
@@ -90,7 +110,7 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
 }
 
 ErrorModel Pipeline::known_effects() const {
-  return effects_beside(error_model_, robot_, setup_, rig_);
+  return effects_beside(error_model_, robot_, setup_, rig_, readouts_s_);
 }
 
 ObservationStream Pipeline::make_stream() const {
@@ -120,6 +140,21 @@ void Pipeline::take_background_from(Pipeline& other) {
   }
   for (std::size_t c = 0; c < eyes_.size(); ++c) eyes_[c].segmenter = std::move(other.eyes_[c].segmenter);
   background_watch_.take_from(other.background_watch_);
+}
+
+LooksByCamera Pipeline::looks() const {
+  LooksByCamera looks;
+  for (std::size_t c = 0; c < eyes_.size(); ++c) {
+    if (eyes_[c].segmenter.looks().known()) looks[rig_.cameras[c].name] = eyes_[c].segmenter.looks();
+  }
+  return looks;
+}
+
+void Pipeline::know_looks(const LooksByCamera& looks) {
+  for (std::size_t c = 0; c < eyes_.size(); ++c) {
+    const auto found = looks.find(rig_.cameras[c].name);
+    if (found != looks.end()) eyes_[c].segmenter.know_looks(found->second);
+  }
 }
 
 void Pipeline::learn_from(const Observation& observation) {

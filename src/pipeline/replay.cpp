@@ -93,6 +93,10 @@ class Replay {
   }
 
   std::string run() {
+    std::error_code none;
+    if (options_.looks && std::filesystem::exists(*options_.looks, none)) {
+      pipeline_.know_looks(read_looks(*options_.looks, pipeline_.model_hash()));
+    }
     if (pipeline_.learns_background() && !options_.learn_background_online) {
       for_each("learning the background", [&](Observation& o, const Observation*) { pipeline_.learn_from(o); });
       pipeline_.finish_learning();
@@ -118,6 +122,7 @@ class Replay {
     }
     estimates_.flush();
     if (!estimates_) throw DeviceError(options_.out.string() + ": disk full? estimates.jsonl is cut short");
+    if (options_.looks) write_looks(*options_.looks, pipeline_.model_hash(), pipeline_.looks());
     end_where_it_converged();
     if (last_view_) {
       write_overlay(pipeline_, *last_view_, last_, options_.out / "overlay_final.png", "last frame");
@@ -234,7 +239,7 @@ class Replay {
     if (last_.state == EstimatorState::kConverged) {
       converged_ = last_;
       frames_since_ = 0;
-    } else if (last_.state == EstimatorState::kConverging) {
+    } else if (last_.state == EstimatorState::kConverging || last_.state == EstimatorState::kOccluded) {
       ++frames_since_;
     } else if (last_.state == EstimatorState::kDiverged || last_.state == EstimatorState::kModelMisfit) {
       converged_.reset();
@@ -339,6 +344,7 @@ class Replay {
       case EstimatorState::kHandNotInView:
         return last_view_ ? "the arm had left the pictures; the offsets are of before" : "the arm is in no picture";
       case EstimatorState::kModelMisfit: return last_.misfit;
+      case EstimatorState::kOccluded: return "something hides too much of the hand";
       case EstimatorState::kLearningBackground: return "it holds too few pictures to learn the background from";
       default: return "the offsets have not settled: " + missed_limits() + "; do not use them yet";
     }

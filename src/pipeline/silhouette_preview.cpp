@@ -3,28 +3,9 @@
 #include <cmath>
 #include <limits>
 
+#include "bodyschema/camera/bent_silhouette.hpp"
+
 namespace bodyschema {
-namespace {
-
-/// A silhouette of a pinhole camera as a lens with radial distortion k1 shows it.
-BinaryMask bent(const BinaryMask& straight, const PinholeIntrinsics& k, double k1) {
-  BinaryMask result(straight.width(), straight.height());
-  for (int v = 0; v < straight.height(); ++v) {
-    for (int u = 0; u < straight.width(); ++u) {
-      const Eigen::Vector2d seen((u - k.cx) / k.fx, (v - k.cy) / k.fy);
-      Eigen::Vector2d x = seen;
-      for (int i = 0; i < 5; ++i) x = seen / (1.0 + k1 * x.squaredNorm());
-      const auto su = static_cast<int>(std::lround(k.fx * x.x() + k.cx));
-      const auto sv = static_cast<int>(std::lround(k.fy * x.y() + k.cy));
-      const bool inside = su >= 0 && sv >= 0 && su < straight.width() && sv < straight.height();
-      if (inside && straight.at(su, sv)) result.set(u, v);
-    }
-  }
-  return result;
-}
-
-}  // namespace
-
 SilhouettePreview::SilhouettePreview(const PictureLog& log)
     : projection_(log.robot(), log.setup(), log.rig(), log.roles()), X_CB_(projection_.part_count()) {
   SilhouetteOptions options;
@@ -38,9 +19,7 @@ BinaryMask SilhouettePreview::draw(const Eigen::Ref<const Eigen::VectorXd>& q, c
   camera_ = camera;
   projection_.place(q, corrections, camera);
   projection_.parts(X_CB_);
-  const BinaryMask silhouette = scorer_->render(X_CB_, camera);
-  const double k1 = corrections.camera.k1;
-  return k1 == 0.0 ? silhouette : bent(silhouette, projection_.intrinsics(camera), k1);
+  return bent_silhouette(scorer_->render(X_CB_, camera), projection_.intrinsics(camera), corrections.camera.k1);
 }
 
 BinaryMask SilhouettePreview::draw_parts(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
@@ -52,9 +31,7 @@ BinaryMask SilhouettePreview::draw_parts(const Eigen::Ref<const Eigen::VectorXd>
   for (std::size_t part = 0; part < X_CB_.size(); ++part) {
     if (!parts[part]) X_CB_[part].pretranslate(Eigen::Vector3f(kOutOfSight_m, 0.0f, 0.0f));
   }
-  const BinaryMask silhouette = scorer_->render(X_CB_, camera);
-  const double k1 = corrections.camera.k1;
-  return k1 == 0.0 ? silhouette : bent(silhouette, projection_.intrinsics(camera), k1);
+  return bent_silhouette(scorer_->render(X_CB_, camera), projection_.intrinsics(camera), corrections.camera.k1);
 }
 
 Eigen::Vector2d SilhouettePreview::hand() const {

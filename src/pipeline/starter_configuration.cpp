@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 constexpr double kGuessedFieldOfView_rad = 1.05;       // 60 deg across, a common camera
 constexpr double kPairSd_deg = 0.1, kPairSd_mm = 1.0;  // of a stereo pair that was calibrated as one
 /// Physical: joined by arrival, pictures come late by some frames; a lens that nobody measured bends by as much.
-constexpr double kLag_sd_ms = 60.0, kLens_sd = 0.05;
+constexpr double kLag_sd_ms = 60.0;
 /// Of a camera's principal point, share of the width: by which calibrations of one camera differ.
 constexpr double kCentre_share = 0.005;
 
@@ -418,6 +418,15 @@ class Starter {
     return text;
   }
 
+  /// A calibration that found nothing is rarely one: k1 is estimated then, unless pictures are said to come straight.
+  [[nodiscard]] std::string lens_of(const StarterCamera& camera) const {
+    const bool bends =
+        std::any_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d != 0.0; });
+    if (bends) return fmt::format("[{:.8g}]", fmt::join(camera.distortion, ", "));
+    return o_.rectified ? "[0, 0, 0, 0, 0]"
+                        : "unknown             # k1 is estimated; zeros: pictures come straightened";
+  }
+
   [[nodiscard]] std::string camera_yaml(std::size_t c) const {
     const StarterCamera& camera = cameras_[c];
     std::string text = fmt::format("  {}:\n", yaml(camera.name));
@@ -442,15 +451,14 @@ class Starter {
     const auto& k = camera.k;
     text += fmt::format(
         "    width: {}\n    height: {}\n    fx: {:.8g}{}\n    fy: {:.8g}\n    cx: {:.8g}\n    cy: {:.8g}\n"
-        "    distortion: [{:.8g}]\n",
+        "    distortion: {}\n    readout_ms: unknown             # of a rolling shutter; 0: all rows at once\n",
         k.width, k.height, k.fx,
         camera.source.empty() ? o_.focal_px > 0.0 ? "" : "                   # a guess" : "  # " + camera.source, k.fy,
-        k.cx, k.cy, fmt::join(camera.distortion, ", "));
+        k.cx, k.cy, lens_of(camera));
     return text;
   }
 
   [[nodiscard]] std::string estimator_yaml() const {
-    const bool stills = !o_.stills.empty();
     std::string text = fmt::format(
         "# The included files of config/ are the installed ones and explain every key.\n"
         "include: [config/estimator.yaml, config/bus.yaml, config/vision.yaml, "
@@ -458,12 +466,12 @@ class Starter {
         "vision:\n"
         "  method: {}                # or {}: "
         "docs/calibrate_my_robot.md\n"
+        "  looks_file: looks.json      # the robot's colours, which a service keeps for its next start (auto)\n"
         "bus:\n"
         "  channel_prefix: {}\n",
         masks_     ? "given"
         : learned_ ? "learned_background"
-        : stills   ? "auto"
-                   : "statistics",
+                   : "auto",
         masks_     ? "auto, without masks"
         : learned_ ? "auto, where the cameras move"
                    : "single_colour, learned_background",
@@ -483,22 +491,16 @@ class Starter {
 
   /// What may be wrong in this recording besides what may be on any robot.
   [[nodiscard]] std::string state_yaml() const {
-    const bool straight = std::any_of(cameras_.begin(), cameras_.end(), [](const StarterCamera& camera) {
-      return std::all_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d == 0.0; });
-    });
     std::string text;
     if (moving_) {
       text += fmt::format("    latency: {{sd_ms: {}}}             # pictures against encoders\n", kLag_sd_ms);
     }
-    if (stills_) {
+    if (stills_ && !moving_) {
       double width = 0.0;
       for (const auto& camera : cameras_) width = std::max(width, static_cast<double>(camera.k.width));
       text +=
           fmt::format("    principal_point common: {{sd_px: {:.1f}}} # of calibrations of one camera after the other\n",
                       kCentre_share * width);
-    }
-    if (straight && !o_.rectified && cameras_.size() == 1) {
-      text += fmt::format("    distortion: {{sd: {}}}           # a lens without any is none\n", kLens_sd);
     }
     return text.empty() ? text : "estimator:\n  state:\n" + text;
   }

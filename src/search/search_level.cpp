@@ -15,6 +15,15 @@ int shorter_side(std::span<const PinholeIntrinsics> cameras) {
   return least;
 }
 
+SilhouetteModel simplified(const SilhouetteModel& model, double bound_m) {
+  // Of an open part, back-face culling shows what each triangle faces: that is not to be moved.
+  if (model.culling != FaceCulling::kNone) return model;
+  SilhouetteModel light;
+  light.culling = model.culling;
+  for (const auto& part : model.parts) light.parts.push_back(simplified_mesh(part, bound_m));
+  return light;
+}
+
 }  // namespace
 
 PinholeIntrinsics every_nth_pixel(const PinholeIntrinsics& camera, int step) {
@@ -55,12 +64,14 @@ SearchLevel search_level(const SilhouetteModel& model, std::span<const PinholeIn
   level.step = std::max(1, shorter_side(cameras) / kRows);
   for (const auto& camera : cameras) level.cameras.push_back(every_nth_pixel(camera, level.step));
   level.mesh_bound_m = search_mesh_bound_m(model, level.cameras);
-  level.model.culling = model.culling;
-  for (const auto& part : model.parts) {
-    // Of an open part, back-face culling shows what each triangle faces: that is not to be moved.
-    level.model.parts.push_back(model.culling == FaceCulling::kNone ? simplified_mesh(part, level.mesh_bound_m) : part);
-  }
+  level.model = simplified(model, level.mesh_bound_m);
   return level;
+}
+
+SilhouetteModel outline_level(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras) {
+  constexpr double kRows = 240.0, kFiner = 0.25;
+  const double rows = shorter_side(cameras);
+  return simplified(model, kFiner * search_mesh_bound_m(model, cameras) * rows / std::min(rows, kRows));
 }
 
 }  // namespace bodyschema

@@ -44,6 +44,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kPoll{50};
 constexpr milliseconds kStatusPeriod{1000};
+constexpr milliseconds kLooksPeriod{60'000};
 constexpr std::size_t kTimingsWindow = 100'000;
 constexpr int kEngineCheckFrames = 8;
 
@@ -122,10 +123,16 @@ struct Session {
         link(lcm_url, pipeline->bus().one_source_silence_s,
              pipeline->bus().longest_message_bytes(pipeline->rig().cameras.size())),
         receiver(link, pipeline->make_stream(), queue, recorder), picture_since_us(pipeline->rig().cameras.size(), -1) {
+    const VisionSetup& vision = pipeline->vision();
+    if (vision.method == SegmentationMethod::kAuto && !vision.looks_file.empty()) {
+      looks.emplace(vision.looks_file, pipeline->model_hash());
+      pipeline->know_looks(looks->read());
+    }
     if (pipeline->options().live_diagnosis) diagnosis = std::make_unique<LiveDiagnosis>(*pipeline);
   }
 
   std::unique_ptr<Pipeline> pipeline;
+  std::optional<LooksKeeper> looks;          ///< absent: not asked for
   std::unique_ptr<LiveDiagnosis> diagnosis;  ///< null: not asked for
   ObservationQueue queue;
   LcmLink link;
@@ -172,6 +179,7 @@ class Daemon {
       loop(signals);
     }
     notifier_.stopping();
+    keep_looks();
     session_->receiver.finish();
     {
       const std::lock_guard progress_lock(progress_mutex_);
@@ -293,7 +301,14 @@ class Daemon {
       if (!reloading_.valid() && signals.take_reload_request()) begin_reload();
       finish_reload();
       if (auto arrived = session_->take(kPoll)) estimate(*arrived);
+      if (monotonic_us() - looks_kept_us_ > 1000 * kLooksPeriod.count()) keep_looks();
     }
+  }
+
+  /// What the robot looks like, for the next start.
+  void keep_looks() {
+    looks_kept_us_ = monotonic_us();
+    if (session_->looks) session_->looks->write(session_->pipeline->looks());
   }
 
   bool done() {
@@ -586,6 +601,7 @@ class Daemon {
   std::int64_t sequence_ = 0;
   bool ready_ = false;
   std::future<std::unique_ptr<Pipeline>> reloading_;
+  std::int64_t looks_kept_us_ = monotonic_us();
 };
 
 }  // namespace

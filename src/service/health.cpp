@@ -192,7 +192,7 @@ std::string turned_away(const HealthFacts& f) {
   if (turned_rad <= 0.0) return "";
   return fmt::format(
       "the head has turned by {:.1f} deg from where the background was learned, masks are wrong: set "
-      "vision.method: statistics",
+      "vision.method: auto",
       degrees(turned_rad));
 }
 
@@ -210,6 +210,9 @@ std::optional<std::string> warning(const HealthFacts& f) {
     return std::string("learning the background: keep the arm out of view or moving");
   }
   if (f.estimate.state == EstimatorState::kHandNotInView) return std::string("hand not in view");
+  if (f.estimate.state == EstimatorState::kOccluded) {
+    return std::string("occluded: too little of the hand is seen to say where it is; the offsets are kept");
+  }
   if (f.estimate.state == EstimatorState::kModelMisfit) {
     return "do not use the offsets: " + f.estimate.misfit;
   }
@@ -285,10 +288,18 @@ Health assess(const HealthFacts& facts) {
       !turned.empty() && health.sentence != turned && health.level != HealthLevel::kStale) {
     health.sentence += "; " + turned;
   }
+  // What is left out of the evidence is said beside what the rest gives.
+  if (const std::string hidden = facts.estimate.hidden.text(); !hidden.empty() && health.level <= HealthLevel::kWarn) {
+    health.sentence += "; " + hidden;
+  }
   // What is wrong beside the offsets is said beside whatever is said of them.
   std::string found;
   for (const auto& cause : facts.estimate.findings.causes) {
     if (!cause.estimated) found += (found.empty() ? "" : "; ") + cause.text();
+  }
+  // What a file should say is named although it is taken into account.
+  for (const auto& cause : facts.estimate.findings.causes) {
+    if (cause.estimated && cause.effect == "distortion") health.sentence += "; taken into account: " + cause.sentence;
   }
   if (!found.empty() && health.level != HealthLevel::kStale) {
     health.sentence += "; the pictures ask for: " + found;

@@ -43,6 +43,7 @@ struct Moment {
   double contour_rms_px = 0.0;
   double likelihood = 0.0;
   double hand_sd_mm = 0.0;
+  std::string hidden{};  ///< what other things hide, in words; empty: nothing
 };
 
 struct Shown {
@@ -77,7 +78,8 @@ Json to_json(const Moment& m, std::int64_t now_us) {
   return {{"sequence", m.sequence},     {"age_s", age_s(now_us, m.at_us)},
           {"state", m.state},           {"offset_deg", m.offset_deg},
           {"sd_deg", m.sd_deg},         {"contour_rms_px", m.contour_rms_px},
-          {"likelihood", m.likelihood}, {"hand_sd_mm", m.hand_sd_mm}};
+          {"likelihood", m.likelihood}, {"hand_sd_mm", m.hand_sd_mm},
+          {"hidden", m.hidden}};
 }
 
 Json to_json(const offsets_status_t& status) {
@@ -256,6 +258,7 @@ void LivePage::add(const Estimate& estimate) {
   moment->contour_rms_px = estimate.contour_rms_px;
   moment->likelihood = estimate.best_likelihood;
   moment->hand_sd_mm = 1e3 * estimate.hand_sd_m;
+  moment->hidden = estimate.hidden.text();
   scene.joints = estimate.joint_names;
   scene.history.push_back(std::move(moment));
   if (scene.history.size() > kHistoryLength) scene.history.pop_front();

@@ -321,8 +321,9 @@ void ColourEvidence::learn(const Image& image, const BinaryMask& predicted, floa
     }
   }
   if (count < 100.0f) return;
-  const bool first = !looks.known();
+  const bool first = !looks.known() || looks.channels != image.channels;
   if (first) looks.share.assign(RobotLooks::kCells, 0.0f);
+  looks.channels = image.channels;
   const float rate = first ? 1.0f : share;
   for (std::size_t k = 0; k < RobotLooks::kCells; ++k) {
     looks.share[k] += rate * (seen[k] / count - looks.share[k]);

@@ -7,18 +7,9 @@
 #include "bodyschema/geometry/image.hpp"
 #include "bodyschema/vision/background_model.hpp"
 #include "bodyschema/vision/mask_operations.hpp"
+#include "bodyschema/vision/robot_looks.hpp"
 
 namespace bodyschema {
-
-/// The robot's colours, as learned while its outline fitted: shares of coarse colour cells, whatever the link.
-struct RobotLooks {
-  static constexpr int kBits = 4;  ///< per channel
-  static constexpr std::size_t kCells = std::size_t{1} << (3 * kBits);
-  std::vector<float> share;  ///< kCells entries that sum to one; empty: nothing is known
-  [[nodiscard]] bool known() const { return !share.empty(); }
-  /// The cell of a pixel; gray pictures use one channel's levels in full.
-  static std::size_t cell(const std::uint8_t* pixel, int channels);
-};
 
 /// Tells robot from background near a predicted outline by colours: of each side as they are near that piece of the
 /// outline in this picture, and of the robot as they were. Evidence is the log of the likelihood ratio of a pixel's

@@ -57,6 +57,29 @@ float background_change(const BackgroundModel& background, int u, int v) {
   return largest;
 }
 
+// Compression keeps colour at half the resolution and in coarse steps: its errors beside an outline are so much larger
+// than those of brightness. Squared.
+constexpr float kColourVariance = 16.0f;
+
+/// Where the difference of a pixel from its background lies on the way to the robot's, both as brightness and colour
+/// of compressed pictures tell it, by their variances.
+float share_by_brightness(const std::array<float, 3>& seen, const std::array<float, 3>& inside) {
+  // Of red, green and blue in what JPEG and video call luma.
+  constexpr std::array<float, 3> kBrightness = {0.299f, 0.587f, 0.114f};
+  float seen_brightness = 0.0f, brightness = 0.0f;
+  for (std::size_t c = 0; c < kBrightness.size(); ++c) {
+    seen_brightness += kBrightness[c] * seen[c];
+    brightness += kBrightness[c] * inside[c];
+  }
+  float along = 3.0f * seen_brightness * brightness, contrast = 3.0f * brightness * brightness;
+  for (std::size_t c = 0; c < kBrightness.size(); ++c) {
+    const float colour = inside[c] - brightness;
+    along += (seen[c] - seen_brightness) * colour / kColourVariance;
+    contrast += colour * colour / kColourVariance;
+  }
+  return contrast > 1e-6f ? along / contrast : 0.0f;
+}
+
 template <typename Function>
 void for_each_set(const BinaryMask& mask, const PixelBox& box, Function&& function) {
   for (int v = box.v0; v <= box.v1; ++v) {
@@ -137,6 +160,7 @@ void CoverageEstimator::project(const Image& image, const BackgroundModel& backg
     float difference = 0.0f;  // |I - B|^2
     float contrast = 0.0f;    // |F - B|^2
     float along = 0.0f;       // (I - B).(F - B)
+    std::array<float, 3> seen{}, inside{};
     for (std::size_t c = 0; c < channels; ++c) {
       const float b = background.mean[i * channels + c];
       const float d = static_cast<float>(colour[c]) - b;
@@ -144,11 +168,14 @@ void CoverageEstimator::project(const Image& image, const BackgroundModel& backg
       difference += d * d;
       contrast += f * f;
       along += d * f;
+      seen[c] = d;
+      inside[c] = f;
     }
     const float precision = background.precision[i];
     const float least = least_contrast_sigma * least_contrast_sigma;
     pixel.contrast = contrast * precision >= least && precision > 0.0f;
     pixel.share = contrast > 1e-6f ? along / contrast : 0.0f;
+    if (!sharp_colours && channels == 3) pixel.share = share_by_brightness(seen, inside);
     // A colour that no mixture of F and B explains is that of another part of the robot.
     const float across = difference - pixel.share * along;
     if (sharp_colours && pixel.share < 0.5f && across * precision > std::max(25.0f, 0.25f * difference * precision) &&

@@ -458,6 +458,7 @@ void LearnedBackground::update(const Image& frame, const BinaryMask* robot, bool
     // The first two frames give the noise, without which nothing can be compared.
     if (first_.empty()) {
       first_ = frame;
+      first_robot_ = robot != nullptr ? *robot : BinaryMask();
       return;
     }
     model_.noise_sd = noise_between(first_, frame);
@@ -465,8 +466,9 @@ void LearnedBackground::update(const Image& frame, const BinaryMask* robot, bool
     if (setup_.method == SegmentationMethod::kAuto) model_.noise_sd = std::min(model_.noise_sd, noise_of(frame));
     const Image first = std::move(first_);
     first_ = Image{};
+    const BinaryMask* covered = first_robot_.empty() ? nullptr : &first_robot_;
     for (int v = 0; v < model_.height; ++v) {
-      model_.channels == 1 ? update_row<1>(first, v, nullptr) : update_row<3>(first, v, nullptr);
+      model_.channels == 1 ? update_row<1>(first, v, covered) : update_row<3>(first, v, covered);
     }
     innovation_sum_ = innovation_count_ = 0.0;
   }

@@ -95,6 +95,7 @@ class LearnedBackground {
   BackgroundModel model_;
   int frames_seen_ = 0;
   Image first_;                         // until the second frame gives the noise
+  BinaryMask first_robot_;              // where it must not be learned from; empty: nowhere
   std::vector<std::uint16_t> support_;  // sightings of the background
   std::vector<float> variance_;         // of one channel around the background
   std::vector<float> rival_;            // another colour, channels interleaved

@@ -64,6 +64,20 @@ void pack_bits(const std::uint8_t* bytes, std::size_t count, std::uint64_t* word
   }
 }
 
+/// The length that one pixel of a 320x240 picture has.
+double unit_of(int width, int height) {
+  return std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0));
+}
+
+/// Lengths and areas of the configuration are those of a 320x240 picture: in larger ones they grow with it.
+VisionSetup in_pixels_of(VisionSetup setup, int width, int height) {
+  const double unit = std::max(1.0, unit_of(width, height)), area = unit * unit;
+  setup.search_px = static_cast<int>(std::lround(setup.search_px * unit));
+  setup.min_component_px = static_cast<int>(std::min(setup.min_component_px * area, 1e9));
+  setup.max_hole_px = static_cast<int>(std::min(setup.max_hole_px * area, 1e9));
+  return setup;
+}
+
 /// What is in both.
 void intersect(BinaryMask& mask, const BinaryMask& other) {
   for (int v = 0; v < mask.height(); ++v) {
@@ -91,8 +105,12 @@ constexpr float kBesideFrom_px = 2.0f, kBesideTo_px = 8.0f;
 constexpr double kQuantile = 0.95;
 constexpr float kChiSquare1 = 3.84f, kChiSquare3 = 7.81f;
 constexpr float kEdgeShare = 0.2f;
+// Levels: compression errs by less beside an outline; what differs by more there is something else than the background.
+constexpr float kMostSpoilt = 24.0f;
 // From this on it is compression: colours bleed over the outline without being mixtures of both sides.
 constexpr float kCompressed = 4.0f;
+// How much further off than its outline is looked for an arm may be whose prediction is not confirmed, px.
+constexpr double kFarOff_px = 24.0;
 // Share that one picture has in what is known of the robot's colours.
 constexpr float kLookShare = 0.05f;
 
@@ -134,8 +152,8 @@ BackgroundModel load_background(const VisionSetup& setup, const std::string& cam
 
 struct Segmenter::Impl {
   Impl(const VisionSetup& s, std::string name, int w, int h)
-      : setup(s), camera(std::move(name)), width(w), height(h), single_colour(s, w, h), learned(s, w, h),
-        detected(w, h), sure(w, h), uncertain(w, h), robot(w, h),
+      : configured(s), setup(in_pixels_of(s, w, h)), camera(std::move(name)), width(w), height(h),
+        single_colour(s, w, h), learned(s, w, h), detected(w, h), sure(w, h), uncertain(w, h), robot(w, h),
         hits((static_cast<std::size_t>(w) + 63) / 64 * 64, 0) {}
 
   void check(const Image& image);
@@ -170,7 +188,8 @@ struct Segmenter::Impl {
   /// How much more than elsewhere the background varies beside the robot: what compression makes of an outline.
   void measure_edge_noise(const Image& image);
 
-  VisionSetup setup;
+  VisionSetup configured;
+  VisionSetup setup;  ///< in pixels of these pictures
   std::string camera;
   int width;
   int height;
@@ -404,7 +423,7 @@ void Segmenter::admit(const Image& image) {
   impl_->check(image);
   if (impl_->channels == image.channels) return;
   if (impl_->channels != 0) {
-    impl_ = std::make_unique<Impl>(impl_->setup, impl_->camera, impl_->width, impl_->height);
+    impl_ = std::make_unique<Impl>(impl_->configured, impl_->camera, impl_->width, impl_->height);
   }
   impl_->channels = image.channels;
 }
@@ -533,6 +552,14 @@ void Segmenter::adapt(const Image& image, const BinaryMask& mask, const Predicte
   self.learned.update(image, &self.robot, false);
 }
 
+const RobotLooks& Segmenter::looks() const {
+  return impl_->looks;
+}
+
+void Segmenter::know_looks(RobotLooks looks) {
+  impl_->looks = std::move(looks);
+}
+
 void Segmenter::camera_turned() {
   impl_->turned = true;
 }
@@ -627,7 +654,7 @@ bool Segmenter::Impl::background_holds(const Image& image) {
 void Segmenter::Impl::measure_edge_noise(const Image& image) {
   const BackgroundModel& model = learned.model();
   const auto n = static_cast<std::size_t>(channels);
-  const auto unit = static_cast<float>(std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0)));
+  const auto unit = static_cast<float>(unit_of(width, height));
   const PixelBox& box = evidence.box();
   ratios.clear();
   for (int v = box.v0; v <= box.v1; ++v) {
@@ -641,6 +668,7 @@ void Segmenter::Impl::measure_edge_noise(const Image& image) {
         const float d = static_cast<float>(image.pixel(u, v)[c]) - model.mean[i * n + c];
         square += d * d;
       }
+      if (square > static_cast<float>(n) * kMostSpoilt * kMostSpoilt) continue;  // a held thing, somebody's arm
       ratios.push_back(square * model.precision[i]);
     }
   }
@@ -661,8 +689,8 @@ void Segmenter::Impl::forget_background() {
 
 void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryMask& valid,
                                    std::vector<std::uint8_t>& coverage, const PredictedRobot& predicted) {
-  const double unit = std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0));
-  const double reach_px = predicted.reach_px > 0.0 ? predicted.reach_px : setup.search_px * unit;
+  const double unit = unit_of(width, height);
+  const double reach_px = predicted.reach_px > 0.0 ? predicted.reach_px : setup.search_px;
   if (beside.width() != width || beside.height() != height) {
     beside = BinaryMask(width, height);
     known = BinaryMask(width, height);
@@ -704,6 +732,7 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
     sure.fill(false);
   }
   const BackgroundModel* background = holds ? &local : nullptr;
+  if (looks.channels != channels) looks = {};
   const bool everywhere = reach_px >= ColourEvidence::kEverywhere_px * unit;
   evidence.separate(seen, *predicted.silhouette, reach_px, looks, background, sure, robot);
   components.remove_small(robot, setup.min_component_px);
@@ -739,6 +768,8 @@ void Segmenter::Impl::adapt_auto(const Image& image, const BinaryMask& mask, con
   for (int v = 0; v < height; ++v) {
     for (int w = 0; w < robot.words_per_row(); ++w) robot.row(v)[w] |= beside.row(v)[w];
   }
+  // A prediction that nothing has confirmed yet may be far from the arm, whose ghost would stay in the background.
+  if (!predicted.trusted) morphology.dilate(robot, static_cast<int>(kFarOff_px * unit_of(width, height)));
   constexpr int kEager = 20;
   learned.update(seen, &robot, learned.frames_seen() < kEager);
   if (predicted.silhouette != nullptr && predicted.trusted) {

@@ -6,9 +6,8 @@ namespace bodyschema {
 
 VisionSetup VisionSetup::from(const Configuration& vision) {
   VisionSetup setup;
-  const auto method =
-      vision.choice_or("method", "learned_background",
-                       {"auto", "single_colour", "background_picture", "learned_background", "statistics", "given"});
+  const auto method = vision.choice_or(
+      "method", "auto", {"auto", "single_colour", "background_picture", "learned_background", "statistics", "given"});
   if (method == "auto") setup.method = SegmentationMethod::kAuto;
   if (method == "single_colour") setup.method = SegmentationMethod::kSingleColour;
   if (method == "background_picture") setup.method = SegmentationMethod::kBackgroundPicture;
@@ -48,6 +47,7 @@ VisionSetup VisionSetup::from(const Configuration& vision) {
   setup.min_sightings = static_cast<int>(vision.integer_or("min_sightings", setup.min_sightings, 1, 64));
   setup.search_px = static_cast<int>(vision.integer_or("search_px", setup.search_px, 2, 64));
   setup.min_piece_share = vision.number_or("min_piece_share", setup.min_piece_share, 0.0, 1.0);
+  if (vision.has("looks_file") && !vision.text("looks_file").empty()) setup.looks_file = vision.path("looks_file");
   return setup;
 }
 

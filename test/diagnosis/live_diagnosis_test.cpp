@@ -99,6 +99,38 @@ TEST(LiveDiagnosis, MeasuresALargeLatencyAndSaysWhenAJointSlipped) {
   EXPECT_TRUE(sentence.find(" UTC") != std::string::npos) << sentence;
 }
 
+/// What the estimator itself saw happen needs no second look: 10 s after a slip it is said, with its size and time.
+TEST(LiveDiagnosis, SaysWhatTheEstimatorSawSlip) {
+  const auto said = listen("slip:joint=r_elbow,value=3,at=26", 36.0);
+  ASSERT_TRUE(named(said.news.back(), "slip")) << said.per_frame.back();
+  const auto& finding = said.news.back().causes.front();
+  EXPECT_EQ(finding.joint, "r_elbow");
+  EXPECT_TRUE(finding.estimated) << "the offset follows it already";
+  EXPECT_NEAR(finding.parameters.at(0).value, 3.0, 0.3);
+  EXPECT_GT(finding.from, 0);
+}
+
+/// Other joints of the head and the arm's offsets make up for most of it, which makes it no smaller.
+TEST(LiveDiagnosis, SaysWhatTheStateHasTakenUp) {
+  const auto said = listen("head_offset:joint=neck_pitch,value=4", 40.0);
+  ASSERT_TRUE(named(said.news.back(), "head_offset")) << said.per_frame.back();
+  const auto& finding = said.news.back().causes.front();
+  EXPECT_TRUE(finding.estimated);
+  EXPECT_EQ(finding.joint, "neck_pitch");
+  EXPECT_GT(finding.hand_mm, 0.5);
+}
+
+/// Tested about one linearisation, a longer link also seems to lie aside a little: that does not change its name.
+TEST(LiveDiagnosis, ALongerLinkKeepsItsName) {
+  const auto said = listen("link_length:joint=r_shoulder_yaw,value=12", 50.0);
+  ASSERT_TRUE(named(said.news.back(), "link_length")) << said.per_frame.back();
+  for (const auto& news : said.news) {
+    if (news.causes.empty()) continue;
+    EXPECT_EQ(news.causes.front().effect, "link_length") << news.causes.front().sentence;
+    EXPECT_EQ(news.causes.front().joint, "r_elbow");
+  }
+}
+
 TEST(LiveDiagnosis, IsSilentAboutAHealthyRobotAndTheSameEveryTime) {
   const auto said = listen("", 32.0), again = listen("", 32.0);
   ASSERT_GE(said.news.size(), 3u);

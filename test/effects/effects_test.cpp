@@ -46,13 +46,13 @@ double size_of(const Corrections& c) {
   for (const auto& s : c.shapes) sum += std::abs(s.scale) + std::abs(s.dilation_px);
   const auto& k = c.camera;
   for (const auto& v : {k.rig_shift_m, k.rig_turn_rad, k.shift_m, k.turn_rad}) sum += v.lpNorm<1>();
-  for (const double x : {k.focal_scale, k.cx_px, k.cy_px, k.k1}) sum += std::abs(x);
+  for (const double x : {k.focal_scale, k.cx_px, k.cy_px, k.k1, k.readout_s}) sum += std::abs(x);
   return sum;
 }
 
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
-  EXPECT_EQ(shipped_effects().size(), 26u);
+  EXPECT_EQ(shipped_effects().size(), 27u);
   auto at = instant(r);
   at.q.setConstant(0.7);
   at.encoder.setConstant(0.8);
@@ -249,6 +249,17 @@ TEST(CameraSkew, OnlyTheRightPictureIsLater) {
   EXPECT_EQ(corrections(*effect, 20.0, at).dq.norm(), 0.0);
   at.camera = 1;
   EXPECT_NEAR(dq_deg(corrections(*effect, 20.0, at), kElbow), 0.6, 1e-12);
+}
+
+TEST(RollingShutter, IsOfTheCamerasItNames) {
+  const auto r = roles();
+  auto at = instant(r);
+  EXPECT_NEAR(corrections(*make_effect("rolling_shutter", {}, r), 20.0, at).camera.readout_s, 0.020, 1e-15);
+  ASSERT_GT(r.cameras.size(), 1u);
+  const auto second = make_effect("rolling_shutter", {"", r.cameras[1]}, r);
+  EXPECT_EQ(corrections(*second, 20.0, at).camera.readout_s, 0.0);
+  at.camera = 1;
+  EXPECT_NEAR(corrections(*second, 20.0, at).camera.readout_s, 0.020, 1e-15);
 }
 
 TEST(Geometry, LengthTiltAndHeadGoWhereTheyBelong) {

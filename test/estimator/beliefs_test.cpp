@@ -46,6 +46,32 @@ TEST_F(BeliefsOfOwnRobot, PaperModeEstimatesTheArmAlone) {
   EXPECT_GT(read(load()).state.size(), 7u);
 }
 
+TEST_F(BeliefsOfOwnRobot, ALensNobodyCalibratedIsEstimated) {
+  const auto sd = [&](const std::vector<std::string>& overrides) {
+    const auto beliefs = read(load(overrides));
+    const Belief* lens = find(beliefs.state, "distortion");
+    return lens == nullptr ? 0.0 : lens->sd.at(0);
+  };
+  EXPECT_EQ(sd({}), 0.01) << "zeros may be as wrong as other numbers are";
+  EXPECT_EQ(sd({"cameras.left.distortion=none", "cameras.right.distortion=none"}), 0.0);
+  EXPECT_EQ(sd({"cameras.left.distortion=unknown"}), 0.2);
+  EXPECT_EQ(sd({"cameras.left.distortion=[-0.3, 0, 0, 0, 0]"}), 0.01);
+  EXPECT_EQ(sd({"cameras.left.distortion=[-0.3, 0, 0, 0, 0]", "cameras.right.distortion=unknown"}), 0.2);
+  EXPECT_EQ(sd({"cameras.left.distortion=unknown", "estimator.state.distortion.sd=0.05"}), 0.05)
+      << "what the configuration believes goes first";
+  EXPECT_EQ(sd({"cameras.left.distortion=unknown", "estimator.state.distortion.sd=0"}), 0.0);
+  EXPECT_EQ(sd({"cameras.left.distortion=unknown", "estimator.mode=paper"}), 0.0);
+}
+
+TEST_F(BeliefsOfOwnRobot, HowLongPicturesAreReadOutIsEstimatedUntilTheConfigurationSaysSo) {
+  const auto beliefs = read(load());
+  ASSERT_NE(find(beliefs.state, "rolling_shutter"), nullptr);
+  EXPECT_NEAR(find(beliefs.state, "rolling_shutter")->sd.at(0), 0.015, 1e-12);
+  EXPECT_NE(find(read(load({"cameras.left.readout_ms=20"})).state, "rolling_shutter"), nullptr);
+  EXPECT_EQ(find(read(load({"cameras.left.readout_ms=20", "cameras.right.readout_ms=0"})).state, "rolling_shutter"),
+            nullptr);
+}
+
 TEST_F(BeliefsOfOwnRobot, OfTheHeadOnlyWhatMovesBothEyes) {
   const auto beliefs = read(load({"estimator.state.head_offset.sd_deg=2"}));
   for (const char* joint : {"neck_pitch", "neck_roll", "neck_yaw", "eyes_tilt"}) {

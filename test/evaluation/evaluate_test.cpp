@@ -81,6 +81,20 @@ TEST(Evaluate, ExperimentsThatRunAnotherNumberOfTrialsSaySo) {
   }
 }
 
+TEST(Evaluate, ARowOfHonestyThatDoesNotExistIsNamed) {
+  EvaluationOptions options;
+  options.experiment = "honesty";
+  const TemporaryFolder folder;
+  options.out = folder.path() / "honesty";
+  options.rows = {"heald"};
+  try {
+    evaluate(Configuration::load(kConfigs / "icub_right/evaluation.yaml"), kConfigs, options);
+    ADD_FAILURE() << "no error";
+  } catch (const ConfigurationError& error) {
+    EXPECT_STREQ(error.what(), "--rows: honesty has no row 'heald'; did you mean 'held'?");
+  }
+}
+
 TEST(Evaluate, WhatIsSetAboutEstimatingReachesTheRecordingToo) {
   SKIP_WITHOUT("eyehand-sim");
   EvaluationOptions options;

@@ -107,6 +107,15 @@ TEST_F(Lerobot, RowsBecomeReadingsAndFramesPicturesInOrderOfTime) {
   EXPECT_EQ(all[1].format, bot_core::image_t::PIXEL_FORMAT_MJPEG);
 }
 
+TEST_F(Lerobot, AnEpisodeWithoutAPictureSaysWhatIsWrongWithItsVideo) {
+  RecordedBytes records;
+  episode(records, 4, {0.0, 0.1}, {0.1, 9, 0.5, 0.2, 9, 0.4});
+  records.add(R"({"kind": "broken", "camera": "observation.images.cam", "message": "no moov atom"})");
+  end_episode(records);
+  EXPECT_THAT(error_of([&] { import(records, logs()); }),
+              AllOf(HasSubstr("no picture of any camera"), HasSubstr("observation.images.cam: no moov atom")));
+}
+
 TEST_F(Lerobot, PicturesAreKeptRawWhereThatIsAskedFor) {
   RecordedBytes records;
   episode(records, 0, {0.0}, {0.1, 9, 0.5});

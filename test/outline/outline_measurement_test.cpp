@@ -18,8 +18,8 @@ bool is_angle(Kind kind) {
 }
 
 bool moves_no_link(Kind kind) {
-  return kind == Kind::kFocal || kind == Kind::kCx || kind == Kind::kCy || kind == Kind::kK1 || kind == Kind::kScale ||
-         kind == Kind::kDilation;
+  return kind == Kind::kFocal || kind == Kind::kCx || kind == Kind::kCy || kind == Kind::kK1 ||
+         kind == Kind::kReadout || kind == Kind::kScale || kind == Kind::kDilation;
 }
 
 class OutlineOfOwnRobot : public OwnRobot {
@@ -168,6 +168,40 @@ TEST_F(OutlineOfOwnRobot, OneStepTakesASmallErrorAway) {
     EXPECT_NEAR(step, -error.size, 0.25 * std::abs(error.size))
         << "kind " << static_cast<int>(error.kind) << ", " << error.index;
   }
+}
+
+// A camera that takes its rows one after the other shows each where the arm was at that row's time.
+TEST_F(OutlineOfOwnRobot, RowsOfAMovingArmAreSeenAtTheirOwnTime) {
+  const std::size_t camera = 0;
+  const auto& k = rig_.cameras[camera].intrinsics;
+  Corrections moving = nothing_;
+  moving.qdot = Eigen::VectorXd::Zero(q_.size());
+  for (const auto joint : roles_.arm) moving.qdot[joint] = radians(20.0);
+  const std::vector<std::uint32_t> readout = {position(Kind::kReadout, 0)};
+  const CameraObservation seen = reach_.draw(q_, nothing_, camera);
+
+  // What each row sees, drawn row by row from the arm as it was then.
+  constexpr double kReadout_s = 0.030;
+  CameraObservation rolled = seen;
+  for (int v = 0; v < k.height; ++v) {
+    const double time_s = kReadout_s * (v - 0.5 * (k.height - 1)) / (k.height - 1);
+    const CameraObservation then = reach_.draw(q_ + time_s * moving.qdot, nothing_, camera);
+    const auto row = static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width);
+    std::copy_n(then.coverage.begin() + static_cast<std::ptrdiff_t>(row), k.width,
+                rolled.coverage.begin() + static_cast<std::ptrdiff_t>(row));
+    for (int u = 0; u < k.width; ++u) rolled.mask.set(u, v, then.mask.at(u, v));
+  }
+  measurement_.linearise(edges(rolled, camera), q_, moving, camera, readout, {.search_px = 10.0}, evidence_);
+  const double unaware_px = evidence_.rms_px();
+  EXPECT_NEAR(evidence_.b(0) / evidence_.A(0, 0), kReadout_s, 0.15 * kReadout_s);
+  moving.camera.readout_s = kReadout_s;
+  measurement_.linearise(edges(rolled, camera), q_, moving, camera, readout, {.search_px = 10.0}, evidence_);
+  EXPECT_LT(evidence_.rms_px(), 0.4 * unaware_px);
+  EXPECT_NEAR(evidence_.b(0) / evidence_.A(0, 0), 0.0, 0.1 * kReadout_s);
+
+  moving.qdot.setZero();
+  measurement_.linearise(edges(seen, camera), q_, moving, camera, readout, {.search_px = 10.0}, evidence_);
+  EXPECT_EQ(evidence_.A(0, 0), 0.0) << "an arm at rest tells nothing of it";
 }
 
 TEST_F(OutlineOfOwnRobot, ADilatedPredictionLiesOutsideByAsMuch) {

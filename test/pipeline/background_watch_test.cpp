@@ -128,9 +128,9 @@ TEST_F(LookingAbout, BeforeARoomIsSaidByReplay) {
   for (const bool online : {false, true}) {
     const std::string text = closing("room.log", "learned_background", online);
     EXPECT_THAT(text, HasSubstr("WARNING: the head turned by up to ")) << text;
-    EXPECT_THAT(text, HasSubstr("set vision.method: statistics"));
+    EXPECT_THAT(text, HasSubstr("set vision.method: auto"));
     const auto summary = nlohmann::json::parse(std::ifstream(folder_ / "out/summary.json"));
-    EXPECT_THAT(summary["warnings"].at(0).get<std::string>(), HasSubstr("vision.method: statistics"));
+    EXPECT_THAT(summary["warnings"].at(0).get<std::string>(), HasSubstr("vision.method: auto"));
   }
 }
 

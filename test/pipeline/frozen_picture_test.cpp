@@ -28,5 +28,21 @@ TEST(FrozenPicture, TellsARepeatedPictureFromANewOneAndHowFarTheArmMoved) {
   EXPECT_DOUBLE_EQ(change.moved_rad, 0.0);
 }
 
+TEST(FrozenPicture, SeesAnyByteThatChanged) {
+  Image image;
+  image.width = 101;
+  image.height = 1;
+  image.channels = 1;
+  image.data.assign(101, 7);
+  const Eigen::VectorXd q = Eigen::VectorXd::Zero(2);
+  FrozenPicture frozen;
+  (void)frozen.look(image, q);
+  for (auto& level : image.data) {
+    level = 8;
+    EXPECT_FALSE(frozen.look(image, q).repeated);
+    EXPECT_TRUE(frozen.look(image, q).repeated);
+  }
+}
+
 }  // namespace
 }  // namespace bodyschema

@@ -245,16 +245,25 @@ TEST_F(StarterConfiguration, FollowsTheLinksOfAWorkspaceThatWasInstalledBySymlin
   put(source / "package.xml", "<package/>");
   put(source / "meshes/visual/wedge.stl", kWedge);
   put(source / "urdf/pointer.urdf", pointer("package://pointer_description/meshes/visual/wedge.stl"));
-  for (const char* file : {"meshes/visual/wedge.stl", "urdf/pointer.urdf"}) {
+  put(source / "urdf/beside.urdf", pointer("../meshes/visual/wedge.stl"));
+  for (const char* file : {"meshes/visual/wedge.stl", "urdf/pointer.urdf", "urdf/beside.urdf"}) {
     fs::create_directories((installed / file).parent_path());
     fs::create_symlink(source / file, installed / file);
   }
-  StarterOptions o;
-  o.urdf = installed / "urdf/pointer.urdf";
-  o.out = folder_ / "mine";
-  const StarterReport report = write_starter_configuration(o);
-  EXPECT_THAT(report.text, HasSubstr("robot and meshes load"));
-  EXPECT_TRUE(report.usable);
+  // Some tools link whole packages.
+  fs::create_directories(folder_ / "linked/share");
+  fs::create_directory_symlink(source, folder_ / "linked/share/pointer_description");
+  for (const fs::path& package : {installed, folder_ / "linked/share/pointer_description"}) {
+    for (const char* urdf : {"urdf/pointer.urdf", "urdf/beside.urdf"}) {
+      StarterOptions o;
+      o.urdf = package / urdf;
+      o.out = folder_ / "mine";
+      const StarterReport report = write_starter_configuration(o);
+      EXPECT_THAT(report.text, HasSubstr("robot and meshes load")) << o.urdf;
+      EXPECT_TRUE(report.usable) << o.urdf;
+      fs::remove_all(o.out);
+    }
+  }
 }
 
 TEST_F(StarterConfiguration, FindsMeshesBesideTheFolderOfTheUrdf) {

@@ -63,5 +63,46 @@ TEST(SearchLevel, MeshesMayMoveOutlinesByATenthOfItsPixels) {
   EXPECT_NEAR(camera.fy * search_mesh_bound_m(model, cameras) / depth, 0.1, 1e-6);
 }
 
+// Pixels that differ over the outline's length, in poses all around: less than a tenth of a pixel of 720 rows, a
+// thirtieth of 240. What is left of that at so few pixels is chance.
+TEST(OutlineLevel, MovesOutlinesByNextToNothing) {
+  const SilhouetteModel hand = synthetic::hand(150000);
+  const std::vector<PinholeIntrinsics> cameras{synthetic::camera(1280, 720)};
+  const SilhouetteModel light = outline_level(hand, cameras);
+  std::size_t before = 0, after = 0;
+  for (const auto& part : hand.parts) before += part.triangles.size();
+  for (const auto& part : light.parts) after += part.triangles.size();
+  if (after == before) GTEST_SKIP() << "built without meshoptimizer";
+  EXPECT_LT(after, 0.7 * static_cast<double>(before));
+  const auto full_scorer = make_silhouette_scorer(hand, cameras, {"contour", "auto", 1});
+  const auto light_scorer = make_silhouette_scorer(light, cameras, {"contour", "auto", 1});
+  constexpr std::size_t kPoses = 8;
+  const auto X_CB = synthetic::stereo_particles(kPoses, 1, 1, 0.3f, 0.01f);
+  for (std::size_t i = 0; i < kPoses; ++i) {
+    const auto pose = std::span(X_CB).subspan(i * hand.parts.size(), hand.parts.size());
+    const BinaryMask one = full_scorer->render(pose, 0), other = light_scorer->render(pose, 0);
+    int different = 0, outline = 0;
+    for (int v = 1; v < one.height(); ++v) {
+      for (int u = 1; u < one.width(); ++u) {
+        different += one.at(u, v) != other.at(u, v) ? 1 : 0;
+        outline += (one.at(u, v) != one.at(u - 1, v) ? 1 : 0) + (one.at(u, v) != one.at(u, v - 1) ? 1 : 0);
+      }
+    }
+    ASSERT_GT(outline, 500) << "the hand is not in the picture";
+    EXPECT_LT(different, 0.1 * outline) << "pose " << i;
+  }
+}
+
+TEST(OutlineLevel, MoreRowsAskForNoFinerMeshes) {
+  const SilhouetteModel hand = synthetic::hand(60000);
+  const auto triangles = [&](const PinholeIntrinsics& camera) {
+    std::size_t sum = 0;
+    for (const auto& part : outline_level(hand, std::vector{camera}).parts) sum += part.triangles.size();
+    return sum;
+  };
+  EXPECT_EQ(triangles(synthetic::camera(1280, 720)), triangles(synthetic::camera(320, 240)));
+  EXPECT_LE(triangles(synthetic::camera(160, 120)), triangles(synthetic::camera(320, 240)));
+}
+
 }  // namespace
 }  // namespace bodyschema

@@ -80,7 +80,7 @@ TEST(Health, TheHeadHasTurnedFromItsBackground) {
   facts.cameras[1].background_turned_rad = 0.21;
   expect(facts, HealthLevel::kWarn,
          "the head has turned by 12.0 deg from where the background was learned, masks are wrong: set "
-         "vision.method: statistics");
+         "vision.method: auto");
   facts.estimate.state = EstimatorState::kDiverged;
   expect(facts, HealthLevel::kError, "diverged: ");
   expect(facts, HealthLevel::kError, "; the head has turned by 12.0 deg");
@@ -96,6 +96,16 @@ TEST(Health, EncodersLateButUsed) {
   HealthFacts facts = well();
   facts.encoder_lag_ms = 140.0;
   expect(facts, HealthLevel::kWarn, "encoders late by 140 ms");
+}
+
+TEST(Health, ALensThatIsTakenIntoAccountIsNamed) {
+  HealthFacts facts = well();
+  Finding lens;
+  lens.effect = "distortion";
+  lens.sentence = "the lens bends the picture inwards (k1) by -0.30 more than configured";
+  lens.estimated = true;
+  facts.estimate.findings.causes = {lens};
+  expect(facts, HealthLevel::kOk, "taken into account: the lens bends the picture inwards (k1) by -0.30");
 }
 
 TEST(Health, EncodersTooLateToBeUsed) {
@@ -305,6 +315,19 @@ TEST(Health, FramesThatCouldNotBeWorkedOn) {
   facts.estimated_since_last = 0;
   facts.estimate_age_ms = 2000.0;
   expect(facts, HealthLevel::kError, "2 frames of the last second could not be worked on: camera 'left'");
+}
+
+TEST(Health, WhatHidesTheHandIsSaidBesideWhatTheRestGives) {
+  HealthFacts facts = well();
+  facts.estimate.hidden = {0.35, 0.2, true};
+  expect(facts, HealthLevel::kOk, "hand known to 0.4 mm; weakest 0.71 r_wrist_prosup");
+  expect(facts, HealthLevel::kOk, "; 35 % of the hand is hidden, it holds something");
+  facts.estimate.hidden = {0.0, 0.0, true};
+  expect(facts, HealthLevel::kOk, "; the hand holds something");
+  facts.estimate.hidden = {0.95, 0.6, false};
+  facts.estimate.state = EstimatorState::kOccluded;
+  expect(facts, HealthLevel::kWarn, "occluded: too little of the hand is seen to say where it is");
+  expect(facts, HealthLevel::kWarn, "95 % of the hand is hidden");
 }
 
 TEST(Health, WhatThePicturesAskForIsSaidBesideTheRest) {

@@ -21,6 +21,9 @@ enum class EstimatorState {
   kConverged,
   kDiverged,     ///< the best prediction no longer fits the pictures; searching again
   kModelMisfit,  ///< postures agree only if something is wrong by more than is believed possible: see `misfit`
+  /// What is seen of the robot agrees with what is known, but too much of the hand is hidden to claim `converged`: the
+  /// offsets are kept.
+  kOccluded,
 };
 const char* to_string(EstimatorState state);
 
@@ -84,6 +87,16 @@ enum class FrameVerdict {
 };
 const char* to_string(FrameVerdict verdict);
 
+/// What other things hide of the robot in one frame: shares of the predicted outline, 0 to 1, that show the edge of
+/// something else or lie where a held thing is known to be. They are left out of the evidence.
+struct HiddenShare {
+  double hand = 0.0;   ///< of hand and fingers, all cameras; 0 where none of them is in view
+  double robot = 0.0;  ///< of all that is drawn of the robot
+  bool holds = false;  ///< something is known to be held: it has moved with the hand over several postures
+  /// "35 % of the hand is hidden, it holds something"; empty: nothing worth a word.
+  [[nodiscard]] std::string text() const;
+};
+
 /// Result of one step. Offsets follow the paper's sign: encoder = true + offset.
 struct Estimate {
   Microseconds utime = 0;
@@ -117,6 +130,7 @@ struct Estimate {
   std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected; in one that is absent for the
                                     ///< encoders of another
   std::vector<Pose> X_CP_nominal;   ///< the same with encoders and model as they are
+  HiddenShare hidden;               ///< mode best
   LiveFindings findings;            ///< by LiveDiagnosis, where one watches
   StageTimes times;
 

@@ -34,6 +34,7 @@ struct FrameRecord {
   double visible_share = 0.0;  ///< of the pictures' pixels: shows the robot, in the camera that shows more
   Eigen::VectorXd offset_deg;
   Eigen::MatrixXd covariance_deg2;
+  std::vector<EstimatedParameter> effects;  ///< what else is estimated
   double likelihood = 0.0;
   double total_ms = 0.0;
 };

@@ -58,6 +58,8 @@ class LogFit {
   /// After pictures were added or forgotten: parts that no posture of the log moves in the pictures, a robot's base
   /// before a still camera, show the same in all, and count as seen once.
   void weigh_parts();
+  /// Parts that are drawn, and hide what is behind them, but whose own outlines have no say from now on.
+  void leave_out(std::vector<bool> parts);
 
   [[nodiscard]] const Coordinates& coordinates() const;
   [[nodiscard]] PictureLog& log() { return log_; }
@@ -105,6 +107,7 @@ class LogFit {
   PictureLog& log_;
   std::vector<std::unique_ptr<OutlineMeasurement>> workers_;
   std::vector<double> part_weight_;
+  std::vector<bool> left_out_;  ///< by part; empty: none
 };
 
 }  // namespace bodyschema

@@ -18,6 +18,7 @@ struct CameraCorrection {
   double cx_px = 0.0;        ///< principal point, px
   double cy_px = 0.0;        ///< principal point, px
   double k1 = 0.0;           ///< radial distortion, added to the camera's own
+  double readout_s = 0.0;    ///< the last row of a picture is exposed this much later than the first
 };
 
 /// A small constant transform at a joint, between its parent link and its rotation.
@@ -51,6 +52,9 @@ struct Corrections {
   Eigen::Vector3d base_shift_m = Eigen::Vector3d::Zero();
   CameraCorrection camera;
   std::vector<ShapeCorrection> shapes;  ///< one per segment
+  /// How the joints move while a picture is read out, rad/s, RobotModel order; empty: they rest. What is known of the
+  /// instant, no correction: rows of a moving arm lie beside where its middle row says.
+  Eigen::VectorXd qdot;
 
   explicit Corrections(Eigen::Index joint_count = 0, std::size_t segment_count = 1)
       : dq(Eigen::VectorXd::Zero(joint_count)), adjustments(static_cast<std::size_t>(joint_count)),
@@ -62,6 +66,7 @@ struct Corrections {
     base_shift_m.setZero();
     camera = {};
     for (auto& s : shapes) s = {};
+    qdot.resize(0);
   }
 };
 

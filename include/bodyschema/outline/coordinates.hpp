@@ -28,6 +28,7 @@ struct Coordinate {
     kCx,           ///< px
     kCy,           ///< px
     kK1,
+    kReadout,   ///< s
     kScale,     ///< of segment `index`, relative
     kDilation,  ///< of segment `index`, px
   };

@@ -9,6 +9,7 @@
 
 #include "bodyschema/outline/coordinates.hpp"
 #include "bodyschema/outline/observed_edges.hpp"
+#include "bodyschema/outline/odd_pieces.hpp"
 #include "bodyschema/outline/robot_projection.hpp"
 #include "bodyschema/silhouette/contour_points.hpp"
 
@@ -24,6 +25,11 @@ struct OutlineSearch {
   double robust_px = 3.0;
   /// Factor on every point of a part; empty: 1. 0: the part has no say, it only hides others.
   std::vector<double> part_weight{};
+  /// Standard deviation of a residual, by which pieces of the outline that show something else are told and left out
+  /// (OddPieces); 0: none are.
+  double odd_sd_px = 0.0;
+  /// Pixels where something else is known to be: the outline is not looked for there. Null: none.
+  const BinaryMask* covered = nullptr;
 };
 
 /// The length in a camera's pictures that one pixel of a 320x240 picture has: settings in px are multiplied by it.
@@ -37,6 +43,7 @@ struct OutlinePoint {
   Eigen::Vector2d normal = Eigen::Vector2d::Zero();  ///< unit, image, outwards
   double residual_px = 0.0;                          ///< observed minus predicted, along the normal
   double weight = 1.0;                               ///< robust weight
+  bool odd = false;                                  ///< left out: it shows something else
 };
 
 /// What one picture says about some coordinates near a prediction. With G the derivatives of the predicted outline
@@ -51,6 +58,8 @@ struct OutlineEvidence {
   double misfit = 0.0;   ///< the same with one c for all: comparable however far was searched
   double sampled = 0.0;  ///< points of the predicted outline in the picture
   double matched = 0.0;  ///< ... that found a counterpart within the search
+  double covered = 0.0;  ///< points that were not looked for; not among `sampled`
+  double odd = 0.0;      ///< points of `sampled` that were left out: they show something else
   void clear(Eigen::Index coordinates);
   [[nodiscard]] double rms_px() const { return weight > 0.0 ? std::sqrt(square / weight) : 0.0; }
   [[nodiscard]] double matched_share() const { return sampled > 0.0 ? matched / sampled : 0.0; }
@@ -66,6 +75,9 @@ class OutlineMeasurement {
  public:
   OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
                      const JointRoles& roles);
+  /// @param drawn  the rendered links' meshes as outlines are taken from, one per mesh of the robot
+  OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                     const JointRoles& roles, const SilhouetteModel& drawn);
 
   [[nodiscard]] const Coordinates& coordinates() const { return coordinates_; }
   [[nodiscard]] RobotProjection& projection() { return projection_; }
@@ -82,6 +94,8 @@ class OutlineMeasurement {
               std::span<const std::uint32_t> active, const OutlineSearch& search, OutlineEvidence& out);
   /// The matched points of the last `linearise`.
   [[nodiscard]] std::span<const OutlinePoint> points() const { return points_; }
+  /// All points of the last predicted outline, but for parts without a say.
+  [[nodiscard]] std::span<const OutlineSample> samples() const { return samples_; }
 
   /// Motion of a link (position in RobotProjection::links) per unit of each active coordinate: 6 x active, translation
   /// of its frame in m and rotation vector in rad, camera frame.
@@ -91,9 +105,16 @@ class OutlineMeasurement {
  private:
   void find_motions(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera,
                     std::span<const std::uint32_t> active);
+  /// How links move while rows are read out; nothing where no row is another one's time, or nothing moves.
+  void find_shutter_motion(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
+                           std::size_t camera, std::span<const std::uint32_t> active);
+  /// Moves a point to where its row saw it.
+  void roll(const Corrections& corrections, const PinholeIntrinsics& k, OutlinePoint& point) const;
   /// @param edges  null: every point is where it is predicted
   void compare(const ObservedEdges* edges, const Corrections& corrections, std::size_t camera,
                const OutlineSearch& search, OutlineEvidence& out);
+  /// Leaves odd pieces of `samples_` out of the points.
+  void leave_out_odd(const OutlineSearch& search, double unit_px, OutlineEvidence& out);
   void differentiate(const Corrections& corrections, const PinholeIntrinsics& k, std::span<const std::uint32_t> active,
                      OutlineEvidence& out);
 
@@ -105,7 +126,10 @@ class OutlineMeasurement {
   std::vector<Pose> links_;  ///< of the prediction
   /// Velocity of a point (p_C, 1) of a link per unit of an active coordinate: [coordinate][link].
   std::vector<Eigen::Matrix<double, 3, 4>> motion_;
+  std::vector<Eigen::Matrix<double, 3, 4>> shutter_;  ///< the same per second, by link; empty: they rest
   std::vector<OutlinePoint> points_;
+  std::vector<OutlineSample> samples_;
+  OddPieces odd_pieces_;
   Eigen::MatrixXd rows_;
 };
 

@@ -15,6 +15,7 @@
 #include "bodyschema/estimator/estimator.hpp"
 #include "bodyschema/pipeline/background_watch.hpp"
 #include "bodyschema/pipeline/frozen_picture.hpp"
+#include "bodyschema/pipeline/looks_file.hpp"
 #include "bodyschema/robot/robot_model.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
 #include "bodyschema/vision/given_mask.hpp"
@@ -54,6 +55,10 @@ class Pipeline {
   /// given, the picture read last counts. `other` segments no more afterwards.
   void take_background_from(Pipeline& other);
 
+  /// `vision.method: auto`: the robot's colours by camera, as learned so far; those known from an earlier run.
+  [[nodiscard]] LooksByCamera looks() const;
+  void know_looks(const LooksByCamera& looks);
+
   /// Offline learning of the background, for methods that learn: every picture of a log, then
   /// `finish_learning`.
   void learn_from(const Observation& observation);
@@ -78,6 +83,7 @@ class Pipeline {
   [[nodiscard]] const std::optional<ErrorModel>& error_model() const { return error_model_; }
   /// What of it is not in the rig, and not found anew as joints' offsets are.
   [[nodiscard]] ErrorModel known_effects() const;
+  [[nodiscard]] const VisionSetup& vision() const { return vision_; }
   [[nodiscard]] const BusOptions& bus() const { return bus_; }
   [[nodiscard]] const EstimatorOptions& options() const { return options_; }
   [[nodiscard]] const Beliefs& beliefs() const { return beliefs_; }
@@ -140,6 +146,7 @@ class Pipeline {
   Beliefs beliefs_;
   std::vector<Eye> eyes_;  ///< those of the other thread while it looks ahead
   std::vector<PictureChange> changes_;
+  std::vector<double> readouts_s_;  ///< of each camera, as configured
   BackgroundWatch background_watch_;
   std::vector<double> background_turned_rad_;
   Estimator estimator_;

@@ -20,6 +20,9 @@ struct ReplayOptions {
   /// does, which cannot look ahead: with the arm in them it would be learned as background. Otherwise it
   /// is learned from all pictures of the log before the first estimate.
   bool learn_background_online = false;
+  /// `vision.method: auto`: the robot's colours, read at the start where the file is there, and written at the end;
+  /// absent: every replay learns them anew, and what was learned before changes no result.
+  std::optional<std::filesystem::path> looks;
   /// Who watches beside the estimator, as LiveDiagnosis does beside the service's: made for the pipeline, called after
   /// each step, may add to the estimate.
   using Watcher = std::function<void(const Observation& observation, Estimate& estimate)>;

@@ -9,6 +9,7 @@
 #include "bodyschema/geometry/binary_mask.hpp"
 #include "bodyschema/geometry/image.hpp"
 #include "bodyschema/vision/background_model.hpp"
+#include "bodyschema/vision/robot_looks.hpp"
 #include "bodyschema/vision/vision_setup.hpp"
 
 namespace bodyschema {
@@ -90,6 +91,10 @@ class Segmenter {
   void adapt(const Image& image, const BinaryMask& mask, const PredictedRobot& predicted = {});
   /// `auto`: the camera has turned since the background was learned; that is forgotten unless it looks the same.
   void camera_turned();
+
+  /// `auto`: the robot's colours as learned, or as told: those of an earlier run, of pictures with as many channels.
+  [[nodiscard]] const RobotLooks& looks() const;
+  void know_looks(RobotLooks looks);
 
   /// The background as now known; empty before anything is.
   [[nodiscard]] const BackgroundModel& background() const;

@@ -62,6 +62,9 @@ struct VisionSetup {
   /// statistics: how far from the predicted outline the robot is searched for, px.
   int search_px = 12;
 
+  /// auto: where a service keeps the robot's colours for its next start; empty: nowhere.
+  std::filesystem::path looks_file;
+
   /// given: pieces of robot with a smaller share of the largest one's pixels are taken for neither robot nor
   /// background.
   double min_piece_share = 0.05;

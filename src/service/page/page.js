@@ -117,6 +117,7 @@ function setOffsets() {
   });
   show('fit', fitted(last) ? last.contour_rms_px.toFixed(2) + ' px' : '-');
   show('hand', last.hand_sd_mm.toFixed(1) + ' mm');
+  show('hand-note', 'hand known to' + (last.hidden ? '; ' + last.hidden : ''));
 }
 
 // What recent pictures ask for outside what is estimated.

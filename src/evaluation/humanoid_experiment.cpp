@@ -1,0 +1,293 @@
+#include <spdlog/fmt/fmt.h>
+#include <unistd.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "bodyschema/calibration/calibrate.hpp"
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/core/installation.hpp"
+#include "bodyschema/core/progress_bar.hpp"
+#include "bodyschema/imports/lerobot.hpp"
+#include "drawn_outlines.hpp"
+#include "experiments.hpp"
+#include "humanoid_view.hpp"
+#include "real_trial.hpp"
+
+/// A physical humanoid that looks at its own two hands with one camera in its head (Unitree G1): sixteen episodes, each
+/// calibrated alone. Nobody knows its true offsets. What is measured: whether the answers agree with each other about
+/// where the hand is, and how far the model lies from outlines that were drawn by hand in pictures of other episodes.
+namespace bodyschema {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kEpisodesAmongAll = 3;  ///< where everything is evaluated, which takes long
+constexpr double kRate_hz = 3.0;              ///< pictures a second that a calibration looks at
+constexpr std::size_t kCommonPostures = 10;
+
+/// One episode's answer.
+struct Answer {
+  std::int64_t episode = 0;
+  Calibration calibration;
+  HumanoidModel model;
+};
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+/// Root of the mean squared distance from the mean.
+double scatter(const std::vector<double>& values) {
+  double sum = 0.0, squares = 0.0;
+  for (const double v : values) sum += v;
+  const double mean = sum / static_cast<double>(std::max<std::size_t>(1, values.size()));
+  for (const double v : values) squares += (v - mean) * (v - mean);
+  return std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, values.size())));
+}
+
+class HumanoidExperiment {
+ public:
+  explicit HumanoidExperiment(ExperimentContext& context)
+      : context_(context), set_(context.options.data / "real" / "g1"),
+        work_(fs::temp_directory_path() / fmt::format("bodyschema_{}_g1", getpid())) {}
+  ~HumanoidExperiment() {
+    std::error_code error;
+    fs::remove_all(work_, error);
+  }
+  HumanoidExperiment(const HumanoidExperiment&) = delete;
+  HumanoidExperiment& operator=(const HumanoidExperiment&) = delete;
+
+  void run() {
+    if (!fs::exists(set_)) return;
+    drawn_ = read_drawn_outlines(find_data_file("config/g1/drawn_outlines.txt"));
+    std::set<std::int64_t> episodes;
+    for (const auto& picture : drawn_) {
+      if (context_.options.experiment == "all" && episodes.size() >= kEpisodesAmongAll) break;
+      episodes.insert(picture.episode);
+    }
+    try {
+      answer(episodes);
+    } catch (const DeviceError& error) {
+      context_.table += fmt::format("\nG1: skipped, the recordings cannot be read: {}\n", error.what());
+      return;
+    }
+    if (answers_.empty()) return;
+    outlines();
+    repeats();
+    told();
+  }
+
+ private:
+  static Configuration configuration() {
+    return Configuration::load(find_data_file("config/g1/estimator.yaml"));
+  }
+
+  void answer(const std::set<std::int64_t>& episodes) {
+    const auto target = ImportTarget::from(configuration(), find_data_file("config/g1/lerobot.yaml"));
+    LerobotOptions import;
+    import.episodes = fmt::format("{}", fmt::join(episodes, ","));
+    const auto out = LerobotOutput::of(work_ / "logs");
+    import_lerobot(set_, target, import, out, [](const std::string&) {});
+    ProgressBar bar("G1", episodes.size());
+    for (const auto episode : episodes) {
+      CalibrationOptions options;
+      options.log = out.log_of(episode);
+      options.out = work_ / fmt::format("calibration_{}", episode);
+      options.picture_rate_hz = kRate_hz;
+      options.quiet = true;
+      Answer answer{episode, calibrate(configuration(), options), view_.nominal()};
+      answer.model.take(answer.calibration);
+      answers_.push_back(std::move(answer));
+      bar.set(answers_.size());
+    }
+  }
+
+  // --- outlines drawn by hand -------------------------------------------------------------------
+
+  struct Distances {
+    std::vector<double> left, right;
+    void add(const Distances& other) {
+      left.insert(left.end(), other.left.begin(), other.left.end());
+      right.insert(right.end(), other.right.begin(), other.right.end());
+    }
+    [[nodiscard]] std::vector<double> all() const {
+      auto both = left;
+      both.insert(both.end(), right.begin(), right.end());
+      return both;
+    }
+  };
+
+  [[nodiscard]] std::map<std::string, double> joints(std::int64_t episode, std::size_t row) {
+    auto& table = tables_[episode];
+    if (table.rows.empty()) table = JointTable::read_file(set_ / "joints" / fmt::format("episode_{:06}.csv", episode));
+    if (row >= table.rows.size()) {
+      throw FileError(fmt::format("config/g1/drawn_outlines.txt: episode {} has no row {}", episode, row));
+    }
+    return table.row(row);
+  }
+
+  Distances distances(const DrawnPicture& picture, const HumanoidModel& model) {
+    const auto q = joints(picture.episode, picture.row);
+    return {distances_to_outline(picture.left, view_.silhouette(model, q, "left")),
+            distances_to_outline(picture.right, view_.silhouette(model, q, "right"))};
+  }
+
+  void outlines() {
+    Distances before, after;
+    for (const auto& picture : drawn_) before.add(distances(picture, view_.nominal()));
+    std::vector<double> by_answer;
+    for (const auto& answer : answers_) {
+      Distances own;
+      for (const auto& picture : drawn_) {
+        if (picture.episode != answer.episode) own.add(distances(picture, answer.model));
+      }
+      by_answer.push_back(median(own.all()));
+      after.add(own);
+    }
+    context_.table += fmt::format(
+        "\n{:<44} {:>9} {:>9} {:>9} {:>9}\n", fmt::format("G1, head camera, {} episodes alone", answers_.size()), "before",
+        "after", "worst", "demanded");
+    const auto row = [&](const char* name, const std::vector<double>& a, const std::vector<double>& b, double worst) {
+      context_.table += fmt::format("{:<44} {:>9.1f} {:>9.1f} {:>9} {:>9}\n", name, median(a), median(b),
+                                    worst > 0.0 ? fmt::format("{:.1f}", worst) : "", worst > 0.0 ? "4" : "");
+    };
+    row("drawn outlines of other episodes, px, median", before.all(), after.all(),
+        *std::max_element(by_answer.begin(), by_answer.end()));
+    row("  right arm", before.right, after.right, 0.0);
+    row("  left arm", before.left, after.left, 0.0);
+    context_.summary["real"]["g1"]["outlines"] = {
+        {"pictures", drawn_.size()},          {"before_px", median(before.all())}, {"after_px", median(after.all())},
+        {"right_px", median(after.right)},    {"left_px", median(after.left)},
+        {"right_before_px", median(before.right)}, {"left_before_px", median(before.left)},
+        {"after_px_by_episode", by_answer}};
+    figure();
+  }
+
+  /// One picture that the drawn episode's answer did not see: outlines, no photograph.
+  void figure() {
+    const auto picture = std::max_element(drawn_.begin(), drawn_.end(), [](const auto& a, const auto& b) {
+      return a.right.size() + a.left.size() < b.right.size() + b.left.size();
+    });
+    const auto other = std::find_if(answers_.begin(), answers_.end(),
+                                    [&](const auto& answer) { return answer.episode != picture->episode; });
+    if (other == answers_.end()) return;
+    view_.write_figure(*picture, joints(picture->episode, picture->row), other->model,
+                       context_.options.out / "g1_outlines.png");
+  }
+
+  // --- do the answers agree ---------------------------------------------------------------------
+
+  /// Where each answer has the right hand in the camera, in postures that are the same for all.
+  void repeats() {
+    std::vector<double> mm, deg;
+    std::vector<double> nominal_mm;
+    const std::size_t step = std::max<std::size_t>(1, drawn_.size() / kCommonPostures);
+    for (std::size_t i = 0; i < drawn_.size() && mm.size() < kCommonPostures; i += step) {
+      const auto q = joints(drawn_[i].episode, drawn_[i].row);
+      std::vector<Pose> poses;
+      for (const auto& answer : answers_) poses.push_back(view_.hand(answer.model, q));
+      Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+      for (const auto& pose : poses) middle += pose.translation() / static_cast<double>(poses.size());
+      double squares = 0.0, turns = 0.0;
+      const Eigen::Matrix3d R = mean_rotation(poses);
+      for (const auto& pose : poses) {
+        squares += (pose.translation() - middle).squaredNorm();
+        turns += std::pow(rotation_distance(pose.linear(), R), 2);
+      }
+      const auto n = static_cast<double>(poses.size());
+      mm.push_back(1e3 * std::sqrt(squares / n));
+      deg.push_back(degrees(std::sqrt(turns / n)));
+      nominal_mm.push_back(1e3 * (view_.hand(view_.nominal(), q).translation() - middle).norm());
+    }
+    const auto rms = [](const std::vector<double>& values) {
+      double sum = 0.0;
+      for (const double v : values) sum += v * v;
+      return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, values.size())));
+    };
+    context_.table += fmt::format("{:<44} {:>9} {:>9.1f} {:>9.1f} {:>9}\n", "right hand in the camera, mm, scatter", "",
+                                  rms(mm), *std::max_element(mm.begin(), mm.end()), 5);
+    context_.table += fmt::format("{:<44} {:>9} {:>9.2f} {:>9.2f} {:>9}\n", "  deg", "", rms(deg),
+                                  *std::max_element(deg.begin(), deg.end()), 1);
+    context_.table += fmt::format("{:<44} {:>9.1f}\n", "  nominal model from their mean, mm", rms(nominal_mm));
+    context_.summary["real"]["g1"]["repeat"] = {
+        {"postures", mm.size()}, {"hand_mm", rms(mm)}, {"hand_deg", rms(deg)}, {"nominal_from_mean_mm", rms(nominal_mm)}};
+  }
+
+  static Eigen::Matrix3d mean_rotation(const std::vector<Pose>& poses) {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    for (const auto& pose : poses) sum += pose.linear();
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    return svd.matrixU() * svd.matrixV().transpose();
+  }
+
+  /// What is told, how that repeats, and how the answers call themselves.
+  void told() {
+    std::map<std::string, std::vector<double>> offsets;
+    std::size_t fewest = 1000, most = 0;
+    std::map<std::string, int> states;
+    std::map<std::string, std::map<std::string, int>> why;
+    std::vector<double> x, y, z, focal;
+    for (const auto& answer : answers_) {
+      std::size_t count = 0;
+      for (const auto& joint : answer.calibration.joints) {
+        if (!joint.name.starts_with("right")) continue;
+        count += joint.told;
+        if (joint.told) {
+          offsets[joint.name].push_back(degrees(joint.offset_rad));
+        } else {
+          ++why[joint.name][joint.untold_why];
+        }
+      }
+      fewest = std::min(fewest, count);
+      most = std::max(most, count);
+      ++states[to_string(answer.calibration.state)];
+      const auto& camera = answer.calibration.cameras.front();
+      x.push_back(1e3 * camera.X_link_optical.translation().x());
+      y.push_back(1e3 * camera.X_link_optical.translation().y());
+      z.push_back(1e3 * camera.X_link_optical.translation().z());
+      focal.push_back(camera.intrinsics.fx);
+    }
+    double worst = 0.0;
+    for (const auto& [name, list] : offsets) worst = std::max(worst, scatter(list));
+    context_.table += fmt::format("{:<44} {:>9} {:>9} {:>9} {:>9}\n", "joints of the right arm told, fewest and most", "",
+                                  fewest, most, 4);
+    context_.table += fmt::format("{:<44} {:>9} {:>9.2f} {:>9} {:>9}\n", "their offsets, deg, scatter of the worst", "",
+                                  worst, "", 0.5);
+    context_.table += fmt::format("{:<44} {:>9} {:>9.1f} {:>9} {:>9}\n", "camera's place, mm, scatter", "",
+                                  std::sqrt(std::pow(scatter(x), 2) + std::pow(scatter(y), 2) + std::pow(scatter(z), 2)),
+                                  "", 5);
+    context_.table += fmt::format("{:<44} {:>9} {:>9.1f}\n", "focal length, px, scatter", "", scatter(focal));
+    for (const auto& [state, count] : states) context_.table += fmt::format("  {}: {}\n", state, count);
+    for (const auto& [joint, reasons] : why) {
+      const auto usual = std::max_element(reasons.begin(), reasons.end(),
+                                          [](const auto& a, const auto& b) { return a.second < b.second; });
+      context_.table += fmt::format("  {}: {} of {}: {}\n", joint, usual->second, answers_.size(), usual->first);
+    }
+    auto& entry = context_.summary["real"]["g1"]["told"];
+    entry = {{"fewest", fewest}, {"most", most}, {"worst_scatter_deg", worst}};
+    for (const auto& [state, count] : states) entry["states"][state] = count;
+  }
+
+  ExperimentContext& context_;
+  fs::path set_, work_;
+  HumanoidView view_{configuration()};
+  std::vector<DrawnPicture> drawn_;
+  std::map<std::int64_t, JointTable> tables_;
+  std::vector<Answer> answers_;
+};
+
+}  // namespace
+
+void run_humanoid(ExperimentContext& context) {
+  if (!fs::exists(context.options.data / "real" / "g1")) return;
+  HumanoidExperiment(context).run();
+}
+
+}  // namespace bodyschema
