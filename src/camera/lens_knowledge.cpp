@@ -19,6 +19,7 @@ std::string word_of(const Configuration& camera) {
 
 LensKnowledge lens_knowledge(const Configuration& camera) {
   if (!camera.has("distortion")) return LensKnowledge::kUnknown;
+  if (camera.is_mapping("distortion")) camera.fail("distortion", kExpected);
   const std::string word = word_of(camera);
   if (word == "none") return LensKnowledge::kNone;
   if (word == "unknown") return LensKnowledge::kUnknown;

@@ -123,7 +123,8 @@ struct Estimator::Impl {
         considered(Considered::beside(state_at_first, beliefs.tolerances)),
         outlines(particles_only() ? silhouette_model(*robot, setup)
                                   : outline_level(silhouette_model(*robot, setup), rig.intrinsics())),
-        model(robot, setup, rig, known.roles(), state_at_first, considered.effects, &outlines), joints(model.state().joints()),
+        model(robot, setup, rig, known.roles(), state_at_first, considered.effects, &outlines),
+        joints(model.state().joints()),
         scorer(model, silhouette_model(*robot, setup), particles_only() ? nullptr : &outlines, rig.intrinsics(),
                options.silhouette, options.filter.particles),
         filter(joints, options.filter), memory(memory_layout(model.state(), considered), options.memory),
@@ -776,7 +777,7 @@ struct Estimator::Impl {
   /// The silhouette of parts placed by a state, as the lens shows it.
   [[nodiscard]] BinaryMask drawn(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera, const Exposure& exposure,
                                  const Eigen::VectorXd& x) {
-    Corrections corrections;
+    Corrections corrections = model.roles().no_corrections();
     model.corrections(exposure, x, corrections);
     return bent_silhouette(scorer.render(X_CB, camera), rig.cameras[camera].intrinsics, corrections.camera.k1);
   }

@@ -87,8 +87,10 @@ std::vector<Belief> camera_beliefs(const StereoRig& rig) {
   return list;
 }
 
-/// Of what a lens does beyond its configuration; where cameras differ, of the one that is known least. Nothing where the
-/// configuration says what to believe.
+namespace {
+
+/// Of what a lens does beyond its configuration; where cameras differ, of the one that is known least. Nothing where
+/// the configuration says what to believe.
 std::optional<Belief> lens_belief(const Configuration& configuration, const StereoRig& rig) {
   if (configuration.section("estimator").section("state").has("distortion")) return std::nullopt;
   double sd = 0.0;
@@ -104,6 +106,8 @@ bool shutters_known(const Configuration& cameras, const StereoRig& rig) {
   return std::all_of(rig.cameras.begin(), rig.cameras.end(),
                      [&](const CameraModel& camera) { return readout_s(cameras.section(camera.name)).has_value(); });
 }
+
+}  // namespace
 
 Beliefs Beliefs::from(const Configuration& configuration, const JointRoles& roles, const StereoRig& rig,
                       const EstimatorOptions& options) {

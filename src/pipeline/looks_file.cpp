@@ -29,7 +29,9 @@ constexpr int kShift = 8 - RobotLooks::kBits;
 std::vector<int> levels_of(std::size_t cell, int channels) {
   if (channels == 1) return {static_cast<int>(cell)};
   constexpr std::size_t kMask = (std::size_t{1} << RobotLooks::kBits) - 1;
-  const auto level = [&](int place) { return static_cast<int>((cell >> (place * RobotLooks::kBits)) & kMask) << kShift; };
+  const auto level = [&](int place) {
+    return static_cast<int>((cell >> (place * RobotLooks::kBits)) & kMask) << kShift;
+  };
   return {level(2), level(1), level(0)};
 }
 
@@ -102,7 +104,9 @@ LooksByCamera read_looks(const fs::path& file, const std::string& robot) {
   if (!stream) throw FileError(file.string() + ": cannot be read");
   const Json json = Json::parse(stream, nullptr, false);
   if (json.is_discarded()) throw FileError(file.string() + ": is not JSON");
-  const auto is = [&](const char* key, const Json& value) { return json.is_object() && json.value(key, Json()) == value; };
+  const auto is = [&](const char* key, const Json& value) {
+    return json.is_object() && json.value(key, Json()) == value;
+  };
   if (!is("kind", kKind)) wrong(file, "kind", fmt::format("'{}'", kKind));
   if (!is("version", kVersion)) wrong(file, "version", std::to_string(kVersion));
   if (!is("robot", robot)) wrong(file, "robot", robot + ", as this robot's model: these are the colours of another");

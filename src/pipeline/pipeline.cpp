@@ -35,7 +35,8 @@ std::vector<double> readouts_of(const Configuration& cameras, const StereoRig& r
   return readouts_s;
 }
 
-/// What of an extended model is not in the rig already, and not found anew; and what the configuration says of shutters.
+/// What of an extended model is not in the rig already, and not found anew; and what the configuration says of
+/// shutters.
 ErrorModel effects_beside(const std::optional<ErrorModel>& model, const std::shared_ptr<const RobotModel>& robot,
                           const RobotSetup& setup, const StereoRig& rig, const std::vector<double>& readouts_s) {
   ErrorModel rest(JointRoles::of(robot, setup, rig));
@@ -77,8 +78,10 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
       error_model_(load_error_model(setup_, robot_, StereoRig::from(configuration.section("cameras")))),
       rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
       beliefs_(Beliefs::from(configuration, JointRoles::of(robot_, setup_, rig_), rig_, options_)),
-      readouts_s_(readouts_of(configuration.section("cameras"), rig_)), background_watch_(robot_, links_of(rig_)), background_turned_rad_(rig_.cameras.size(), 0.0),
-      estimator_(robot_, setup_, rig_, beliefs_, options_, effects_beside(error_model_, robot_, setup_, rig_, readouts_s_)),
+      readouts_s_(readouts_of(configuration.section("cameras"), rig_)), background_watch_(robot_, links_of(rig_)),
+      background_turned_rad_(rig_.cameras.size(), 0.0),
+      estimator_(robot_, setup_, rig_, beliefs_, options_,
+                 effects_beside(error_model_, robot_, setup_, rig_, readouts_s_)),
       configuration_hash_(configuration.hash()), model_hash_(model_hash_of(setup_, *robot_, error_model_)) {
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
@@ -90,7 +93,8 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
     }
     if (lens_knowledge(configuration.section("cameras").section(camera.name)) == LensKnowledge::kUnknown) {
       spdlog::warn(
-          "camera '{}' has no distortion in the configuration: how its lens bends pictures (k1) is estimated beside the "
+          "camera '{}' has no distortion in the configuration: how its lens bends pictures (k1) is estimated beside "
+          "the "
           "offsets, which takes longer and tells them less well; set cameras.{}.distortion, to zeros where pictures "
           "come straightened",
           camera.name, camera.name);

@@ -418,9 +418,11 @@ class Starter {
 
   /// A calibration that found nothing is rarely one: k1 is estimated then, unless pictures are said to come straight.
   [[nodiscard]] std::string lens_of(const StarterCamera& camera) const {
-    const bool bends = std::any_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d != 0.0; });
+    const bool bends =
+        std::any_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d != 0.0; });
     if (bends) return fmt::format("[{:.8g}]", fmt::join(camera.distortion, ", "));
-    return o_.rectified ? "[0, 0, 0, 0, 0]" : "unknown             # k1 is estimated; zeros: pictures come straightened";
+    return o_.rectified ? "[0, 0, 0, 0, 0]"
+                        : "unknown             # k1 is estimated; zeros: pictures come straightened";
   }
 
   [[nodiscard]] std::string camera_yaml(std::size_t c) const {

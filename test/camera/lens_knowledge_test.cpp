@@ -21,11 +21,11 @@ TEST(LensKnowledge, IsWhatTheConfigurationSays) {
 }
 
 TEST(LensKnowledge, RefusesAnythingElse) {
-  for (const char* yaml : {", distortion: straight", ", distortion: 0.1", ", distortion: [0, 0, 0, 0]",
-                           ", distortion: {k1: 0.1}"}) {
+  for (const char* yaml :
+       {", distortion: straight", ", distortion: 0.1", ", distortion: [0, 0, 0, 0]", ", distortion: {k1: 0.1}"}) {
     EXPECT_THAT([&] { of(yaml); },
-                testing::ThrowsMessage<ConfigurationError>(testing::AllOf(
-                    testing::HasSubstr("left.distortion"), testing::HasSubstr("k1, k2, p1, p2, k3"))))
+                testing::ThrowsMessage<ConfigurationError>(
+                    testing::AllOf(testing::HasSubstr("left.distortion"), testing::HasSubstr("k1, k2, p1, p2, k3"))))
         << yaml;
   }
 }

@@ -46,13 +46,13 @@ double size_of(const Corrections& c) {
   for (const auto& s : c.shapes) sum += std::abs(s.scale) + std::abs(s.dilation_px);
   const auto& k = c.camera;
   for (const auto& v : {k.rig_shift_m, k.rig_turn_rad, k.shift_m, k.turn_rad}) sum += v.lpNorm<1>();
-  for (const double x : {k.focal_scale, k.cx_px, k.cy_px, k.k1}) sum += std::abs(x);
+  for (const double x : {k.focal_scale, k.cx_px, k.cy_px, k.k1, k.readout_s}) sum += std::abs(x);
   return sum;
 }
 
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
-  EXPECT_EQ(shipped_effects().size(), 26u);
+  EXPECT_EQ(shipped_effects().size(), 27u);
   auto at = instant(r);
   at.q.setConstant(0.7);
   at.encoder.setConstant(0.8);

@@ -18,8 +18,8 @@ bool is_angle(Kind kind) {
 }
 
 bool moves_no_link(Kind kind) {
-  return kind == Kind::kFocal || kind == Kind::kCx || kind == Kind::kCy || kind == Kind::kK1 || kind == Kind::kReadout || kind == Kind::kScale ||
-         kind == Kind::kDilation;
+  return kind == Kind::kFocal || kind == Kind::kCx || kind == Kind::kCy || kind == Kind::kK1 ||
+         kind == Kind::kReadout || kind == Kind::kScale || kind == Kind::kDilation;
 }
 
 class OutlineOfOwnRobot : public OwnRobot {

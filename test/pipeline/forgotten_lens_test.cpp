@@ -18,10 +18,10 @@ struct Outcome {
 };
 
 Outcome through_forgotten_lenses(const std::string& distortion) {
-  const auto configuration = Configuration::load(
-      std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml",
-      {"vision.method=single_colour", "silhouette.engine=contour", "cameras.left.distortion=" + distortion,
-       "cameras.right.distortion=" + distortion});
+  const auto configuration =
+      Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/evaluation.yaml",
+                          {"vision.method=single_colour", "silhouette.engine=contour",
+                           "cameras.left.distortion=" + distortion, "cameras.right.distortion=" + distortion});
   Pipeline pipeline(configuration);
   auto settings = simulator::SimulatorSettings::from(configuration.section("simulator"));
   settings.camera_rate_hz = 8.0;
