@@ -29,6 +29,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kEpisodesAmongAll = 3;  ///< where everything is evaluated, which takes long
 constexpr double kRate_hz = 3.0;              ///< pictures a second that a calibration looks at
 constexpr std::size_t kCommonPostures = 10;
+constexpr double kRows_hz = 30.0;  ///< of the recording
 
 /// One episode's answer.
 struct Answer {
@@ -133,8 +134,19 @@ class HumanoidExperiment {
     return table.row(row);
   }
 
+  /// The same as a late picture of that row shows them.
+  [[nodiscard]] std::map<std::string, double> joints_shown(const DrawnPicture& picture, const HumanoidModel& model) {
+    const double at = std::max(0.0, static_cast<double>(picture.row) - kRows_hz * model.lag_s);
+    auto q = joints(picture.episode, static_cast<std::size_t>(at));
+    const double share = at - std::floor(at);
+    if (share <= 0.0) return q;
+    const auto next = joints(picture.episode, static_cast<std::size_t>(at) + 1);
+    for (auto& [joint, angle] : q) angle += share * (next.at(joint) - angle);
+    return q;
+  }
+
   Distances distances(const DrawnPicture& picture, const HumanoidModel& model) {
-    const auto q = joints(picture.episode, picture.row);
+    const auto q = joints_shown(picture, model);
     return {distances_to_outline(picture.left, view_.silhouette(model, q, "left")),
             distances_to_outline(picture.right, view_.silhouette(model, q, "right"))};
   }
@@ -178,7 +190,7 @@ class HumanoidExperiment {
     const auto other = std::find_if(answers_.begin(), answers_.end(),
                                     [&](const auto& answer) { return answer.episode != picture->episode; });
     if (other == answers_.end()) return;
-    view_.write_figure(*picture, joints(picture->episode, picture->row), other->model,
+    view_.write_figure(*picture, joints_shown(*picture, other->model), other->model,
                        context_.options.out / "g1_outlines.png");
   }
 
