@@ -63,6 +63,7 @@ constexpr std::array kReaches = {40.0, 30.0, 20.0, 12.0, 8.0, 6.0, 5.0};
 constexpr std::array kReachesMoved = {16.0, 12.0, 8.0, 6.0, 5.0, 4.0, 4.0};
 /// Physical. Outlines that may be further off than this, px of a 320x240 picture, are looked for by what moved.
 constexpr double kRough_px = 30.0, kAnywhere_px = 1e3;
+constexpr double kNearlyAll_sd = 2.0;  ///< statistical
 constexpr std::size_t kRawKept = 64;  ///< observations of such a log whose pictures are looked at
 
 class Calibrator {
@@ -173,8 +174,10 @@ class Calibrator {
   /// Masks and fit by turns, masks ever nearer to what the fit of all postures says.
   void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
     const auto& reaches = best ? kReachesMoved : kReaches;
-    for (const double reach_px : reaches) {
-      if (reach_px > believed_px_ && reach_px > reaches.back()) continue;
+    for (std::size_t round = 0; round < reaches.size(); ++round) {
+      const double reach_px = reaches[round];
+      // From the shortest reach that holds nearly all of the robot: what rests beyond it is taken for background.
+      if (!best && round + 1 < reaches.size() && reaches[round + 1] >= kNearlyAll_sd * believed_px_) continue;
       if (!best) {
         masks.about(nominal(fit), reach_px);
       } else {
