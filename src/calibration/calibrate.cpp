@@ -86,7 +86,6 @@ class Calibrator {
     if (raw()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
     loose_ = loose_fingers(*log_, Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options()));
     if (masks) believed_px_ = believed_px();
-    if (std::getenv("BS_DEBUG")) fmt::print("believed {} px\n", believed_px_);
     const bool still = masks && believed_px_ > kRough_px && masks->by_what_moved() && most_moved();
     find_cameras(still);
     LogFit fit(*log_, threads_of(options_));
@@ -187,7 +186,6 @@ class Calibrator {
       const auto x = best ? best->state().x() : Eigen::VectorXd();
       BatchFit next = started(fit, x);
       next.run(reach_px, {});
-      if (std::getenv("BS_DEBUG")) fmt::print("reach {} misfit {} rms {}\n", reach_px, next.misfit(), next.noise().front().sd_px());
       best.emplace(std::move(next));
     }
   }
