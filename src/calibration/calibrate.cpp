@@ -18,7 +18,7 @@
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "bodyschema/evidence/outline_distance.hpp"
 #include "bodyschema/pipeline/watched_log.hpp"
-#include "believed_outline.hpp"
+#include "beyond_model.hpp"
 #include "calibration_files.hpp"
 #include "loose_fingers.hpp"
 #include "next_posture.hpp"
@@ -61,9 +61,11 @@ bool to_be_searched(const CameraModel& camera) {
 /// nothing is known but what is configured, then after a fit of what moved.
 constexpr std::array kReaches = {40.0, 30.0, 20.0, 12.0, 8.0, 6.0, 5.0};
 constexpr std::array kReachesMoved = {16.0, 12.0, 8.0, 6.0, 5.0, 4.0, 4.0};
-/// Physical. Outlines that may be further off than this, px of a 320x240 picture, are looked for by what moved.
-constexpr double kRough_px = 30.0, kAnywhere_px = 1e3;
-constexpr double kNearlyAll_sd = 2.0;  ///< statistical
+static_assert(kReaches.size() == kReachesMoved.size());
+constexpr double kWide_px = 12.0;  ///< ... and then once more, to see whether it makes a difference
+constexpr std::array kReachesAgain = {6.0, 4.0, 4.0};
+constexpr int kMostChecks = 3;
+constexpr double kSettled_sd = 2.0;   ///< statistical
 constexpr std::size_t kRawKept = 64;  ///< observations of such a log whose pictures are looked at
 
 class Calibrator {
@@ -75,24 +77,30 @@ class Calibrator {
   }
 
   Calibration run() {
-    WatchedLog watched = watch_log(
-        pipeline_,
-        {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .kept = raw() ? kRawKept : 12,
-         .quiet = options_.quiet}, false);
+    WatchedLog watched = watch_log(pipeline_,
+                                   {.log = options_.log,
+                                    .picture_rate_hz = options_.picture_rate_hz,
+                                    .kept = raw() ? kRawKept : 12,
+                                    .quiet = options_.quiet},
+                                   false);
     refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);
     log_ = &watched.pictures;
     if (!options_.quiet) bar_.emplace("calibration", 100);
     std::optional<RawPictures> masks;
     if (raw()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
-    loose_ = loose_fingers(*log_, Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options()));
-    if (masks) believed_px_ = believed_px();
-    const bool still = masks && believed_px_ > kRough_px && masks->by_what_moved() && most_moved();
-    find_cameras(still);
+    bool begun = !raw();  // there are masks to begin with
+    if (raw() && masks->cameras_stood_still()) {
+      masks->by_what_moved();
+      begun = most_moved();
+    }
+    find_cameras(begun);
     LogFit fit(*log_, threads_of(options_));
+    loose_ = loose_fingers(*log_, Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options()));
     fit.leave_out(loose_);
     std::optional<BatchFit> best;
-    if (!masks || still) best.emplace(fitted(fit, starts_));
-    if (masks) with_better_masks(*masks, fit, best);
+    if (begun) best.emplace(fitted(fit, starts_));
+    if (raw()) with_better_masks(*masks, fit, best);
+    if (!raw() && !pipeline_.learns_background()) without_strangers(fit, best);
     progress(0.6);
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
@@ -121,9 +129,9 @@ class Calibrator {
       if (!to_be_searched(rig_.cameras[c])) continue;
       if (raw() && !moved) {
         throw DataError(
-            fmt::format("{}: camera '{}' is to be found, which takes masks of the robot, and vision.method "
-                        "statistics makes none before it is known where the robot is; give masks (vision.method: "
-                        "given) or say roughly where the camera is (cameras.{}.pose: roughly)",
+            fmt::format("{}: camera '{}' is to be found, which takes masks of the robot, and none are to be had "
+                        "before it is known where the robot is, as no background stands still in the pictures; give "
+                        "masks (vision.method: given) or say roughly where the camera is (cameras.{}.pose: roughly)",
                         options_.log.string(), rig_.cameras[c].name, rig_.cameras[c].name));
       }
       CameraSearch search(*log_, threads_of(options_));
@@ -161,34 +169,60 @@ class Calibrator {
     return static_cast<double>(std::count(shown.begin(), shown.end(), true)) >=
            kLeastSeen * static_cast<double>(shown.size());
   }
-
-  /// How far off the robot's outlines may be by what is configured; anything where a camera is to be found.
-  [[nodiscard]] double believed_px() {
-    if (std::any_of(rig_.cameras.begin(), rig_.cameras.end(), to_be_searched)) return kAnywhere_px;
-    LogFit fit(*log_, 1);
-    const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
-    return believed_outline_sd_px(fit, State(log_->roles(), beliefs.state), loose_);
-  }
-
-  /// Masks and fit by turns, masks ever nearer to what the fit of all postures says.
+  /// Masks and fit by turns, masks ever nearer to what the fit of all postures says, until it makes no difference how
+  /// far they looked: masks that are made about a prediction follow it, right or wrong, but the wider they look the
+  /// less.
   void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
-    const auto& reaches = best ? kReachesMoved : kReaches;
-    for (std::size_t round = 0; round < reaches.size(); ++round) {
-      const double reach_px = reaches[round];
-      // From the shortest reach that holds nearly all of the robot: what rests beyond it is taken for background.
-      if (!best && round + 1 < reaches.size() && reaches[round + 1] >= kNearlyAll_sd * believed_px_) continue;
-      if (!best) {
-        masks.about(nominal(fit), reach_px);
-      } else {
-        masks.about(best->at().corrections, reach_px);
-      }
+    for (const double reach_px : best ? kReachesMoved : kReaches) with_masks_anew(masks, fit, best, reach_px);
+    for (int again = 0; again < kMostChecks; ++again) {
+      PictureLog near = masks.about(best->at().corrections, kWide_px);
       fit.refresh();
-      const auto x = best ? best->state().x() : Eigen::VectorXd();
-      BatchFit next = started(fit, x);
-      next.run(reach_px, {});
-      best.emplace(std::move(next));
+      BatchFit wide = started(fit, best->state().x());
+      wide.run(kWide_px, {});
+      unsettled_ = moved_joint(best->state(), best->estimate(), wide.estimate());
+      if (unsettled_.empty()) {
+        *log_ = std::move(near);
+        fit.refresh();
+        return;
+      }
+      best.emplace(std::move(wide));
+      for (const double reach_px : kReachesAgain) with_masks_anew(masks, fit, best, reach_px);
     }
   }
+
+  void with_masks_anew(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best, double reach_px) {
+    masks.about(best ? best->at().corrections : nominal(fit), reach_px);
+    fit.refresh();
+    BatchFit next = started(fit, best ? best->state().x() : Eigen::VectorXd());
+    next.run(reach_px, {});
+    best.emplace(std::move(next));
+  }
+
+  /// A joint that two answers about one state place further apart than either claims to know it; empty: none.
+  static std::string moved_joint(const State& state, const MemoryEstimate& a, const MemoryEstimate& b) {
+    for (Eigen::Index k = 0; k < state.joints(); ++k) {
+      const double sd = std::sqrt(std::max(a.covariance(k, k), b.covariance(k, k)));
+      if (std::abs(a.x[k] - b.x[k]) > kSettled_sd * sd) return state.parameters()[static_cast<std::size_t>(k)].name;
+    }
+    return {};
+  }
+
+  /// What the masks show beyond the model is left out: a tool, somebody's arm.
+  void without_strangers(LogFit& fit, std::optional<BatchFit>& best) {
+    if (!is_near(*best)) return;
+    const auto beyond = beyond_model(*log_, best->at().corrections);
+    if (beyond.pictures == 0) return;
+    leave_out(*log_, beyond);
+    fit.refresh();
+    const Eigen::VectorXd x = best->state().x();
+    best.emplace(started(fit, x));
+    best->run(0.0, {});
+    if (beyond.on_link.empty()) return;
+    result_.remarks.push_back("something is on " + beyond.on_link +
+                              " that the robot's model does not have: what the masks show of it is left out");
+  }
+
+  [[nodiscard]] static bool is_near(const BatchFit& batch) { return batch.noise().front().sd_px() < kNear_px; }
 
   [[nodiscard]] BatchFit started(LogFit& fit, const Eigen::VectorXd& x) const {
     const auto roles = log_->roles();
@@ -199,9 +233,7 @@ class Calibrator {
   }
 
   /// Encoders and cameras as they are configured.
-  std::vector<Corrections> nominal(LogFit& fit) const {
-    return fit.predict(ErrorModel(log_->roles()), {}).corrections;
-  }
+  std::vector<Corrections> nominal(LogFit& fit) const { return fit.predict(ErrorModel(log_->roles()), {}).corrections; }
 
   // --- fit --------------------------------------------------------------------------------------
 
@@ -590,6 +622,14 @@ class Calibrator {
                              "better where the cameras are.",
                              result_.outline_px.after));
     }
+    if (!unsettled_.empty()) {
+      return say(
+          CalibrationState::kNotConverged,
+          fmt::format("Not converged: without masks the answer depends on how far from the prediction the robot's "
+                      "outline is looked for ({} moves by more than {:.0f} standard deviations); record more "
+                      "postures, or give masks (vision.method: given).",
+                      unsettled_, kSettled_sd));
+    }
     if (only_ < kOnly) {
       return say(CalibrationState::kNotConverged,
                  fmt::format("Not converged: another place of the camera explains the pictures nearly as well (misfit "
@@ -655,8 +695,8 @@ class Calibrator {
   StereoRig rig_;
   PictureLog* log_ = nullptr;
   std::vector<StereoRig> starts_;
-  double believed_px_ = kAnywhere_px;
   std::vector<bool> loose_;  ///< parts that are drawn and have no say
+  std::string unsettled_;  ///< a joint whose offset depends on how masks were made
   double ambiguity_ = 0.0;
   double only_ = kAlone;  ///< misfit of the second best place over that of the best
   Calibration result_;

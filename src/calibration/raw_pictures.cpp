@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/outline/outline_measurement.hpp"
 #include "bodyschema/pipeline/silhouette_preview.hpp"
 #include "bodyschema/vision/mask_operations.hpp"
@@ -39,12 +40,25 @@ RawPictures::RawPictures(PictureLog& log, const VisionSetup& vision, const std::
     : log_(log), vision_(with_auto(vision)), kept_(kept) {
   for (const auto& camera : log.rig().cameras) {
     segmenters_.emplace_back(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height);
+    shown_.push_back(camera.has_distortion() ? Undistorter(camera).valid() : BinaryMask());
   }
 }
 
-bool RawPictures::by_what_moved() {
-  std::vector<Observation> seen;
-  for (const auto& full : kept_) seen.push_back(without_pictures(full));
+void RawPictures::segment(std::size_t camera, const Image& image, const PredictedRobot& predicted,
+                          CameraObservation& out) {
+  segmenters_[camera].segment(image, out.mask, out.valid, out.coverage, predicted);
+  const BinaryMask& shown = shown_[camera];
+  for (int v = 0; v < shown.height(); ++v) {
+    for (int w = 0; w < shown.words_per_row(); ++w) {
+      out.mask.row(v)[w] &= shown.row(v)[w];
+      out.valid.row(v)[w] &= shown.row(v)[w];
+    }
+  }
+}
+
+bool RawPictures::cameras_stood_still() {
+  moved_.clear();
+  for (const auto& full : kept_) moved_.push_back(without_pictures(full));
   std::size_t all = 0, known = 0;
   for (std::size_t c = 0; c < segmenters_.size(); ++c) {
     std::vector<Image> frames;
@@ -54,19 +68,21 @@ bool RawPictures::by_what_moved() {
     if (frames.size() < kFewestFrames) return false;
     segmenters_[c].learn(frames);
     for (std::size_t i = 0; i < kept_.size(); ++i) {
-      auto& camera = seen[i].cameras[c];
+      auto& camera = moved_[i].cameras[c];
       if (!camera) continue;
-      segmenters_[c].segment(kept_[i].cameras[c]->image, camera->mask, camera->valid, camera->coverage);
+      segment(c, kept_[i].cameras[c]->image, {}, *camera);
       all += static_cast<std::size_t>(camera->mask.width()) * static_cast<std::size_t>(camera->mask.height());
       known += camera->valid.count();
     }
   }
-  if (static_cast<double>(known) < kStands * static_cast<double>(all)) return false;
-  replace(seen, true);
-  return true;
+  return static_cast<double>(known) > kStands * static_cast<double>(all);
 }
 
-void RawPictures::about(std::span<const Corrections> corrections, double reach_px) {
+void RawPictures::by_what_moved() {
+  replace(moved_, true);
+}
+
+PictureLog RawPictures::about(std::span<const Corrections> corrections, double reach_px) {
   std::vector<Observation> seen;
   for (const auto& full : kept_) seen.push_back(without_pictures(full));
   SilhouettePreview preview(log_);
@@ -92,28 +108,26 @@ void RawPictures::about(std::span<const Corrections> corrections, double reach_p
     segmenters_[c].learn(frames, robots);
     for (std::size_t k = 0; k < where.size(); ++k) {
       auto& camera = *seen[where[k]].cameras[c];
-      segmenters_[c].segment(frames[k], camera.mask, camera.valid, camera.coverage,
-                             PredictedRobot(&predicted[k], reach, false));
+      segment(c, frames[k], PredictedRobot(&predicted[k], reach, false), camera);
     }
   }
-  replace(seen, false);
+  return replace(seen, false);
 }
 
 std::size_t RawPictures::picture_of(std::size_t camera, Microseconds utime) const {
   const auto pictures = log_.pictures();
-  const auto found = std::find_if(pictures.begin(), pictures.end(), [&](const Picture& p) {
-    return p.camera == camera && p.joints.utime == utime;
-  });
+  const auto found = std::find_if(pictures.begin(), pictures.end(),
+                                  [&](const Picture& p) { return p.camera == camera && p.joints.utime == utime; });
   return static_cast<std::size_t>(found - pictures.begin());
 }
 
-void RawPictures::replace(const std::vector<Observation>& seen, bool learned) {
+PictureLog RawPictures::replace(const std::vector<Observation>& seen, bool learned) {
   PictureLog log(log_.robot(), log_.setup(), log_.rig());
   for (const auto& observation : seen) log.add(observation);
   log.set_encoders({log_.encoders().begin(), log_.encoders().end()});
   log.finish();
   if (learned) log.learned_background();
-  log_ = std::move(log);
+  return std::exchange(log_, std::move(log));
 }
 
 }  // namespace bodyschema

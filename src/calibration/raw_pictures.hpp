@@ -18,23 +18,30 @@ class RawPictures {
   /// @param kept  its pictures, as the lens's distortion leaves them; must outlive this
   RawPictures(PictureLog& log, const VisionSetup& vision, const std::vector<Observation>& kept);
 
-  /// Masks of what moves, by what most pictures agree about, without knowing where the robot is. What never moved has no
-  /// say then (PictureLog::learned_background).
-  /// @return whether there is such a background: the cameras stood still
-  bool by_what_moved();
+  /// Whether most of the pictures show what other pictures show at the same place: the cameras stood still.
+  bool cameras_stood_still();
+  /// Masks of what moves, by what most pictures agree about, without knowing where the robot is; after
+  /// `cameras_stood_still`. What never moved has no say then (PictureLog::learned_background).
+  void by_what_moved();
   /// Masks about a prediction.
   /// @param corrections  of every picture of the log, as LinearLog::corrections
   /// @param reach_px  how far off the outlines may be, px of a 320x240 picture
-  void about(std::span<const Corrections> corrections, double reach_px);
+  /// @return the log as it was
+  PictureLog about(std::span<const Corrections> corrections, double reach_px);
 
  private:
-  void replace(const std::vector<Observation>& seen, bool learned);
+  PictureLog replace(const std::vector<Observation>& seen, bool learned);
   [[nodiscard]] std::size_t picture_of(std::size_t camera, Microseconds utime) const;
 
   PictureLog& log_;
   VisionSetup vision_;
   const std::vector<Observation>& kept_;
+  /// Masks of one picture; what lies beyond the edge of a straightened picture does not count.
+  void segment(std::size_t camera, const Image& image, const PredictedRobot& predicted, CameraObservation& out);
+
   std::vector<Segmenter> segmenters_;  ///< one per camera
+  std::vector<BinaryMask> shown_;      ///< by camera, where its lens shows something; empty: everywhere
+  std::vector<Observation> moved_;     ///< masks of what moves
 };
 
 }  // namespace bodyschema

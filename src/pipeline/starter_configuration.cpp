@@ -28,6 +28,8 @@ constexpr double kGuessedFieldOfView_rad = 1.05;       // 60 deg across, a commo
 constexpr double kPairSd_deg = 0.1, kPairSd_mm = 1.0;  // of a stereo pair that was calibrated as one
 /// Physical: joined by arrival, pictures come late by some frames; a lens that nobody measured bends by as much.
 constexpr double kLag_sd_ms = 60.0, kLens_sd = 0.05;
+/// Of a camera's principal point, share of the width: by which calibrations of one camera differ.
+constexpr double kCentre_share = 0.005;
 
 bool among(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -448,6 +450,7 @@ class Starter {
   }
 
   [[nodiscard]] std::string estimator_yaml() const {
+    const bool stills = !o_.stills.empty();
     std::string text = fmt::format(
         "# The included files of config/ are the installed ones and explain every key.\n"
         "include: [config/estimator.yaml, config/bus.yaml, config/vision.yaml, "
@@ -459,9 +462,10 @@ class Starter {
         "  channel_prefix: {}\n",
         masks_     ? "given"
         : learned_ ? "learned_background"
+        : stills   ? "auto"
                    : "statistics",
-        masks_     ? "statistics, without masks"
-        : learned_ ? "statistics, where the cameras move"
+        masks_     ? "auto, without masks"
+        : learned_ ? "auto, where the cameras move"
                    : "single_colour, learned_background",
         yaml(o_.channel_prefix));
     text += state_yaml();
@@ -485,6 +489,13 @@ class Starter {
     std::string text;
     if (moving_) {
       text += fmt::format("    latency: {{sd_ms: {}}}             # pictures against encoders\n", kLag_sd_ms);
+    }
+    if (stills_) {
+      double width = 0.0;
+      for (const auto& camera : cameras_) width = std::max(width, static_cast<double>(camera.k.width));
+      text +=
+          fmt::format("    principal_point common: {{sd_px: {:.1f}}} # of calibrations of one camera after the other\n",
+                      kCentre_share * width);
     }
     if (straight && !o_.rectified && cameras_.size() == 1) {
       text += fmt::format("    distortion: {{sd: {}}}           # a lens without any is none\n", kLens_sd);

@@ -194,6 +194,7 @@ struct Segmenter::Impl {
   std::vector<float> ratios;                     // auto: of squared differences to their variances
   FrameSelection selection;
   bool learned_offline = false;
+  bool from_stills = false;   // auto: the background was learned beside predictions that may be far off
   bool just_learned = false;  // the last frame was learned from whole and gave no mask
 
   CoverageEstimator coverage_estimator;
@@ -433,6 +434,8 @@ void Segmenter::learn(std::span<const Image> frames, std::span<const BinaryMask>
   if (!self.learns() || frames.empty()) return;
   self.learned.learn_beside(frames, robots);
   self.learned_offline = true;
+  self.from_stills = true;
+  self.edge_variance = 1.0f;  // until predictions are near
   self.selection.clear();
 }
 
@@ -715,7 +718,9 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
       detected.row(v)[w] = (detected.row(v)[w] & k & near) | (robot.row(v)[w] & ~k) | sure.row(v)[w];
     }
   }
-  if (holds && !everywhere) measure_edge_noise(seen);
+  // What lies beside a prediction that is far off is the robot.
+  const bool beside_it = !from_stills || reach_px < static_cast<double>(kBesideTo_px) * unit;
+  if (holds && !everywhere && beside_it) measure_edge_noise(seen);
   average.around(seen, sure, evidence.box(), static_cast<int>(kAverage_px * unit), local);
   average.around(seen, sure, evidence.box(), static_cast<int>(2.0 * kAverage_px * unit), local);
   valid.fill(true);

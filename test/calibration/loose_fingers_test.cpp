@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "believed_outline.hpp"
 #include "evidence/drawn_log.hpp"
 
 namespace bodyschema {
@@ -57,23 +56,6 @@ TEST_F(LooseFingers, WhatIsLeftOutHasNoSayAndStillHides) {
   for (std::size_t l = 0; l < all.size(); ++l) {
     EXPECT_EQ(arm[l], loose[l] ? 0u : all[l]) << setup_.model.rendered_links[l];
   }
-}
-
-TEST_F(LooseFingers, OutlinesAreBelievedToBeOffByWhatTheOffsetsMoveThem) {
-  const auto log = log_of(seen_);
-  LogFit fit(*log, 1);
-  const auto believed_px = [&](double sd_deg) {
-    std::vector<Belief> list;
-    for (const auto& target : effect_targets("joint_offset", roles_)) {
-      list.push_back({"joint_offset", target, {radians(sd_deg)}});
-    }
-    return believed_outline_sd_px(fit, State(roles_, list));
-  };
-  const double one = believed_px(1.0);
-  // A degree of a shoulder moves a hand 0.4 m away by 7 mm: 4 px of a picture with a focal length of 260 px at 0.35 m.
-  EXPECT_GT(one, 1.0);
-  EXPECT_LT(one, 12.0);
-  EXPECT_NEAR(believed_px(4.0), 4.0 * one, 1e-6 * one);
 }
 
 }  // namespace

@@ -375,7 +375,7 @@ TEST_F(StarterConfiguration, AMovingRecordingWithoutMasksLearnsItsBackground) {
   o.out = folder_ / "still";
   EXPECT_TRUE(write_starter_configuration(o).usable);
   const auto still = Configuration::load(o.out / "estimator.yaml");
-  EXPECT_EQ(still.section("vision").text("method"), "statistics");
+  EXPECT_EQ(still.section("vision").text("method"), "auto");
   EXPECT_FALSE(still.section("estimator").section("state").has("latency"));
 
   stills.write("joints.csv", "posture,time_s,joint1,joint2,joint3,joint4,joint5,joint6,joint7\n0,10,0,0,0,0,0,0,0\n");

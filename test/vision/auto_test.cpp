@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <random>
 
+#include "bodyschema/vision/mask_operations.hpp"
 #include "bodyschema/vision/segmenter.hpp"
 #include "scene.hpp"
 
@@ -102,6 +103,34 @@ TEST(AutomaticMasks, ACameraThatTurnsBeforeARoomNeedsNoBackground) {
   EXPECT_GT(worst_iou, 0.9);
   EXPECT_LT(sd, 0.6);
   EXPECT_GT(found, 0.6);
+}
+
+TEST(AutomaticMasks, FewStillsShowTheBackgroundBesideWhereTheRobotIs) {
+  std::mt19937 random(33);
+  Scene scene = large(Texture::kClutter);
+  Segmenter segmenter(automatic(), "left", scene.width, scene.height);
+  // At 150 in three pictures of five: what most of them show there is the robot.
+  const std::array<double, 5> at_u = {150.0, 154.0, 146.0, 60.0, 240.0};
+  std::vector<Image> frames;
+  std::vector<BinaryMask> predicted, robots;
+  for (const double u : at_u) {
+    scene.shapes = large_hand(u, 120.0);
+    frames.push_back(scene.picture(random));
+    predicted.push_back(prediction(scene, 4.0, -3.0));
+    robots.push_back(predicted.back());
+    MaskMorphology().dilate(robots.back(), 8);
+  }
+  segmenter.learn(frames, robots);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    scene.shapes = large_hand(at_u[i], 120.0);
+    Output out;
+    segmenter.segment(frames[i], out.mask, out.valid, out.coverage, {&predicted[i], 8.0, false});
+    EXPECT_GT(iou(out.mask, scene.true_mask()), 0.95) << i;
+    const auto edge = edges_of(scene, out);
+    EXPECT_LT(edge.sd, 0.5) << i;
+    EXPECT_LT(std::abs(edge.bias), 0.15) << i;
+    EXPECT_GT(edge.found, 0.6) << i;
+  }
 }
 
 TEST(AutomaticMasks, APredictionThatIsFarOffIsPutRight) {

@@ -108,8 +108,8 @@ struct Calibration {
 /// believed uncertain (`cameras: pose`, `estimator.state`), by the outlines in all pictures at once. A camera of which
 /// nothing is known is searched for.
 ///
-/// Writes calibration.json, report.html, corrected.urdf, offsets.yaml, cameras.yaml, ros/ (write_ros_files) and a
-/// configuration to go on with (calibrated.yaml) into `out`. Throws Error.
+/// Writes calibration.json, report.html, corrected.urdf, offsets.yaml, cameras.yaml, ros/ (write_ros_files)
+/// into `out`. Throws Error.
 Calibration calibrate(const Configuration& configuration, const CalibrationOptions& options);
 
 /// The result as a table for people.

@@ -1,0 +1,126 @@
+#include "beyond_model.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "bodyschema/outline/outline_measurement.hpp"
+#include "bodyschema/pipeline/silhouette_preview.hpp"
+#include "bodyschema/vision/mask_operations.hpp"
+
+namespace bodyschema {
+namespace {
+
+// Physical, px of a 320x240 picture.
+constexpr double kErr_px = 2.0;    ///< outlines of a fit that is near err by less
+constexpr double kThick_px = 1.0;  ///< a piece is at least twice as thick: the ragged edge of a mask is none
+constexpr double kBlend_px = 3.0;  ///< so far from such a piece an outline may be part of it
+constexpr double kMost = 0.5;      ///< share of the postures in which what is fixed to a link shows
+
+void subtract(BinaryMask& mask, const BinaryMask& other) {
+  for (int v = 0; v < mask.height(); ++v) {
+    for (int w = 0; w < mask.words_per_row(); ++w) mask.row(v)[w] &= ~other.row(v)[w];
+  }
+}
+
+void add(BinaryMask& mask, const BinaryMask& other) {
+  for (int v = 0; v < mask.height(); ++v) {
+    for (int w = 0; w < mask.words_per_row(); ++w) mask.row(v)[w] |= other.row(v)[w];
+  }
+}
+
+bool meet(const BinaryMask& a, const BinaryMask& b) {
+  for (int v = 0; v < a.height(); ++v) {
+    for (int w = 0; w < a.words_per_row(); ++w) {
+      if ((a.row(v)[w] & b.row(v)[w]) != 0) return true;
+    }
+  }
+  return false;
+}
+
+/// Pieces of one that reach further than `err` beyond the other and are no thin strips.
+BinaryMask pieces(BinaryMask one, BinaryMask other, int err, int thick, MaskMorphology& morphology) {
+  morphology.dilate(other, err);
+  subtract(one, other);
+  morphology.erode(one, thick);
+  morphology.dilate(one, thick);
+  return one;
+}
+
+}  // namespace
+
+BeyondModel beyond_model(const PictureLog& log, std::span<const Corrections> corrections) {
+  const auto pictures = log.pictures();
+  const std::size_t links = log.setup().model.rendered_links.size();
+  BeyondModel result;
+  result.where.resize(pictures.size());
+  SilhouettePreview preview(log);
+  MaskMorphology morphology;
+  std::vector<double> seen(links, 0.0), held(links, 0.0);
+  for (std::size_t p = 0; p < pictures.size(); ++p) {
+    const auto& picture = pictures[p];
+    const double unit = picture_unit(log.rig().cameras[picture.camera].intrinsics);
+    const auto px = [unit](double of_small) { return std::max(1, static_cast<int>(of_small * unit + 0.5)); };
+    const BinaryMask model = preview.draw(picture.joints.q, corrections[p], picture.camera);
+    BinaryMask known = picture.mask, predicted = model;
+    if (!picture.valid.empty()) {
+      BinaryMask unknown(known.width(), known.height());
+      unknown.fill(true);
+      subtract(unknown, picture.valid);
+      add(known, unknown);  // it may be robot: the model lacks nothing there
+    }
+    BinaryMask more = pieces(picture.mask, model, px(kErr_px), px(kThick_px), morphology);
+    const BinaryMask less = pieces(std::move(predicted), std::move(known), px(kErr_px), px(kThick_px), morphology);
+    BinaryMask all = more;
+    add(all, less);
+    if (all.count() == 0) continue;
+    ++result.pictures;
+    morphology.dilate(all, px(kErr_px + kBlend_px));
+    result.where[p] = std::move(all);
+    morphology.dilate(more, px(kErr_px) + 2);
+    for (std::size_t l = 0; l < links; ++l) {
+      std::vector<bool> one(links, false);
+      one[l] = true;
+      const BinaryMask part = preview.draw_parts(picture.joints.q, corrections[p], picture.camera, one);
+      if (part.count() == 0) continue;
+      seen[l] += 1.0;
+      held[l] += meet(part, more);
+    }
+  }
+  std::size_t most = 0;
+  for (std::size_t l = 1; l < links; ++l) {
+    if (held[l] * std::max(1.0, seen[most]) > held[most] * std::max(1.0, seen[l])) most = l;
+  }
+  if (links > 0 && held[most] > kMost * static_cast<double>(pictures.size())) {
+    result.on_link = log.setup().model.rendered_links[most];
+  }
+  return result;
+}
+
+void leave_out(PictureLog& log, const BeyondModel& beyond) {
+  PictureLog left(log.robot(), log.setup(), log.rig());
+  const auto pictures = log.pictures();
+  for (std::size_t p = 0; p < pictures.size(); ++p) {
+    Observation o;
+    o.utime = pictures[p].joints.utime;
+    o.cameras.resize(log.rig().cameras.size());
+    auto& seen = o.cameras[pictures[p].camera].emplace();
+    seen.utime = o.utime;
+    seen.joints = pictures[p].joints;
+    seen.mask = pictures[p].mask;
+    seen.valid = pictures[p].valid;
+    seen.coverage = pictures[p].coverage;
+    if (!beyond.where[p].empty()) {
+      if (seen.valid.empty()) {
+        seen.valid = BinaryMask(seen.mask.width(), seen.mask.height());
+        seen.valid.fill(true);
+      }
+      subtract(seen.valid, beyond.where[p]);
+    }
+    left.add(o);
+  }
+  left.set_encoders({log.encoders().begin(), log.encoders().end()});
+  left.finish();
+  log = std::move(left);
+}
+
+}  // namespace bodyschema

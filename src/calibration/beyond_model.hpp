@@ -1,0 +1,30 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bodyschema/evidence/picture_log.hpp"
+#include "bodyschema/observation/corrections.hpp"
+
+namespace bodyschema {
+
+/// What masks show beyond the model, or lack of it: a tool that no mesh of the robot has, somebody's arm that a network
+/// took for the robot's, a piece that something hides. Where it begins, the outline is not the model's, and half of it
+/// lies near enough to pull.
+struct BeyondModel {
+  std::vector<BinaryMask> where;  ///< of each picture of the log; no pixels: nothing there
+  std::size_t pictures = 0;       ///< in which there is something
+  /// The link to which something is fixed that no mesh shows: it is there in most postures that show that link. Empty:
+  /// none.
+  std::string on_link;
+};
+
+/// Looks for it about a fit that is near: pieces wider than outlines err.
+/// @param corrections  of every picture of the log, as LinearLog::corrections
+BeyondModel beyond_model(const PictureLog& log, std::span<const Corrections> corrections);
+
+/// Pixels there, and near there, no longer count.
+void leave_out(PictureLog& log, const BeyondModel& beyond);
+
+}  // namespace bodyschema
