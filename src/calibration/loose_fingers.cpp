@@ -1,13 +1,15 @@
 #include "loose_fingers.hpp"
 
 #include <algorithm>
-#include <string>
+
+#include "bodyschema/robot/forward_kinematics.hpp"
 
 namespace bodyschema {
 namespace {
 
 /// Physical: a finger is about so long, and half as wide as this many metres.
 constexpr double kFinger_m = 0.08, kHalfWidth_m = 0.008;
+constexpr double kBend_rad = 0.1;  ///< any: what moves with a finger's joints is a finger
 
 }  // namespace
 
@@ -19,20 +21,15 @@ std::vector<bool> loose_fingers(const PictureLog& log, const Beliefs& beliefs) {
     }
   }
   if (kFinger_m * sd_rad <= kHalfWidth_m) return {};
-  const auto& joints = log.robot()->joints();
-  std::vector<std::string> links;  // that a finger's joint carries, from the palm outwards
-  for (const auto finger : log.roles().fingers) links.push_back(joints[static_cast<std::size_t>(finger)].child_link);
-  for (std::size_t i = 0; i < links.size(); ++i) {
-    for (const auto& joint : joints) {
-      if (joint.parent_link == links[i] && std::find(links.begin(), links.end(), joint.child_link) == links.end()) {
-        links.push_back(joint.child_link);
-      }
-    }
-  }
+  const auto& links = log.setup().model.rendered_links;
+  ForwardKinematics kinematics(log.robot(), links);
+  Eigen::VectorXd q = log.setup().default_joints(*log.robot());
+  std::vector<Pose> straight(links.size()), bent(links.size());
+  kinematics.compute(q, straight);
+  for (const auto finger : log.roles().fingers) q[finger] += kBend_rad;
+  kinematics.compute(q, bent);
   std::vector<bool> loose;
-  for (const auto& link : log.setup().model.rendered_links) {
-    loose.push_back(std::find(links.begin(), links.end(), link) != links.end());
-  }
+  for (std::size_t l = 0; l < links.size(); ++l) loose.push_back(!bent[l].isApprox(straight[l], 1e-6));
   return loose;
 }
 

@@ -29,6 +29,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kEpisodesAmongAll = 3;  ///< where everything is evaluated, which takes long
 constexpr double kRate_hz = 3.0;              ///< pictures a second that a calibration looks at
 constexpr std::size_t kCommonPostures = 10;
+constexpr double kRows_hz = 30.0;  ///< of the recording
 
 /// One episode's answer.
 struct Answer {
@@ -85,9 +86,7 @@ class HumanoidExperiment {
   }
 
  private:
-  static Configuration configuration() {
-    return Configuration::load(find_data_file("config/g1/estimator.yaml"));
-  }
+  static Configuration configuration() { return Configuration::load(find_data_file("config/g1/estimator.yaml")); }
 
   void answer(const std::set<std::int64_t>& episodes) {
     const auto target = ImportTarget::from(configuration(), find_data_file("config/g1/lerobot.yaml"));
@@ -133,8 +132,19 @@ class HumanoidExperiment {
     return table.row(row);
   }
 
+  /// The same as a late picture of that row shows them.
+  [[nodiscard]] std::map<std::string, double> joints_shown(const DrawnPicture& picture, const HumanoidModel& model) {
+    const double at = std::max(0.0, static_cast<double>(picture.row) - kRows_hz * model.lag_s);
+    auto q = joints(picture.episode, static_cast<std::size_t>(at));
+    const double share = at - std::floor(at);
+    if (share <= 0.0) return q;
+    const auto next = joints(picture.episode, static_cast<std::size_t>(at) + 1);
+    for (auto& [joint, angle] : q) angle += share * (next.at(joint) - angle);
+    return q;
+  }
+
   Distances distances(const DrawnPicture& picture, const HumanoidModel& model) {
-    const auto q = joints(picture.episode, picture.row);
+    const auto q = joints_shown(picture, model);
     return {distances_to_outline(picture.left, view_.silhouette(model, q, "left")),
             distances_to_outline(picture.right, view_.silhouette(model, q, "right"))};
   }
@@ -151,9 +161,9 @@ class HumanoidExperiment {
       by_answer.push_back(median(own.all()));
       after.add(own);
     }
-    context_.table += fmt::format(
-        "\n{:<44} {:>9} {:>9} {:>9} {:>9}\n", fmt::format("G1, head camera, {} episodes alone", answers_.size()), "before",
-        "after", "worst", "demanded");
+    context_.table += fmt::format("\n{:<44} {:>9} {:>9} {:>9} {:>9}\n",
+                                  fmt::format("G1, head camera, {} episodes alone", answers_.size()), "before", "after",
+                                  "worst", "demanded");
     const auto row = [&](const char* name, const std::vector<double>& a, const std::vector<double>& b, double worst) {
       context_.table += fmt::format("{:<44} {:>9.1f} {:>9.1f} {:>9} {:>9}\n", name, median(a), median(b),
                                     worst > 0.0 ? fmt::format("{:.1f}", worst) : "", worst > 0.0 ? "4" : "");
@@ -162,11 +172,14 @@ class HumanoidExperiment {
         *std::max_element(by_answer.begin(), by_answer.end()));
     row("  right arm", before.right, after.right, 0.0);
     row("  left arm", before.left, after.left, 0.0);
-    context_.summary["real"]["g1"]["outlines"] = {
-        {"pictures", drawn_.size()},          {"before_px", median(before.all())}, {"after_px", median(after.all())},
-        {"right_px", median(after.right)},    {"left_px", median(after.left)},
-        {"right_before_px", median(before.right)}, {"left_before_px", median(before.left)},
-        {"after_px_by_episode", by_answer}};
+    context_.summary["real"]["g1"]["outlines"] = {{"pictures", drawn_.size()},
+                                                  {"before_px", median(before.all())},
+                                                  {"after_px", median(after.all())},
+                                                  {"right_px", median(after.right)},
+                                                  {"left_px", median(after.left)},
+                                                  {"right_before_px", median(before.right)},
+                                                  {"left_before_px", median(before.left)},
+                                                  {"after_px_by_episode", by_answer}};
     figure();
   }
 
@@ -178,7 +191,7 @@ class HumanoidExperiment {
     const auto other = std::find_if(answers_.begin(), answers_.end(),
                                     [&](const auto& answer) { return answer.episode != picture->episode; });
     if (other == answers_.end()) return;
-    view_.write_figure(*picture, joints(picture->episode, picture->row), other->model,
+    view_.write_figure(*picture, joints_shown(*picture, other->model), other->model,
                        context_.options.out / "g1_outlines.png");
   }
 
@@ -216,8 +229,10 @@ class HumanoidExperiment {
     context_.table += fmt::format("{:<44} {:>9} {:>9.2f} {:>9.2f} {:>9}\n", "  deg", "", rms(deg),
                                   *std::max_element(deg.begin(), deg.end()), 1);
     context_.table += fmt::format("{:<44} {:>9.1f}\n", "  nominal model from their mean, mm", rms(nominal_mm));
-    context_.summary["real"]["g1"]["repeat"] = {
-        {"postures", mm.size()}, {"hand_mm", rms(mm)}, {"hand_deg", rms(deg)}, {"nominal_from_mean_mm", rms(nominal_mm)}};
+    context_.summary["real"]["g1"]["repeat"] = {{"postures", mm.size()},
+                                                {"hand_mm", rms(mm)},
+                                                {"hand_deg", rms(deg)},
+                                                {"nominal_from_mean_mm", rms(nominal_mm)}};
   }
 
   static Eigen::Matrix3d mean_rotation(const std::vector<Pose>& poses) {
@@ -256,13 +271,13 @@ class HumanoidExperiment {
     }
     double worst = 0.0;
     for (const auto& [name, list] : offsets) worst = std::max(worst, scatter(list));
-    context_.table += fmt::format("{:<44} {:>9} {:>9} {:>9} {:>9}\n", "joints of the right arm told, fewest and most", "",
-                                  fewest, most, 4);
+    context_.table += fmt::format("{:<44} {:>9} {:>9} {:>9} {:>9}\n", "joints of the right arm told, fewest and most",
+                                  "", fewest, most, 4);
     context_.table += fmt::format("{:<44} {:>9} {:>9.2f} {:>9} {:>9}\n", "their offsets, deg, scatter of the worst", "",
                                   worst, "", 0.5);
-    context_.table += fmt::format("{:<44} {:>9} {:>9.1f} {:>9} {:>9}\n", "camera's place, mm, scatter", "",
-                                  std::sqrt(std::pow(scatter(x), 2) + std::pow(scatter(y), 2) + std::pow(scatter(z), 2)),
-                                  "", 5);
+    context_.table +=
+        fmt::format("{:<44} {:>9} {:>9.1f} {:>9} {:>9}\n", "camera's place, mm, scatter", "",
+                    std::sqrt(std::pow(scatter(x), 2) + std::pow(scatter(y), 2) + std::pow(scatter(z), 2)), "", 5);
     context_.table += fmt::format("{:<44} {:>9} {:>9.1f}\n", "focal length, px, scatter", "", scatter(focal));
     for (const auto& [state, count] : states) context_.table += fmt::format("  {}: {}\n", state, count);
     for (const auto& [joint, reasons] : why) {

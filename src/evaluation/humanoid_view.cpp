@@ -29,6 +29,9 @@ void HumanoidModel::take(const Calibration& calibration) {
   for (const auto& joint : calibration.joints) offset_rad[joint.name] = joint.offset_rad;
   X_link_optical = calibration.cameras.front().X_link_optical;
   intrinsics = calibration.cameras.front().intrinsics;
+  for (const auto& parameter : calibration.parameters) {
+    if (parameter.name == "latency") lag_s = 1e-3 * parameter.value;
+  }
 }
 
 HumanoidView::HumanoidView(const Configuration& configuration) : pipeline_(configuration) {

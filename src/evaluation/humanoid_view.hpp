@@ -18,6 +18,7 @@ struct HumanoidModel {
   std::map<std::string, double> offset_rad;  ///< by joint; encoder = true + offset
   Pose X_link_optical = Pose::Identity();    ///< of the camera in the link that carries it
   PinholeIntrinsics intrinsics;
+  double lag_s = 0.0;  ///< of pictures against encoders
   void take(const Calibration& calibration);
 };
 

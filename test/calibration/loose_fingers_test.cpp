@@ -29,7 +29,9 @@ TEST_F(LooseFingers, AllFingersAndNothingElseWhereTheirAnglesAreHardlyKnown) {
   for (std::size_t l = 0; l < links.size(); ++l) {
     fingers += loose[l];
     for (const char* other : {"r_forearm", "r_hand", "r_upper_arm", "r_wrist_1"}) {
-      if (links[l] == other) EXPECT_FALSE(loose[l]) << links[l];
+      if (links[l] == other) {
+        EXPECT_FALSE(loose[l]) << links[l];
+      }
     }
   }
   EXPECT_GE(fingers, 5);

@@ -35,7 +35,8 @@ TEST_F(DrawnOutlines, EdgesOfOneArmAreCollectedByPicture) {
 }
 
 TEST_F(DrawnOutlines, WhatIsNoneIsRefusedWithItsLine) {
-  for (const std::string text : {"L 1,2\n", "frame x 3\n", "frame 1 2\nM 1,2\n", "frame 1 2\nL 1;2\n", "frame 1 2\nL 1,2x\n"}) {
+  for (const std::string text :
+       {"L 1,2\n", "frame x 3\n", "frame 1 2\nM 1,2\n", "frame 1 2\nL 1;2\n", "frame 1 2\nL 1,2x\n"}) {
     try {
       read(text);
       FAIL() << text;
