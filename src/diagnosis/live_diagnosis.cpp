@@ -245,6 +245,7 @@ struct LiveDiagnosis::Impl {
 
   bool watch(const Observation& observation, Estimate& estimate) {
     if (observation.encoders_begin_anew) begin_anew();
+    keep_change(observation, estimate);
     keep(observation, estimate);
     const bool news = answer(observation.utime);
     begin_look(observation.utime);
@@ -261,6 +262,16 @@ struct LiveDiagnosis::Impl {
     kept_utime = look_utime = change_utime = 0;
   }
 
+  /// Remembers when the estimator took something to have changed.
+  void keep_change(const Observation& observation, const Estimate& estimate) {
+    if (estimate.changed.empty() || estimate.postures == 0) return;
+    change_utime = observation.utime;
+    for (const auto& seen : observation.cameras) {
+      if (seen) change_utime = std::min(change_utime, seen->joints.utime);
+    }
+    waiting.changes.push_back(change_utime);
+  }
+
   void keep(const Observation& observation, const Estimate& estimate) {
     for (const auto& sample : observation.encoders) {
       if (encoders.empty() || seconds(sample.utime - encoders.back().utime) >= kEncoderPeriod_s) {
@@ -268,13 +279,6 @@ struct LiveDiagnosis::Impl {
       }
     }
     // While no frame is kept only the last motion matters.
-    if (!estimate.changed.empty() && estimate.postures > 0) {
-      change_utime = observation.utime;
-      for (const auto& seen : observation.cameras) {
-        if (seen) change_utime = std::min(change_utime, seen->joints.utime);
-      }
-      waiting.changes.push_back(change_utime);
-    }
     if (std::ssize(encoders) > kMostEncoders) encoders.erase(encoders.begin(), encoders.begin() + kMostEncoders / 2);
     // A state that nothing is known of yet is no place to ask from.
     if (estimate.postures < least_postures || estimate.cameras_swapped) return;

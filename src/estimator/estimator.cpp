@@ -123,7 +123,8 @@ struct Estimator::Impl {
         considered(Considered::beside(state_at_first, beliefs.tolerances)),
         outlines(particles_only() ? silhouette_model(*robot, setup)
                                   : outline_level(silhouette_model(*robot, setup), rig.intrinsics())),
-        model(robot, setup, rig, known.roles(), state_at_first, considered.effects, &outlines), joints(model.state().joints()),
+        model(robot, setup, rig, known.roles(), state_at_first, considered.effects, &outlines),
+        joints(model.state().joints()),
         scorer(model, silhouette_model(*robot, setup), particles_only() ? nullptr : &outlines, rig.intrinsics(),
                options.silhouette, options.filter.particles),
         filter(joints, options.filter), memory(memory_layout(model.state(), considered), options.memory),

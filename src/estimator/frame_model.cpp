@@ -21,8 +21,8 @@ bool Frame::exposed() const {
 FrameModel::FrameModel(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
                        const JointRoles& roles, State state, const ErrorModel& beside, const SilhouetteModel* drawn)
     : roles_(roles), rig_(rig), state_(std::move(state)),
-      measurement_(robot, setup, rig, roles, drawn != nullptr ? *drawn : silhouette_model(*robot, setup)), track_(robot, setup),
-      probes_(state_.model(), refs_of(state_), measurement_.coordinates()),
+      measurement_(robot, setup, rig, roles, drawn != nullptr ? *drawn : silhouette_model(*robot, setup)),
+      track_(robot, setup), probes_(state_.model(), refs_of(state_), measurement_.coordinates()),
       beside_(beside, fitted_parameters(beside), measurement_.coordinates()),
       settled_(rig.cameras.size(), roles.no_corrections()), scratch_(roles.no_corrections()), nothing_(scratch_),
       position_(static_cast<std::size_t>(measurement_.coordinates().size()), -1) {

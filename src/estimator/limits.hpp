@@ -16,6 +16,9 @@ inline constexpr double kLeastOdd_px = 0.4;
 /// Physical. Of an outline: neighbours on the same flank (cosine between their normals), px of a 320x240 picture apart.
 inline constexpr double kSameSide = 0.5;
 inline constexpr double kBeside_px = 7.0;
+/// Physical. px of a 320x240 picture: what the edge of a wrong model keeps its distance from the prediction by, along a
+/// finger; those of other things cross it.
+inline constexpr double kParallel_px = 1.0;
 /// Physical. A change of the robot explains what looked hidden only if no more than this share of it looks so still ...
 inline constexpr double kLeastExplained = 0.5;
 /// ... but for this share of the outline, which noise and thin fingers leave.

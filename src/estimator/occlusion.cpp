@@ -8,7 +8,7 @@
 namespace bodyschema {
 
 std::vector<OutlinePoint> without_hidden(std::span<const OutlineSample> samples, std::span<const OutlinePoint> points,
-                                         double reach_px) {
+                                         double reach_px, double parallel_px) {
   std::vector<std::size_t> left_out;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (samples[i].odd || samples[i].covered) left_out.push_back(i);
@@ -21,15 +21,21 @@ std::vector<OutlinePoint> without_hidden(std::span<const OutlineSample> samples,
   while (!left_out.empty()) {
     std::vector<std::size_t> piece = {left_out.back()};
     left_out.pop_back();
-    std::size_t without_edge = 0;
+    double found = 0.0, sum = 0.0, square = 0.0;  // of residuals
     for (std::size_t next = 0; next < piece.size(); ++next) {
-      without_edge += samples[piece[next]].residual_px ? 0 : 1;
+      if (const auto& residual = samples[piece[next]].residual_px) {
+        found += 1.0;
+        sum += *residual;
+        square += *residual * *residual;
+      }
       const auto rest = std::partition(left_out.begin(), left_out.end(),
                                        [&](std::size_t other) { return !beside(piece[next], other); });
       piece.insert(piece.end(), rest, left_out.end());
       left_out.erase(rest, left_out.end());
     }
-    if (2 * without_edge < piece.size()) continue;
+    const bool mostly_found = 2.0 * found > static_cast<double>(piece.size());
+    const double mean = sum / std::max(1.0, found), spread = square / std::max(1.0, found) - mean * mean;
+    if (mostly_found && spread < parallel_px * parallel_px) continue;
     for (const auto i : piece) hidden[i] = 1;
   }
   std::vector<OutlinePoint> shown;

@@ -14,13 +14,14 @@
 namespace bodyschema {
 
 /// The points of an outline that show how the robot's own outline errs: without pieces that were left out and mostly
-/// have no edge near, which something hides. A piece that was left out but runs beside the prediction is the model's
-/// error as likely as a thing's edge: it stays.
+/// have no edge near, or edges here and there, which something hides. A piece that was left out but runs beside the
+/// prediction is the model's error as likely as a thing's edge: it stays.
 /// @param samples  all of the outline
 /// @param points  those that were found, in their order
 /// @param reach_px  between neighbours
+/// @param parallel_px  standard deviation of the residuals of a piece that runs beside the prediction, at most
 std::vector<OutlinePoint> without_hidden(std::span<const OutlineSample> samples, std::span<const OutlinePoint> points,
-                                         double reach_px);
+                                         double reach_px, double parallel_px);
 
 /// What other things hide of the robot, frame by frame, and what the hand holds over many. One thread.
 class Occlusion {

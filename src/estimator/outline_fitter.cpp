@@ -154,7 +154,8 @@ bool OutlineFitter::fits(const FrameEvidence& evidence) const {
 
 std::vector<OutlinePoint> OutlineFitter::shown(const OutlineFit& fit, std::size_t camera) const {
   return without_hidden(fit.seen.evidence.samples[camera], fit.points[camera],
-                        limits::kBeside_px * model_.picture_unit_px(camera));
+                        limits::kBeside_px * model_.picture_unit_px(camera),
+                        limits::kParallel_px * model_.picture_unit_px(camera));
 }
 
 void OutlineFitter::learn_noise(const OutlineFit& fit) {

@@ -43,24 +43,12 @@ Quadratic PostureMemory::with_posture_error(const Quadratic& block) const {
   return result;
 }
 
-const Quadratic& PostureMemory::say(const Block& block) const {
-  if (!block.say) block.say = with_posture_error(block.pictures);
-  return *block.say;
-}
-
-void PostureMemory::Block::average(const Quadratic& frame) {
-  frames += 1.0;
-  pictures.A += (frame.A - pictures.A) / frames;
-  pictures.b += (frame.b - pictures.b) / frames;
-  say.reset();
-}
-
 Quadratic PostureMemory::sum(const Block* without) const {
   Quadratic total = prior_;
   const auto kept = [&](double then_s) { return std::exp(-std::max(0.0, now_s_ - then_s) / options_.memory_s); };
   if (old_) total.add(*old_, kept(old_s_));
   for (const auto& block : blocks_) {
-    if (&block != without) total.add(say(block), kept(block.end_s));
+    if (&block != without) total.add(with_posture_error(block.pictures), kept(block.end_s));
   }
   return total;
 }
@@ -197,10 +185,6 @@ std::optional<std::uint64_t> PostureMemory::add(double time_s, const Eigen::Vect
     const bool stays = (q - open.q).cwiseAbs().maxCoeff() < options_.same_posture_rad;
     if (stays || time_s - open.begin_s < options_.block_s) {
       open.end_s = time_s;
-      if (stays) {
-        open.average(frame);
-        changed();
-      }
       return std::nullopt;
     }
   }
@@ -247,8 +231,6 @@ void PostureMemory::relinearise(std::uint64_t number, const Quadratic& pictures,
     if (block.number != number) continue;
     block.pictures = pictures;
     block.x = x;
-    block.frames = 1.0;
-    block.say.reset();
     changed();
     return;
   }
@@ -263,7 +245,7 @@ void PostureMemory::fold_oldest() {
   const double kept = std::exp(-std::max(0.0, block->end_s - old_s_) / options_.memory_s);
   old_->A *= kept;
   old_->b *= kept;
-  old_->add(say(*block));
+  old_->add(with_posture_error(block->pictures));
   old_s_ = std::max(old_s_, block->end_s);
   ++old_postures_;
   blocks_.erase(block);
@@ -304,7 +286,6 @@ void PostureMemory::learn_posture_error(const Block& block) {
   error_directions_ += told;
   const double prior = std::pow(options_.posture_sd_rad, 2);
   posture_variance_ = (options_.posture_prior * prior + error_square_) / (options_.posture_prior + error_directions_);
-  for (const auto& other : blocks_) other.say.reset();
   changed();
 }
 

@@ -63,8 +63,7 @@ OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, 
 OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
                                        const StereoRig& rig, const JointRoles& roles, const SilhouetteModel& drawn)
     : coordinates_(roles), projection_(robot, setup, rig, roles), moved_(robot, setup, rig, roles),
-      extractor_(drawn, rig.intrinsics()), probe_(roles.no_corrections()),
-      X_CB_(projection_.part_count()) {}
+      extractor_(drawn, rig.intrinsics()), probe_(roles.no_corrections()), X_CB_(projection_.part_count()) {}
 
 void OutlineMeasurement::linearise(const ObservedEdges& edges, const Eigen::Ref<const Eigen::VectorXd>& q,
                                    const Corrections& corrections, std::size_t camera,

@@ -100,28 +100,6 @@ TEST_F(MemoryOfTwo, MorePicturesOfOnePostureNeverShrinkADeviation) {
   }
 }
 
-/// One frame's noise is not what the arm is like.
-TEST_F(MemoryOfTwo, OfAPostureThatStandsTheMeanOfItsFramesSpeaks) {
-  auto memory = this->memory();
-  next(memory, both(first_, 0.8, second_, 0.1, 0.01));
-  const auto once = memory.estimate();
-  again(memory, both(first_, 0.2, second_, 0.1, 0.01));
-  again(memory, both(first_, 0.5, second_, 0.4, 0.01));
-  EXPECT_NEAR(memory.estimate().x(0), 0.5, 1e-3);
-  EXPECT_NEAR(memory.estimate().x(1), 0.2, 1e-3);
-  EXPECT_TRUE(memory.estimate().covariance.isApprox(once.covariance, 1e-9)) << "known no better";
-}
-
-/// Frames of a moving arm show more than one posture: together they would claim to tell more than one does.
-TEST_F(MemoryOfTwo, OfAQuarterOfASecondOfMotionTheFirstFrameSpeaks) {
-  auto memory = this->memory();
-  next(memory, measures(first_, 0.8, 0.01));
-  q_ += Eigen::Vector2d::Constant(kFarApart_rad);
-  memory.add(time_s_ += 0.1, q_, measures(second_, 0.2, 0.01), memory.estimate().x);
-  EXPECT_NEAR(memory.estimate().x(0), 0.8, 1e-3);
-  EXPECT_NEAR(memory.estimate().covariance(1, 1), 4.0, 1e-9) << "of the second posture nothing is known";
-}
-
 TEST_F(MemoryOfTwo, AQuarterOfASecondOfMotionIsOnePosture) {
   auto memory = this->memory();
   for (int frame = 0; frame < 30; ++frame) {  // a second at 30 Hz, 10 deg a frame

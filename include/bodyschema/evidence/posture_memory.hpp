@@ -61,15 +61,13 @@ struct Innovation {
 /// What postures taught about a state, kept posture by posture: the fused estimate, the same without any of them and
 /// the test of a new one come from the same sums.
 ///
-/// A block is one posture of the arm, or a quarter of a second of motion. It counts as one frame: what the model gets
-/// wrong in a posture it gets wrong in all pictures of it, so that more of them make nothing surer. While the arm
-/// stands it says what its frames say on average, so that one frame's noise is not taken for the arm's; of motion the
-/// first frame speaks. A posture that comes again takes the place of what it said before. Every block is linearised
-/// about one state, and again when the estimate has moved on: quadratics from different places claim to know directions
-/// that no picture tells (Huang et al., 2010, on the consistency of filters for simultaneous localisation and mapping).
-/// What blocks disagree about beyond their pictures' noise is learned as an error of every posture, in the joints'
-/// angles (a variance component, by MacKay's update of its evidence, 1992). At most `most_blocks` are kept. Not
-/// thread-safe.
+/// A block is one posture of the arm, or a quarter of a second of motion. Its first pictures speak for it: what the
+/// model gets wrong in a posture it gets wrong in all pictures of it, so that more of them teach nothing new. A posture
+/// that comes again takes the place of what it said before. Every block is linearised about one state, and again when
+/// the estimate has moved on: quadratics from different places claim to know directions that no picture tells (Huang et
+/// al., 2010, on the consistency of filters for simultaneous localisation and mapping). What blocks disagree about
+/// beyond their pictures' noise is learned as an error of every posture, in the joints' angles (a variance component,
+/// by MacKay's update of its evidence, 1992). At most `most_blocks` are kept. Not thread-safe.
 class PostureMemory {
  public:
   PostureMemory(MemoryLayout layout, const MemoryOptions& options);
@@ -132,15 +130,11 @@ class PostureMemory {
   struct Block {
     std::uint64_t number = 0;
     double begin_s = 0.0, end_s = 0.0;
-    Eigen::VectorXd q;                       ///< of its first frame
-    Quadratic pictures;                      ///< mean over its frames; once linearised anew, of the first ...
-    Eigen::VectorXd x;                       ///< ... about this state
-    double frames = 1.0;                     ///< that this is the mean of
-    mutable std::optional<Quadratic> say{};  ///< with the posture's own error; nothing: not worked out yet
-    void average(const Quadratic& frame);
+    Eigen::VectorXd q;   ///< of its first frame
+    Quadratic pictures;  ///< of its first frame, as last linearised ...
+    Eigen::VectorXd x;   ///< ... about this state
   };
   [[nodiscard]] Quadratic with_posture_error(const Quadratic& block) const;
-  [[nodiscard]] const Quadratic& say(const Block& block) const;
   [[nodiscard]] Quadratic sum(const Block* without = nullptr) const;
   [[nodiscard]] MemoryEstimate solve(const Quadratic& sum) const;
   [[nodiscard]] const Eigen::MatrixXd& posture_precision() const;

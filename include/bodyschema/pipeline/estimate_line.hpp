@@ -11,10 +11,10 @@ namespace bodyschema {
 /// (us), `state`, `offset_deg` and `stddev_deg` by joint, `hand_pose_<name>_camera` (4x4, metres),
 /// `likelihood`, `effective_sample_size` (particles), `contour_rms_px`, `hand_sd_mm`; where the estimator
 /// has them `hidden` (shares of the outline of `hand` and `robot`, 0 to 1, that were left out, and whether the hand
-/// `holds` something; absent: nothing), `findings` (what the pictures ask for beside: effect, parameters with unit, z), `head_offset_deg` and
-/// `head_stddev_deg` by head joint, and `nuisance` and `nuisance_stddev` by name and unit (`vergence_rad`,
-/// `dilation_px`, relative ones `focal_scale`). Numbers are written so that they read back exactly. Without the line's
-/// end.
+/// `holds` something; absent: nothing), `findings` (what the pictures ask for beside: effect, parameters with unit, z),
+/// `head_offset_deg` and `head_stddev_deg` by head joint, and `nuisance` and `nuisance_stddev` by name and unit
+/// (`vergence_rad`, `dilation_px`, relative ones `focal_scale`). Numbers are written so that they read back exactly.
+/// Without the line's end.
 [[nodiscard]] std::string estimate_line(const Estimate& estimate, const StereoRig& rig);
 
 }  // namespace bodyschema

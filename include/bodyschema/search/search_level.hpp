@@ -29,7 +29,8 @@ SearchLevel search_level(const SilhouetteModel& model, std::span<const PinholeIn
 
 /// Meshes for outlines that decide: moved by a quarter of what a search's level of the pictures' size would allow
 /// (search_mesh_bound_m), 0.025 px, which changes offsets by a few hundredths of their standard deviations. Of pictures
-/// with more than 240 rows, as much as of 240: 0.02 mm at 0.3 m before a common lens. No robot is as true to its meshes.
+/// with more than 240 rows, as much as of 240: 0.02 mm at 0.3 m before a common lens. No robot is as true to its
+/// meshes.
 /// @param cameras  of the full pictures
 SilhouetteModel outline_level(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras);
 
