@@ -31,7 +31,7 @@ LensKnowledge lens_knowledge(const Configuration& camera) {
 }
 
 double lens_sd(LensKnowledge knowledge) {
-  constexpr double kUncalibrated = 0.2, kCalibrated = 0.01;
+  constexpr double kUncalibrated = 0.2, kCalibrated = 0.03;
   switch (knowledge) {
     case LensKnowledge::kUnknown: return kUncalibrated;
     case LensKnowledge::kCalibrated: return kCalibrated;

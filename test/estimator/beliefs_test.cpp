@@ -52,10 +52,10 @@ TEST_F(BeliefsOfOwnRobot, ALensNobodyCalibratedIsEstimated) {
     const Belief* lens = find(beliefs.state, "distortion");
     return lens == nullptr ? 0.0 : lens->sd.at(0);
   };
-  EXPECT_EQ(sd({}), 0.01) << "zeros may be as wrong as other numbers are";
+  EXPECT_EQ(sd({}), 0.03) << "zeros may be as wrong as other numbers are";
   EXPECT_EQ(sd({"cameras.left.distortion=none", "cameras.right.distortion=none"}), 0.0);
   EXPECT_EQ(sd({"cameras.left.distortion=unknown"}), 0.2);
-  EXPECT_EQ(sd({"cameras.left.distortion=[-0.3, 0, 0, 0, 0]"}), 0.01);
+  EXPECT_EQ(sd({"cameras.left.distortion=[-0.3, 0, 0, 0, 0]"}), 0.03);
   EXPECT_EQ(sd({"cameras.left.distortion=[-0.3, 0, 0, 0, 0]", "cameras.right.distortion=unknown"}), 0.2);
   EXPECT_EQ(sd({"cameras.left.distortion=unknown", "estimator.state.distortion.sd=0.05"}), 0.05)
       << "what the configuration believes goes first";
