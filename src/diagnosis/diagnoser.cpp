@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -231,11 +232,24 @@ class Diagnoser {
       Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0, true};
       trial.gain = without.total() - trial.heldout.total();
       trial.plausible = is_plausible(candidate, trial.heldout.estimate.tail(candidate.columns.size()));
-      if (trial.gain > 0.0) trials.push_back(std::move(trial));
+      if (trial.gain > 0.0 && !says_hardly_more(candidate, trial.gain)) trials.push_back(std::move(trial));
     }
     std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.gain > b.gain; });
     std::stable_partition(trials.begin(), trials.end(), [](const Trial& t) { return t.plausible; });
     return trials;
+  }
+
+  /// Whether it is what was found already under another name, and a little besides: a longer link that seems to lie
+  /// aside. A look has no fits that would show whether that little is there.
+  [[nodiscard]] bool says_hardly_more(const Candidate& candidate, double gain) const {
+    if (search_.refits() || candidate.columns.size() < 2) return false;
+    const Eigen::VectorXd unit = candidate.scores.S.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    const Eigen::MatrixXd S = unit.asDiagonal() * candidate.scores.S * unit.asDiagonal();
+    const bool one_is_known = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(S).eigenvalues()[0] < limits::kSameChange;
+    return one_is_known && std::any_of(search_.causes().begin(), search_.causes().end(), [&](const FoundCause& found) {
+             return found.name.joint == candidate.cause.joint && found.columns < candidate.parameters.size() &&
+                    gain < limits::kAlikeShare * found.gain;
+           });
   }
 
   [[nodiscard]] bool is_plausible(const Candidate& candidate, const Eigen::VectorXd& estimate) const {
@@ -288,6 +302,7 @@ class Diagnoser {
     const auto& candidate = *trial.candidate;
     FoundCause cause{.name = candidate.cause, .variable = candidate.variable, .from = candidate.from};
     cause.stated = candidate.stated;
+    cause.gain = trial.gain;
     const auto [begin, end] = seen_span(fit_, field.log.at);
     cause.begin_s = begin;
     cause.duration_s = end - begin;

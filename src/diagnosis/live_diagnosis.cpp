@@ -128,8 +128,11 @@ class Window {
     if (changes_.size() > kMostChanges) changes_.erase(changes_.begin(), changes_.end() - kMostChanges);
   }
 
+  /// Pictures of the window date a slip no better than they follow each other.
   [[nodiscard]] bool is_slip_at_change(const Finding& finding) const {
-    return finding.effect == "slip" && std::find(changes_.begin(), changes_.end(), finding.from) != changes_.end();
+    return finding.effect == "slip" && std::any_of(changes_.begin(), changes_.end(), [&](Microseconds change) {
+             return std::abs(seconds(finding.from - change)) <= options_.picture_period_s;
+           });
   }
 
   void forget() {

@@ -28,6 +28,7 @@ struct FoundCause {
   std::vector<std::vector<double>> amounts{};  ///< of a free curve
   std::size_t columns = 0;                     ///< how many parameters are fitted
   bool stated = false;                         ///< others saw it happen
+  double gain = 0.0;                           ///< in held-out blocks, when it was taken in
   [[nodiscard]] bool generic() const { return !variable.empty(); }
 };
 

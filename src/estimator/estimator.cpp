@@ -773,7 +773,6 @@ struct Estimator::Impl {
     }
   }
 
-  /// The state that an estimate reports.
   /// The silhouette of parts placed by a state, as the lens shows it.
   [[nodiscard]] BinaryMask drawn(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera, const Exposure& exposure,
                                  const Eigen::VectorXd& x) {
@@ -782,6 +781,7 @@ struct Estimator::Impl {
     return bent_silhouette(scorer.render(X_CB, camera), rig.cameras[camera].intrinsics, corrections.camera.k1);
   }
 
+  /// The state that an estimate reports.
   [[nodiscard]] Eigen::VectorXd state_of(const Estimate& estimate) const {
     Eigen::VectorXd x = model.state().prior_mean();
     x.head(joints) = estimate.offset_rad;
