@@ -102,6 +102,10 @@ std::vector<EverydayFrame> play(const ExperimentContext& context, const Job& job
   overrides.insert(overrides.end(), context.options.overrides.begin(), context.options.overrides.end());
   overrides.push_back("filter.seed=" + std::to_string(job.seed * 1000003u + 17u));
   overrides.emplace_back("silhouette.threads=1");
+  for (const std::string camera : {"left", "right"}) {  // what a lab knows of its cameras, whatever the row plays
+    overrides.push_back("cameras." + camera + ".distortion=[0, 0, 0, 0, 0]");
+    overrides.push_back("cameras." + camera + ".readout_ms=unknown");
+  }
   if (job.row->lens_known) {
     // The simulator draws through the lenses of its configuration; so does the estimator's then.
     overrides.emplace_back("cameras.left.distortion=[-0.3, 0, 0, 0, 0]");
