@@ -101,7 +101,7 @@ TEST(LiveDiagnosis, MeasuresALargeLatencyAndSaysWhenAJointSlipped) {
   EXPECT_TRUE(sentence.find(" UTC") != std::string::npos) << sentence;
 }
 
-/// What the estimator itself saw happen needs no second look: some 10 s after a slip it is said, with its size and time.
+/// What the estimator itself saw happen needs no second look: some 10 s after a slip it is said, with size and time.
 TEST(LiveDiagnosis, SaysWhatTheEstimatorSawSlip) {
   const auto said = listen("slip:joint=r_elbow,value=3,at=26", 38.0);
   ASSERT_TRUE(named(said.news.back(), "slip")) << said.per_frame.back();
