@@ -64,10 +64,12 @@ TEST_F(BeliefsOfOwnRobot, ALensNobodyCalibratedIsEstimated) {
 }
 
 TEST_F(BeliefsOfOwnRobot, HowLongPicturesAreReadOutIsEstimatedUntilTheConfigurationSaysSo) {
-  const auto beliefs = read(load());
+  const auto beliefs = read(load({"cameras.left.readout_ms=unknown", "cameras.right.readout_ms=unknown"}));
   ASSERT_NE(find(beliefs.state, "rolling_shutter"), nullptr);
   EXPECT_NEAR(find(beliefs.state, "rolling_shutter")->sd.at(0), 0.015, 1e-12);
-  EXPECT_NE(find(read(load({"cameras.left.readout_ms=20"})).state, "rolling_shutter"), nullptr);
+  EXPECT_NE(
+      find(read(load({"cameras.left.readout_ms=20", "cameras.right.readout_ms=unknown"})).state, "rolling_shutter"),
+      nullptr);
   EXPECT_EQ(find(read(load({"cameras.left.readout_ms=20", "cameras.right.readout_ms=0"})).state, "rolling_shutter"),
             nullptr);
 }
