@@ -94,8 +94,8 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
     if (lens_knowledge(configuration.section("cameras").section(camera.name)) == LensKnowledge::kUnknown) {
       spdlog::warn(
           "camera '{}' has no distortion in the configuration: how its lens bends pictures (k1) is estimated beside "
-          "the offsets, which takes longer and tells them less well; set cameras.{}.distortion, to zeros where pictures "
-          "come straightened",
+          "the offsets, which takes longer and tells them less well; set cameras.{}.distortion, to zeros where "
+          "pictures come straightened",
           camera.name, camera.name);
     }
     std::optional<Undistorter> undistorter;
