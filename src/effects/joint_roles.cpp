@@ -114,8 +114,11 @@ class ArmAnatomy {
     return segments;
   }
 
+  /// Each link once by the joint at its far end. One that turns about its own length also by the joint that turns it:
+  /// where on its axis that sits a URDF may choose freely, often at the near end, so that the robot's own may carry the
+  /// link, cover and all, further out.
   [[nodiscard]] std::vector<ArmLink> links() const {
-    constexpr double kApart_m = 0.02;
+    constexpr double kApart_m = 0.02, kAbout = 0.9;
     std::vector<ArmLink> list;
     for (const auto joint : arm_) {
       const auto before = joint_before(joint);
@@ -124,11 +127,16 @@ class ArmAnatomy {
       const double length = along.norm();
       if (length < kApart_m) continue;
       const Eigen::Vector3d direction = along / length;
+      const auto& name = info(joint).parent_link;
+      const bool listed = !list.empty() && list.back().joint == before;
+      if (!listed && joint_before(before) >= 0 && direction.dot(corrected_.shift_axis(before, 0)) > kAbout) {
+        list.push_back({name, before, length, {.along_m = 1.0}});
+      }
       JointAdjustment step;
       step.along_m = direction.dot(corrected_.shift_axis(joint, 0));
       step.shift_1_m = direction.dot(corrected_.shift_axis(joint, 1));
       step.shift_2_m = direction.dot(corrected_.shift_axis(joint, 2));
-      list.push_back({info(joint).parent_link, joint, length, step});
+      list.push_back({name, joint, length, step});
     }
     return list;
   }
