@@ -24,10 +24,10 @@ void ShapeError::add(std::span<const OutlinePoint> points, std::size_t camera, d
     const double residual = mean.sum / mean.weight;
     // What earlier postures left was left by an earlier estimate.
     const double kept = std::exp(-1.0 / limits::kRecentPostures);
-    for (double* sum : {&known.postures, &known.points, &known.sum, &known.square}) *sum *= kept;
+    for (double* sum : {&known.postures, &known.weight, &known.sum, &known.square}) *sum *= kept;
     ++known.seen;
     known.postures += 1.0;
-    known.points += mean.points;
+    known.weight += mean.weight;
     known.sum += residual;
     known.square += residual * residual;
   }
@@ -45,10 +45,10 @@ double ShapeError::variance_px2(double floor_px, double fitted) const {
     // Chance cannot be told from shape in the first few.
     const double of_mean =
         part.seen < limits::kPosturesOfShape ? 0.0 : std::max(0.0, part.square / n - mean * mean) / (n - 1.0);
-    square += part.points * (mean * mean - of_mean);
-    alike += part.points * part.points / n;
-    weight += part.points;
-    weight_square += part.points * part.points;
+    square += part.weight * (mean * mean - of_mean);
+    alike += part.weight * part.weight / n;
+    weight += part.weight;
+    weight_square += part.weight * part.weight;
   }
   if (weight <= 0.0) return 0.0;
   // Parts that have a say: as many as equally large ones would be.

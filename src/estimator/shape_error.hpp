@@ -16,7 +16,8 @@ namespace bodyschema {
 /// A variance component: the mean square over the parts of the mean residual over postures, less what chance leaves
 /// there by how the same residuals vary between postures. What a fit took up is not seen: as of any variance that is
 /// measured on what a fit leaves, degrees of freedom make up for it, those of as many parts as have a say of their own
-/// less those of the parameters that were fitted. Lengths are px of a 320x240 picture.
+/// less those of the parameters that were fitted. A part counts by the robust weight of its points: what a fit sets aside
+/// (the edge of another finger beside a narrow gap) does not move it. Lengths are px of a 320x240 picture.
 class ShapeError {
  public:
   /// Adds one posture's picture.
@@ -33,7 +34,7 @@ class ShapeError {
  private:
   struct Part {
     int seen = 0;                                                  ///< postures
-    double postures = 0.0, points = 0.0, sum = 0.0, square = 0.0;  ///< of mean residuals; fading
+    double postures = 0.0, weight = 0.0, sum = 0.0, square = 0.0;  ///< of mean residuals; fading
   };
   std::map<std::pair<std::size_t, std::size_t>, Part> parts_;  ///< by camera and part
 };
