@@ -45,7 +45,7 @@ double ShapeError::variance_px2(double floor_px, double fitted) const {
     // Chance cannot be told from shape in the first few.
     const double of_mean =
         part.seen < limits::kPosturesOfShape ? 0.0 : std::max(0.0, part.square / n - mean * mean) / (n - 1.0);
-    square += part.weight * (mean * mean - of_mean);
+    square += part.weight * part.weight / n * (mean * mean - of_mean);
     alike += part.weight * part.weight / n;
     weight += part.weight;
     weight_square += part.weight * part.weight;
@@ -54,7 +54,7 @@ double ShapeError::variance_px2(double floor_px, double fitted) const {
   // Parts that have a say: as many as equally large ones would be.
   const double parts = weight * weight / weight_square;
   const double left = parts / std::max(limits::kLeastLeft * parts, parts - fitted);
-  return std::max(0.0, left * square / weight - floor_px * floor_px) * alike / weight;
+  return std::max(0.0, left * square / alike - floor_px * floor_px) * alike / weight;
 }
 
 }  // namespace bodyschema
