@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "bodyschema/core/installation.hpp"
 #include "../common_options.hpp"
 #include "../print_configuration.hpp"
 #include "commands.hpp"
@@ -39,6 +40,7 @@ void add_calibrate(CLI::App& app) {
       return;
     }
     a->options.log = a->log;
+    a->options.configuration = find_data_file(a->common.config);
     a->options.out = a->out;
     const Calibration calibration = calibrate(configuration, a->options);
     std::fputs(to_table(calibration).c_str(), stdout);

@@ -444,9 +444,6 @@ class Calibrator {
     const auto& C = batch.estimate().covariance;
     const auto& state = batch.state();
     constexpr double kHardlyLearned = 0.8, kAlike = 0.7;
-    if (std::sqrt(C(joint, joint)) > kHardlyLearned * state.parameters()[static_cast<std::size_t>(joint)].prior_sd) {
-      return "its motion hardly changes the outline: a round link, or one out of view";
-    }
     Eigen::Index like = -1;
     double most = kAlike;
     for (Eigen::Index k = 0; k < state.size(); ++k) {
@@ -454,6 +451,10 @@ class Calibrator {
       if (k == joint || alike <= most) continue;
       most = alike;
       like = k;
+    }
+    const auto& p = state.parameters()[static_cast<std::size_t>(joint)];
+    if (like < 0 && std::sqrt(C(joint, joint)) > kHardlyLearned * p.prior_sd) {
+      return "its motion hardly changes the outline: a round link, or one out of view";
     }
     if (like < 0) return "the postures hardly tell it";
     return "no picture tells it from " + state.parameters()[static_cast<std::size_t>(like)].name;
@@ -479,22 +480,11 @@ class Calibrator {
       found.X_link_optical = place(x);
       found.intrinsics = corrected.cameras[c].intrinsics;
       found.distortion = corrected.cameras[c].distortion;
-      Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, state.size());
-      for (Eigen::Index k = 0; k < state.size(); ++k) {
-        const auto& effect = state.model()[state.parameters()[static_cast<std::size_t>(k)].ref.effect].name();
-        if (effect != "camera_pose" && effect != "camera_pair" && effect != "baseline") continue;
-        found.estimated = true;
-        constexpr double kStep = 1e-5;
-        Eigen::VectorXd moved = x;
-        moved[k] += kStep;
-        const Pose X = place(moved);
-        J.col(k).head<3>() = (X.translation() - found.X_link_optical.translation()) / kStep;
-        const Eigen::AngleAxisd turn(Eigen::Matrix3d(X.linear() * found.X_link_optical.linear().transpose()));
-        J.col(k).tail<3>() = turn.angle() * turn.axis() / kStep;
-      }
+      const Eigen::MatrixXd J = place_jacobian(state, place, found.estimated);
       const Eigen::MatrixXd C = J * batch.estimate().covariance * J.transpose();
       found.sd_m = std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace()));
       found.sd_rad = std::sqrt(std::max(0.0, C.bottomRightCorner<3, 3>().trace()));
+      if (camera.mount.relative) found.beside = beside_first(batch, c);
       const Eigen::VectorXd with_first = J * batch.estimate().covariance.col(0);
       const Eigen::MatrixXd beside =
           C - with_first * with_first.transpose() / std::max(1e-300, batch.estimate().covariance(0, 0));
@@ -502,6 +492,41 @@ class Calibrator {
       found.sd_rad_beside_first_joint = std::sqrt(std::max(0.0, beside.bottomRightCorner<3, 3>().trace()));
       result_.cameras.push_back(std::move(found));
     }
+  }
+
+  /// How a place moves, m and rad a unit of each parameter of the state that places cameras.
+  /// @param any  set where there is one
+  template <class PlaceOf>
+  static Eigen::MatrixXd place_jacobian(const State& state, const PlaceOf& place, bool& any) {
+    constexpr double kStep = 1e-5;
+    const Eigen::VectorXd x = state.x();
+    const Pose X = place(x);
+    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, state.size());
+    for (Eigen::Index k = 0; k < state.size(); ++k) {
+      const auto& effect = state.model()[state.parameters()[static_cast<std::size_t>(k)].ref.effect].name();
+      if (effect != "camera_pose" && effect != "camera_pair" && effect != "baseline") continue;
+      any = true;
+      Eigen::VectorXd changed = x;
+      changed[k] += kStep;
+      const Pose moved = place(changed);
+      J.col(k).head<3>() = (moved.translation() - X.translation()) / kStep;
+      const Eigen::AngleAxisd turn(Eigen::Matrix3d(moved.linear() * X.linear().transpose()));
+      J.col(k).tail<3>() = turn.angle() * turn.axis() / kStep;
+    }
+    return J;
+  }
+
+  /// Where the pictures say that two cameras are rigid, they are better known to each other than to the robot.
+  [[nodiscard]] CalibratedCamera::Beside beside_first(const BatchFit& batch, std::size_t camera) const {
+    const auto& state = batch.state();
+    const auto place = [&](const Eigen::VectorXd& x) {
+      return camera_place(state, x, 0).inverse(Eigen::Isometry) * camera_place(state, x, camera);
+    };
+    bool any = false;
+    const Eigen::MatrixXd J = place_jacobian(state, place, any);
+    const Eigen::VectorXd variance = (J * batch.estimate().covariance * J.transpose()).diagonal().cwiseMax(0.0);
+    return {rig_.cameras.front().name, place(state.x()), std::sqrt(variance.head<3>().sum()),
+            std::sqrt(variance.tail<3>().sum())};
   }
 
   [[nodiscard]] std::string carrier_of(std::size_t camera) const {

@@ -125,17 +125,21 @@ std::string cameras_yaml(const Calibration& c) {
   for (const auto& camera : c.cameras) {
     const auto& k = camera.intrinsics;
     const auto& d = camera.distortion;
-    const Eigen::Matrix4d X = camera.X_link_optical.matrix();
-    text += fmt::format("  {}:\n    link: {}\n", camera.name, camera.link);
-    text += "    beside: ~  # instead of a place beside the first camera\n    X_beside_optical: ~\n";
-    text += "    X_link_optical:\n";
+    const auto& beside = camera.beside;
+    const Eigen::Matrix4d X = (beside ? beside->X_first_optical : camera.X_link_optical).matrix();
+    const double sd_m = beside ? beside->sd_m : camera.sd_m, sd_rad = beside ? beside->sd_rad : camera.sd_rad;
+    // The other way to place a camera is taken out of what this is included behind.
+    text += beside ? fmt::format("  {}:\n    link: ~\n    X_link_optical: ~\n    beside: {}\n    X_beside_optical:\n",
+                                 camera.name, beside->camera)
+                   : fmt::format("  {}:\n    beside: ~\n    X_beside_optical: ~\n    link: {}\n    X_link_optical:\n",
+                                 camera.name, camera.link);
     for (int r = 0; r < 4; ++r) {
       text += fmt::format("      - [{:.9f}, {:.9f}, {:.9f}, {:.9f}]\n", X(r, 0), X(r, 1), X(r, 2), X(r, 3));
     }
     if (camera.estimated) {
       text += fmt::format("    pose: roughly\n    pose_sd_deg: {:.4f}\n    pose_sd_mm: {:.3f}\n",
-                          std::max(1e-3, degrees(camera.sd_rad) / std::sqrt(3.0)),
-                          std::max(1e-2, 1e3 * camera.sd_m / std::sqrt(3.0)));
+                          std::max(1e-3, degrees(sd_rad) / std::sqrt(3.0)),
+                          std::max(1e-2, 1e3 * sd_m / std::sqrt(3.0)));
     } else {
       text += "    pose: known\n";
     }
@@ -145,6 +149,17 @@ std::string cameras_yaml(const Calibration& c) {
         k.width, k.height, k.fx, k.fy, k.cx, k.cy, d[0], d[1], d[2], d[3], d[4]);
   }
   return text;
+}
+
+/// The configuration as it was, with the cameras as found: what replay, diagnose and the service go on with.
+std::string estimator_yaml(const CalibrationOptions& options) {
+  namespace fs = std::filesystem;
+  const fs::path before = fs::proximate(fs::absolute(options.configuration), fs::absolute(options.out));
+  std::string quoted;
+  for (const char c : before.generic_string()) quoted += c == '\'' ? "''" : std::string(1, c);
+  return fmt::format(
+      "# The configuration that was calibrated, with its cameras where they were found.\ninclude: ['{}', cameras.yaml]\n",
+      quoted);
 }
 
 /// Where the URDF itself places a camera, and nothing else was found, it stays with the URDF.
@@ -258,6 +273,7 @@ void write_calibration(const Calibration& calibration, const BatchFit& batch, Pi
   write_page(calibration, batch, log, kept, options);
   replace_file(options.out / "offsets.yaml", offsets_yaml(calibration, options.all_parameters));
   replace_file(options.out / "cameras.yaml", cameras_yaml(calibration));
+  if (!options.configuration.empty()) replace_file(options.out / "estimator.yaml", estimator_yaml(options));
   const Correction correction = correction_of(calibration, options.all_parameters);
   write_corrected_urdf(pipeline.setup().model.urdf, correction, options.out / "corrected.urdf");
   write_ros_files(options.out / "ros", pipeline.setup().model.urdf, options.out / "corrected.urdf", correction,

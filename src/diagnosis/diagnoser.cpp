@@ -100,9 +100,10 @@ class Diagnoser {
     }
     if (length < options_.shortest_log_s && postures < options_.fewest_postures) {
       throw DataError(
-          fmt::format("{:.1f} s of pictures in {} postures are too few; record at least {:.0f} s, better 60 s, "
-                      "or {} postures",
-                      length, postures, options_.shortest_log_s, options_.fewest_postures));
+          fmt::format("{:.1f} s of pictures are too few; record at least {:.0f} s of motion, better 60 s, or {} "
+                      "postures{}",
+                      length, options_.shortest_log_s, options_.fewest_postures,
+                      postures > 1 ? fmt::format(" (it has {})", postures) : ""));
     }
   }
 

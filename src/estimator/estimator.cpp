@@ -317,6 +317,7 @@ struct Estimator::Impl {
     if (!options.remember) memory.forget_all();
     read_encoders();
     for (const auto joint : stalled.look(reading)) memory.release(std::vector{joint}, now_s);
+    fitter.count_still_parts_once(std::max(memory.postures(), options.least_postures));
     if (memory.empty()) {
       find_anew();
     } else {

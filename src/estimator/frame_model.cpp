@@ -30,6 +30,28 @@ FrameModel::FrameModel(std::shared_ptr<const RobotModel> robot, const RobotSetup
     sags_ = sags_ || std::as_const(state_).model()[e].follows_gravity();
     remembers_ = remembers_ || std::as_const(state_).model()[e].has_memory();
   }
+  find_still_parts(setup.default_joints(*robot));
+}
+
+void FrameModel::find_still_parts(const Eigen::VectorXd& q) {
+  constexpr double kStep_rad = 0.1, kMoved = 1e-9;
+  auto& projection = measurement_.projection();
+  still_parts_.assign(projection.part_count(), true);
+  for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
+    projection.place(q, nothing_, c);
+    const std::vector<Pose> rest(projection.links().begin(), projection.links().end());
+    for (const auto* joints : {&roles_.arm, &roles_.head}) {
+      for (const auto joint : *joints) {
+        Eigen::VectorXd moved = q;
+        moved[joint] += kStep_rad;
+        projection.place(moved, nothing_, c);
+        const auto links = projection.links();
+        for (std::size_t part = 0; part < rest.size(); ++part) {
+          if (!links[part].isApprox(rest[part], kMoved)) still_parts_[part] = false;
+        }
+      }
+    }
+  }
 }
 
 void FrameModel::forget() {

@@ -55,6 +55,8 @@ class FrameModel {
   [[nodiscard]] const State& state() const { return state_; }
   [[nodiscard]] const JointRoles& roles() const { return roles_; }
   [[nodiscard]] std::size_t part_count() const { return measurement_.part_count(); }
+  /// Which parts no joint of arm or head moves against the cameras: the base before a camera that stands still.
+  [[nodiscard]] const std::vector<bool>& still_parts() const { return still_parts_; }
   [[nodiscard]] Eigen::Index beside_count() const { return static_cast<Eigen::Index>(beside_.parameters().size()); }
   [[nodiscard]] double picture_unit_px(std::size_t camera) const {
     return picture_unit(rig_.cameras[camera].intrinsics);
@@ -87,6 +89,7 @@ class FrameModel {
  private:
   void find_directions(const Exposure& exposure, const Eigen::VectorXd& x, bool with_beside);
   void expose(const JointSample& joints, std::size_t camera, const Eigen::VectorXd& x, Exposure& out);
+  void find_still_parts(const Eigen::VectorXd& q);
 
   JointRoles roles_;
   StereoRig rig_;
@@ -94,6 +97,7 @@ class FrameModel {
   bool sags_ = false;       ///< some effect follows gravity
   bool remembers_ = false;  ///< some effect has a memory
   OutlineMeasurement measurement_;
+  std::vector<bool> still_parts_;
   EncoderTrack track_;
   EffectProbes probes_, beside_;
   const Frame* settled_frame_ = nullptr;

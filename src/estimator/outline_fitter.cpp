@@ -22,7 +22,7 @@ std::vector<OutlineSearch> OutlineFitter::searches(double search_px, bool last, 
   std::vector<OutlineSearch> list;
   for (const auto& noise : noise_) {
     const double robust_px = last ? noise.robust_px() : std::max(noise.robust_px(), 0.5 * search_px);
-    list.push_back({search_px, options_.outline_spacing_px, robust_px});
+    list.push_back({search_px, options_.outline_spacing_px, robust_px, part_weight_});
     if (without_odd) list.back().odd_sd_px = std::max(noise.sd_px(), limits::kLeastOdd_px);
   }
   return list;
@@ -156,6 +156,13 @@ std::vector<OutlinePoint> OutlineFitter::shown(const OutlineFit& fit, std::size_
   return without_hidden(fit.seen.evidence.samples[camera], fit.points[camera],
                         limits::kBeside_px * model_.picture_unit_px(camera),
                         limits::kParallel_px * model_.picture_unit_px(camera));
+}
+
+void OutlineFitter::count_still_parts_once(std::size_t postures) {
+  part_weight_.clear();
+  const auto& still = model_.still_parts();
+  if (std::find(still.begin(), still.end(), true) == still.end()) return;
+  for (const bool part : still) part_weight_.push_back(part ? 1.0 / static_cast<double>(postures) : 1.0);
 }
 
 void OutlineFitter::learn_noise(const OutlineFit& fit) {

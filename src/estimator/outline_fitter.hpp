@@ -51,6 +51,9 @@ class OutlineFitter {
   [[nodiscard]] bool fits(const FrameEvidence& evidence) const;
   /// Whether what is left of an outline without odd pieces is enough to be learned from, and lies near.
   [[nodiscard]] bool rest_fits(const OutlineFit::Seen& seen) const;
+  /// From now on parts that no joint moves against the cameras count as one posture of so many: what they say, and what
+  /// hides them or is taken for them, is the same in all of them.
+  void count_still_parts_once(std::size_t postures);
   /// Measures the outlines' noise on what a good fit leaves.
   void learn_noise(const OutlineFit& fit);
   /// Measures what outlines get wrong alike in all postures on what the fit of a new one leaves.
@@ -85,6 +88,7 @@ class OutlineFitter {
   HypothesisScorer& scorer_;
   const EstimatorOptions& options_;
   std::vector<OutlineNoise> noise_;  ///< per camera
+  std::vector<double> part_weight_;  ///< as OutlineSearch
   ShapeError shape_;
 };
 

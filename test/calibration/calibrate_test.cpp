@@ -81,6 +81,7 @@ class Calibrated : public ::testing::Test {
     options.log = log;
     options.out = folder_ / "out";
     options.quiet = true;
+    options.configuration = fs::path(BODYSCHEMA_SOURCE_DIR) / "config/arm7/estimator.yaml";
     return calibrate(arm7("estimator.yaml", overrides), options);
   }
 
@@ -119,6 +120,37 @@ TEST_F(Calibrated, OffsetsAreFoundWithinWhatIsClaimedAndTheFilesSayTheSame) {
   ASSERT_EQ(after.cameras.size(), 2u);
   EXPECT_FALSE(after.cameras[1].mount.relative);
   EXPECT_NE(after.cameras[1].mount.knowledge, PlaceKnowledge::kUnknown);
+}
+
+/// Two cameras on one bar keep what their own calibration says: where both are hardly known to the robot, they are well
+/// known to each other.
+TEST_F(Calibrated, CamerasBesideEachOtherStaySoInTheFiles) {
+  const std::vector<std::string> bar = {
+      "cameras.left.pose=roughly",
+      "cameras.left.pose_sd_deg=2",
+      "cameras.left.pose_sd_mm=20",
+      "cameras.right.link=~",
+      "cameras.right.beside=left",
+      "cameras.right.X_beside_optical=[[1, 0, 0, 0.3], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]",
+      "cameras.right.pose=roughly",
+      "cameras.right.pose_sd_deg=0.1",
+      "cameras.right.pose_sd_mm=1"};
+  const auto result = calibration(recorded(), bar);
+  ASSERT_EQ(result.cameras.size(), 2u);
+  ASSERT_TRUE(result.cameras[1].beside);
+  EXPECT_LT(result.cameras[1].beside->sd_rad, radians(0.18));
+  EXPECT_LT(result.cameras[1].beside->sd_rad, 0.5 * result.cameras[0].sd_rad);
+  const auto written = Configuration::load(folder_ / "out" / "estimator.yaml");
+  EXPECT_EQ(written.section("bus").text("channel_prefix"), "ARM7");
+  const auto after = StereoRig::from(written.section("cameras"));
+  ASSERT_EQ(after.cameras.size(), 2u);
+  EXPECT_TRUE(after.cameras[1].mount.relative);
+  EXPECT_NEAR(after.cameras[1].mount.sd_rad, result.cameras[1].beside->sd_rad / std::sqrt(3.0), 1e-5);
+  const Pose X = result.cameras[0].X_link_optical.inverse(Eigen::Isometry) * result.cameras[1].X_link_optical;
+  EXPECT_LT((after.cameras[1].mount.X_PC.translation() - X.translation()).norm(), 1e-6);
+  const auto untold = std::find_if(result.joints.begin(), result.joints.end(), [](const auto& j) { return !j.told; });
+  ASSERT_NE(untold, result.joints.end());
+  EXPECT_THAT(result.joints.front().untold_why, HasSubstr("from camera_pose"));
 }
 
 /// Joints as told, within what is claimed of them, and never far off while the calibration calls itself good.

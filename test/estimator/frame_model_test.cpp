@@ -77,6 +77,22 @@ TEST_F(FrameModelOfOwnRobot, MemoryEndsAtTheExposureThoughLaterSamplesCame) {
   EXPECT_TRUE(positive && negative) << "the motion never crossed the play";
 }
 
+TEST_F(FrameModelOfOwnRobot, HeadThatTurnsLeavesNoPartStill) {
+  FrameModel frames = model(ErrorModel(roles_));
+  for (const bool still : frames.still_parts()) EXPECT_FALSE(still);
+}
+
+TEST(FrameModel, BaseIsStillBeforeCamerasThatStandStill) {
+  const auto configuration = Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/arm7/robot.yaml",
+                                                 {"robot.rendered_links=[base, link2, hand]"});
+  const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
+  const auto robot = setup.load();
+  const StereoRig rig = StereoRig::from(configuration.section("cameras"));
+  const auto roles = JointRoles::of(robot, setup, rig);
+  const FrameModel frames(robot, setup, rig, roles, State(ErrorModel(roles), {}), ErrorModel(roles));
+  EXPECT_EQ(frames.still_parts(), (std::vector<bool>{true, false, false}));
+}
+
 TEST_F(FrameModelOfOwnRobot, OtherEncodersBeginWithoutAMemory) {
   ErrorModel known(roles_);
   known.add("backlash", {"r_elbow", ""}).parameters()[0].value = radians(2.0);

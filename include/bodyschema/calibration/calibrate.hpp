@@ -18,6 +18,9 @@ namespace bodyschema {
 struct CalibrationOptions {
   std::filesystem::path log;
   std::filesystem::path out;  ///< folder, created
+  /// The file that the configuration was read from: estimator.yaml in `out` includes it, with the cameras as found
+  /// behind it. Empty: none is written.
+  std::filesystem::path configuration;
   double picture_rate_hz = 5.0;
   bool all_parameters = false;  ///< what the pictures do not tell goes into the files as well
   int threads = 0;              ///< 0: one per core
@@ -51,6 +54,13 @@ struct CalibratedCamera {
   /// The same if the arm's first joint were known: where the camera does not move with the robot's base, no picture
   /// tells that joint from a turn of the camera about its axis, and both figures above contain the turn.
   double sd_m_beside_first_joint = 0.0, sd_rad_beside_first_joint = 0.0;
+  /// Of a camera that is configured beside the rig's first: its place there, sds as above, and that one's name.
+  struct Beside {
+    std::string camera;
+    Pose X_first_optical = Pose::Identity();
+    double sd_m = 0.0, sd_rad = 0.0;
+  };
+  std::optional<Beside> beside;
   bool estimated = false;  ///< false: as configured
   bool searched = false;   ///< nothing was known of it
 };
@@ -108,8 +118,8 @@ struct Calibration {
 /// believed uncertain (`cameras: pose`, `estimator.state`), by the outlines in all pictures at once. A camera of which
 /// nothing is known is searched for.
 ///
-/// Writes calibration.json, report.html, corrected.urdf, offsets.yaml, cameras.yaml, ros/ (write_ros_files)
-/// into `out`. Throws Error.
+/// Writes calibration.json, report.html, corrected.urdf, offsets.yaml, cameras.yaml, estimator.yaml, ros/
+/// (write_ros_files) into `out`. Throws Error.
 Calibration calibrate(const Configuration& configuration, const CalibrationOptions& options);
 
 /// The result as a table for people.
