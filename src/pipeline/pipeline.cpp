@@ -169,15 +169,25 @@ void Pipeline::finish_learning() {
   for (auto& eye : eyes_) eye.segmenter.finish_learning();
 }
 
-Estimate Pipeline::process(Observation& observation, const Observation* next) {
-  segment(observation);
-  if (next == nullptr || masks_need_estimates()) return estimate(observation);
-  ahead_ = worker_->begin([this, next] { return look(*next, false); });
+Estimate Pipeline::process(Observation& observation, const Observation* next, const OnEstimate& on_estimate) {
+  find_masks(observation);
+  const bool looks_ahead = next != nullptr && !masks_need_estimates();
+  if (looks_ahead) {
+    ahead_ = worker_->begin([this, next, &observation] {
+      learn_from_masks(observation, false);
+      return look(*next, false);
+    });
+  }
   struct Wait {
     const std::future<Looks>& ahead;
-    ~Wait() { ahead.wait(); }
+    ~Wait() {
+      if (ahead.valid()) ahead.wait();
+    }
   } const wait{ahead_};
-  return estimate(observation);
+  Estimate estimated = estimate(observation);
+  if (on_estimate) on_estimate(estimated);
+  if (!looks_ahead) learn_from_masks(observation, true);
+  return estimated;
 }
 
 bool Pipeline::frozen(const PictureChange& change) {
@@ -199,7 +209,11 @@ void Pipeline::Look::leave_out_all_but(const BinaryMask& seen) {
 
 /// Each camera by itself: the other thread takes the second's share where it has nothing else to do.
 template <class OfCamera>
-void Pipeline::for_each_eye(const OfCamera& of_camera) {
+void Pipeline::for_each_eye(const OfCamera& of_camera, bool alone) {
+  if (!alone) {
+    for (std::size_t c = 0; c < eyes_.size(); ++c) of_camera(c);
+    return;
+  }
   std::future<void> second;
   if (eyes_.size() > 1) second = worker_->begin([&] { of_camera(std::size_t{1}); });
   std::exception_ptr failed;
@@ -228,11 +242,7 @@ Pipeline::Looks Pipeline::look(const Observation& observation, bool alone) {
   const auto of_camera = [&](std::size_t c) {
     if (observation.cameras[c]) looks.of[c] = look_with(c, *observation.cameras[c], std::move(predicted[c]));
   };
-  if (alone) {
-    for_each_eye(of_camera);
-  } else {
-    for (std::size_t c = 0; c < eyes_.size(); ++c) of_camera(c);
-  }
+  for_each_eye(of_camera, alone);
   return looks;
 }
 
@@ -283,11 +293,16 @@ Pipeline::Looks Pipeline::looks_at(const Observation& observation) {
 }
 
 bool Pipeline::segment(Observation& observation) {
+  find_masks(observation);
+  learn_from_masks(observation, true);
+  return !learning_;
+}
+
+void Pipeline::find_masks(Observation& observation) {
   const auto start = std::chrono::steady_clock::now();
   Looks looks = looks_at(observation);
   learning_ = false;
-  std::vector<std::optional<BinaryMask>> predicted(eyes_.size());
-  std::vector<bool> adapts(eyes_.size(), false);
+  lessons_.assign(eyes_.size(), {});
   for (std::size_t c = 0; c < eyes_.size(); ++c) {
     if (!looks.of[c]) continue;
     Look& look = *looks.of[c];
@@ -300,22 +315,32 @@ bool Pipeline::segment(Observation& observation) {
     learning_ = learning_ || look.learning;
     if (frozen(look.change)) continue;
     watch_background(observation, c, look.learning);
-    adapts[c] = true;
-    if (tracking_ && needs_background()) predicted[c] = estimator_.predicted_silhouette(observation, c, true);
-    if (vision_.method == SegmentationMethod::kAuto) predicted[c] = std::move(look.predicted);
+    Lesson& lesson = lessons_[c];
+    lesson.given = true;
+    if (tracking_ && needs_background()) lesson.silhouette = estimator_.predicted_silhouette(observation, c, true);
+    if (vision_.method == SegmentationMethod::kAuto) lesson.silhouette = std::move(look.predicted);
+    lesson.trusted = tracking_;
   }
-  for_each_eye([&](std::size_t c) {
-    if (!adapts[c]) return;
-    const CameraObservation& seen = *observation.cameras[c];
-    eyes_[c].segmenter.adapt(seen.image, seen.mask, prediction(c, predicted[c]));
-  });
   if (learning_) {
+    learn_from_masks(observation, true);
     for (auto& seen : observation.cameras) {
       if (seen) seen->mask = BinaryMask();
     }
   }
   segmentation_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-  return !learning_;
+}
+
+/// What the pictures tell for the next ones: background and looks. Once for each observation.
+void Pipeline::learn_from_masks(const Observation& observation, bool alone) {
+  const auto of_camera = [&](std::size_t c) {
+    const Lesson& lesson = lessons_[c];
+    if (!lesson.given) return;
+    const CameraObservation& seen = *observation.cameras[c];
+    const BinaryMask* silhouette = lesson.silhouette ? &*lesson.silhouette : nullptr;
+    eyes_[c].segmenter.adapt(seen.image, seen.mask, {silhouette, 0.0, lesson.trusted});
+    lessons_[c].given = false;
+  };
+  for_each_eye(of_camera, alone);
 }
 
 /// Only methods that compare with a background that was known before; `auto` finds out by itself.

@@ -360,10 +360,13 @@ class Daemon {
     Observation& observation = arrived.observation;
     Pipeline& pipeline = *session_->pipeline;
     session_->next = session_->queue.pop(milliseconds(0));
-    estimate = pipeline.process(observation, session_->next ? &session_->next->observation : nullptr);
-    const bool news = session_->diagnosis && session_->diagnosis->watch(observation, estimate);
-    const std::int64_t published = publish(estimate, arrived.arrival_us);
-    if (news) send(channels().findings, encode(to_message(estimate.findings)));
+    std::int64_t published = begin;
+    pipeline.process(observation, session_->next ? &session_->next->observation : nullptr, [&](const Estimate& made) {
+      estimate = made;
+      const bool news = session_->diagnosis && session_->diagnosis->watch(observation, estimate);
+      published = publish(estimate, arrived.arrival_us);
+      if (news) send(channels().findings, encode(to_message(estimate.findings)));
+    });
     if (estimates_.is_open()) write(estimate);
 
     const StageTimes& t = estimate.times;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -20,57 +22,106 @@ class ColourEvidence {
   /// changed.
   static constexpr double kEverywhere_px = 30.0;
 
+  /// First of all: where to look, and how deep inside the prediction each pixel near its outline lies.
   /// @param predicted  where the robot is thought to be
   /// @param reach_px   how far off that may be
-  /// @param looks      the robot's colours as known before
-  /// @param background pixels whose background is known say themselves whether they differ, in `differs`; null: none is
-  /// @param robot      out: pixels taken for robot
-  void separate(const Image& image, const BinaryMask& predicted, double reach_px, const RobotLooks& looks,
-                const BackgroundModel* background, const BinaryMask& differs, BinaryMask& robot);
+  /// @param whole      look at all of the picture where the prediction may be as far off as says nothing
+  void look_at(const BinaryMask& predicted, double reach_px, bool whole);
+  /// @param looks    the robot's colours as known before
+  /// @param known    pixels whose background is known: they say themselves whether they differ, in `differs`
+  /// @param robot    out: pixels taken for robot
+  void separate(const Image& image, const RobotLooks& looks, const BinaryMask& known, const BinaryMask& differs,
+                BinaryMask& robot);
   /// Pixels near the outline whose colour, with those around, told nothing in the last `separate`: what was decided
   /// there is the prediction, not the picture.
   void mark_weak(BinaryMask& weak);
-  /// The robot's colours where it was predicted in the last `separate`.
+  /// The robot's colours where it was predicted.
   /// @param share  of the new ones in `looks`
-  void learn(const Image& image, const BinaryMask& predicted, float share, RobotLooks& looks);
+  void learn(const Image& image, float share, RobotLooks& looks);
 
-  /// Where the last `separate` looked.
+  /// Where is looked.
   [[nodiscard]] const PixelBox& box() const { return box_; }
-  /// How far inside the prediction a pixel of the box lay, px; outside: negative.
-  [[nodiscard]] float depth(int u, int v) const {
-    return depth_[static_cast<std::size_t>(v - box_.v0) * static_cast<std::size_t>(box_.width()) +
-                  static_cast<std::size_t>(u - box_.u0)];
-  }
+  /// Calls function(u, v) for pixels outside of the prediction whose distance from its outline lies between these,
+  /// px, as far as `look_at` measured it: as far as the prediction may be off, and a little further.
+  template <class Function>
+  void for_each_outside(float from_px, float to_px, Function&& function) const;
 
  private:
   struct Side {
     std::vector<float> tiles;  ///< counts by tile and cell
-    std::vector<float> near;   ///< the same, summed over a tile and its neighbours
-    std::vector<float> total;  ///< pixels by tile, of `near`
-    std::vector<float> all;    ///< of the whole box
+    std::vector<float> total;  ///< the same of all cells
+    std::vector<float> all;    ///< counts by cell, of the whole box
     float count = 0.0f;
   };
-  void measure_depth(const BinaryMask& predicted);
-  [[nodiscard]] float core_depth(double reach_px) const;
+  void measure_distance();
+  void mark_outline();
+  void pass_on(int v, bool forwards);
+  /// No further than this from the predicted outline.
+  void within(float px, BinaryMask& out);
+  [[nodiscard]] float core_depth() const;
+  void find_sides();
+  void find_sides_again(const BinaryMask& robot);
   void find_cells(const Image& image);
-  void collect(Side& robot, Side& rest) const;
-  void spread(Side& side) const;
-  void weigh(const RobotLooks& looks, double reach_px);
-  void decide(double reach_px, int smoothing, const BackgroundModel* background, const BinaryMask& differs,
-              BinaryMask& robot);
+  void collect(const BinaryMask& pixels, Side& side) const;
+  void weigh(const RobotLooks& looks);
+  [[nodiscard]] float evidence_of(const RobotLooks& looks, std::size_t tile, std::size_t cell) const;
+  void decide(BinaryMask& robot);
+  [[nodiscard]] int smoothing() const { return rough_ ? 2 : 1; }
+  /// Calls function(u, v) for pixels of the box.
+  template <class Function>
+  void for_each_in(const BinaryMask& mask, Function&& function) const;
+
+  /// Of a pixel in what is kept by pixel: whole words of the rows of the box, and a pixel and a row around them.
+  [[nodiscard]] std::size_t index(int u, int v) const {
+    return static_cast<std::size_t>(v - box_.v0 + 1) * stride_ + static_cast<std::size_t>(u - first_u_ + 1);
+  }
+  [[nodiscard]] std::size_t tile_of(int u, int v) const {
+    return static_cast<std::size_t>((v - box_.v0) / tile_px_ * columns_ + (u - box_.u0) / tile_px_);
+  }
 
   PixelBox box_;
-  double unit_ = 1.0;   ///< px of a 320x240 picture in this one
+  int first_u_ = 0;         ///< of the words that the box touches
+  std::size_t stride_ = 0;  ///< pixels of these, and one
+  BinaryMask in_box_;
+  double unit_ = 1.0;  ///< px of a 320x240 picture in this one
+  double reach_px_ = 0.0;
   bool rough_ = false;  ///< the prediction may be far off
   int tile_px_ = 32, columns_ = 0, rows_ = 0;
-  std::vector<float> depth_;            ///< px inside (positive) or outside the prediction
-  std::vector<std::int8_t> side_;       ///< 1: robot for certain, -1: background for certain, 0: to be found
-  std::vector<std::uint16_t> cell_;     ///< of each pixel of the box: its number in `palette_`
+  BinaryMask predicted_;
+  BinaryMask band_;                        ///< in whose words distances are measured; elsewhere they are larger
+  BinaryMask near_;                        ///< no further from the outline than the prediction may be off
+  BinaryMask judged_;                      ///< near, and of unknown background: colours decide
+  BinaryMask weighed_;                     ///< these and those around, whose evidence they take in
+  BinaryMask robot_pixels_, rest_pixels_;  ///< robot for certain, background for certain
+  BinaryMask work_;
+  std::vector<float> distance_;         ///< from the predicted outline, px
+  std::vector<std::uint8_t> hits_;      ///< of one word's pixels, 0 or 1
+  std::vector<std::uint16_t> cell_;     ///< of each pixel: its number in `palette_`
   std::vector<std::uint16_t> palette_;  ///< cells that the box shows
   std::vector<std::uint16_t> number_;   ///< of every cell, in `palette_`
+  std::vector<float> known_evidence_;   ///< by tile and cell, once one was asked for; not a number: not yet
   std::vector<float> evidence_, sums_, smooth_;
   Side robot_, rest_;
   MaskMorphology morphology_;
 };
+
+template <class Function>
+void ColourEvidence::for_each_in(const BinaryMask& mask, Function&& function) const {
+  for (int v = box_.v0; v <= box_.v1; ++v) {
+    for (int w = box_.u0 >> 6; w <= box_.u1 >> 6; ++w) {
+      for (std::uint64_t bits = mask.row(v)[w] & in_box_.row(v)[w]; bits != 0; bits &= bits - 1) {
+        function(64 * w + std::countr_zero(bits), v);
+      }
+    }
+  }
+}
+
+template <class Function>
+void ColourEvidence::for_each_outside(float from_px, float to_px, Function&& function) const {
+  for_each_in(band_, [&](int u, int v) {
+    const float px = distance_[index(u, v)];
+    if (px >= from_px && px <= to_px && !predicted_.at(u, v)) function(u, v);
+  });
+}
 
 }  // namespace bodyschema

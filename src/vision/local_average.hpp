@@ -16,15 +16,24 @@ class LocalAverage {
  public:
   /// Of pixels more than two away from the robot, over squares of this half side, px. Pixels of the box without any
   /// within reach, and those that are known already, keep what `local` says of them.
-  /// @param local  in: noise_sd; out: mean and precision within `box`. A varied background is as uncertain as it is
-  ///   varied.
-  void around(const Image& image, const BinaryMask& robot, const PixelBox& box, int radius, BackgroundModel& local);
+  /// @param wanted  pixels that are asked for
+  /// @param local  in: noise_sd; out: mean and precision of wanted pixels of the box. A varied background is as
+  /// uncertain
+  ///   as it is varied.
+  void around(const Image& image, const BinaryMask& robot, const BinaryMask& wanted, const PixelBox& box, int radius,
+              BackgroundModel& local);
 
  private:
+  static constexpr std::size_t kMostPlanes = 5;  ///< colours, their squares, the number of pixels
+  /// Columns and rows that are averaged at once, bounds inclusive.
+  void average_strip(const Image& image, const BinaryMask& wanted, const PixelBox& box, const PixelBox& strip,
+                     int radius, BackgroundModel& local);
+  void sum_along_row(const Image& image, int v, const PixelBox& box, const PixelBox& strip, int radius, int* out) const;
+
   BinaryMask beside_;
   MaskMorphology morphology_;
-  std::array<std::vector<int>, 5> sums_;  ///< colours, their squares, the number of pixels
-  std::vector<int> columns_;
+  std::vector<int> rows_;     ///< sums along rows, of as many as an average takes, plane by plane
+  std::vector<int> columns_;  ///< the same summed over these rows
 };
 
 }  // namespace bodyschema

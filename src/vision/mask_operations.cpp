@@ -69,12 +69,91 @@ void MaskMorphology::step(BinaryMask& mask) {
   }
 }
 
-void MaskMorphology::erode(BinaryMask& mask, int steps) {
-  for (int i = 0; i < steps; ++i) step<true>(mask);
+namespace {
+
+/// Sets, in a row of words, what lies up to `reach` pixels after a set one. Each pass doubles the reach: many steps
+/// cost no more than a few.
+void spread_up(std::uint64_t* row, int words, int reach) {
+  for (int done = 0; done < reach;) {
+    const int step = std::min(done + 1, reach - done);
+    const int whole = step >> 6, part = step & 63;
+    for (int w = words - 1; w >= whole; --w) {
+      std::uint64_t moved = row[w - whole] << part;
+      if (part != 0 && w > whole) moved |= row[w - whole - 1] >> (64 - part);
+      row[w] |= moved;
+    }
+    done += step;
+  }
 }
 
-void MaskMorphology::dilate(BinaryMask& mask, int steps) {
-  for (int i = 0; i < steps; ++i) step<false>(mask);
+/// The same before a set one.
+void spread_down(std::uint64_t* row, int words, int reach) {
+  for (int done = 0; done < reach;) {
+    const int step = std::min(done + 1, reach - done);
+    const int whole = step >> 6, part = step & 63;
+    for (int w = 0; w + whole < words; ++w) {
+      std::uint64_t moved = row[w + whole] >> part;
+      if (part != 0 && w + whole + 1 < words) moved |= row[w + whole + 1] << (64 - part);
+      row[w] |= moved;
+    }
+    done += step;
+  }
+}
+
+}  // namespace
+
+template <bool kErode>
+void MaskMorphology::steps(BinaryMask& mask, int count) {
+  constexpr int kFew = 2;
+  if (count <= kFew) {
+    for (int i = 0; i < count; ++i) step<kErode>(mask);
+    return;
+  }
+  const int words = mask.words_per_row(), height = mask.height();
+  if (words == 0 || height == 0) return;
+  const int used = mask.width() & 63;
+  const std::uint64_t in_picture = used == 0 ? ~std::uint64_t{0} : (std::uint64_t{1} << used) - 1;
+  const auto stride = static_cast<std::size_t>(words);
+  // Along rows, both ways; then whole rows, likewise.
+  rows_.resize((static_cast<std::size_t>(height) + 1) * stride);
+  std::uint64_t* other = rows_.data() + static_cast<std::size_t>(height) * stride;
+  for (int v = 0; v < height; ++v) {
+    auto* row = mask.row(v);
+    auto* out = rows_.data() + static_cast<std::size_t>(v) * stride;
+    for (int w = 0; w < words; ++w) other[w] = kErode ? ~row[w] : row[w];
+    other[words - 1] &= in_picture;
+    std::copy_n(other, words, out);
+    spread_up(out, words, count);
+    out[words - 1] &= in_picture;
+    spread_down(other, words, count);
+    for (int w = 0; w < words; ++w) row[w] = out[w] |= other[w];
+  }
+  const auto add = [&](std::uint64_t* to, const std::uint64_t* from) {
+    for (int w = 0; w < words; ++w) to[w] |= from[w];
+  };
+  for (int done = 0; done < count;) {
+    const int reach = std::min(done + 1, count - done);
+    for (int v = height - 1; v >= reach; --v) add(mask.row(v), mask.row(v - reach));
+    for (int v = 0; v + reach < height; ++v) {
+      auto* row = rows_.data() + static_cast<std::size_t>(v) * stride;
+      add(row, row + static_cast<std::size_t>(reach) * stride);
+    }
+    done += reach;
+  }
+  for (int v = 0; v < height; ++v) {
+    auto* row = mask.row(v);
+    add(row, rows_.data() + static_cast<std::size_t>(v) * stride);
+    for (int w = 0; kErode && w < words; ++w) row[w] = ~row[w];
+    row[words - 1] &= in_picture;
+  }
+}
+
+void MaskMorphology::erode(BinaryMask& mask, int count) {
+  steps<true>(mask, count);
+}
+
+void MaskMorphology::dilate(BinaryMask& mask, int count) {
+  steps<false>(mask, count);
 }
 
 int ComponentFilter::root(int run) {

@@ -216,7 +216,8 @@ void RegionStatistics::separate(const Image& image, const BinaryMask& predicted,
       }
     }
   }
-  average_.around(image, robot, box_, kLocalRadius, local);
+  work_.fill(true);
+  average_.around(image, robot, work_, box_, kLocalRadius, local);
 }
 
 }  // namespace bodyschema

@@ -4,7 +4,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <optional>
 
 #include "bodyschema/camera/stereo_rig.hpp"
@@ -15,6 +14,7 @@
 #include "coverage.hpp"
 #include "learned_background.hpp"
 #include "local_average.hpp"
+#include "pack_bits.hpp"
 #include "region_statistics.hpp"
 #include "single_colour_background.hpp"
 
@@ -46,22 +46,6 @@ float noise_against(const Image& frame, const BackgroundModel& background) {
     }
   }
   return noise_from_differences(histogram);
-}
-
-static_assert(std::endian::native == std::endian::little, "pack_bits reads eight bytes at once");
-
-/// Packs bytes of 0 or 1 into bits; `bytes` is readable, and zero, up to a whole word.
-void pack_bits(const std::uint8_t* bytes, std::size_t count, std::uint64_t* words) {
-  for (std::size_t u = 0; u < count; u += 64) {
-    std::uint64_t word = 0;
-    for (std::size_t k = 0; k < 8; ++k) {
-      std::uint64_t eight = 0;
-      std::memcpy(&eight, bytes + u + 8 * k, sizeof eight);
-      // Bit b of the top byte gathers byte b.
-      word |= ((eight * 0x0102040810204080u) >> 56) << (8 * k);
-    }
-    *words++ = word;
-  }
 }
 
 /// The length that one pixel of a 320x240 picture has.
@@ -165,13 +149,14 @@ struct Segmenter::Impl {
     return setup.method == SegmentationMethod::kLearnedBackground || setup.method == SegmentationMethod::kAuto;
   }
   [[nodiscard]] const BackgroundModel& background() const;
-  void detect(const Image& image, const BackgroundModel& model);
+  void detect(const Image& image, const BackgroundModel& model, const PixelBox& box);
   void detect_hard(const Image& image, const BackgroundModel& model);
   /// Refines `detected` and `sure` to coverage and cleans up.
   void refine(const Image& image, const BackgroundModel& model, BinaryMask& mask, BinaryMask& valid,
               std::vector<std::uint8_t>& coverage);
   void soften(BinaryMask& mask, std::vector<std::uint8_t>& coverage) const;
-  void mark_valid(const BackgroundModel& model, BinaryMask& valid);
+  void mark_valid(const BackgroundModel& model, BinaryMask& valid, const PixelBox& box);
+  [[nodiscard]] PixelBox everything() const { return {0, 0, width - 1, height - 1}; }
   /// The whole picture against a background that is known.
   void compare(const Image& image, const BackgroundModel& model, BinaryMask& mask, BinaryMask& valid,
                std::vector<std::uint8_t>& coverage);
@@ -185,6 +170,8 @@ struct Segmenter::Impl {
   /// Whether the learned background is what this picture shows away from the robot.
   [[nodiscard]] bool background_holds(const Image& image);
   void forget_background();
+  void start_local(const Image& image, bool holds, const PixelBox& box);
+  void average_beside(const Image& image);
   /// How much more than elsewhere the background varies beside the robot: what compression makes of an outline.
   void measure_edge_noise(const Image& image);
 
@@ -219,7 +206,7 @@ struct Segmenter::Impl {
   CoverageEstimator coverage_estimator;
   ComponentFilter components;
   MaskMorphology morphology;
-  BinaryMask detected, sure, uncertain, robot;
+  BinaryMask detected, sure, uncertain, robot, wanted;
   std::vector<float> rows;           // see detect()
   std::vector<std::uint8_t> hits;    // of one row, 0 or 1, padded to whole words
   std::vector<std::uint64_t> words;  // of one row
@@ -252,14 +239,15 @@ const BackgroundModel& Segmenter::Impl::background() const {
   return learned.model();
 }
 
-/// `sure`: the pixel itself differs from the background. `detected`: the mean of its 3x3 square
-/// does, which sees a third of that contrast; it reaches one pixel farther out.
+/// Within whole words of the box. `sure`: the pixel itself differs from the background. `detected`: the mean of its 3x3
+/// square does, which sees a third of that contrast; it reaches one pixel farther out.
 BODYSCHEMA_WIDE_VECTORS
-void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model) {
-  const auto w = static_cast<std::size_t>(width);
+void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model, const PixelBox& box) {
   const auto n = static_cast<std::size_t>(channels);
+  const int begin = box.u0 & ~63, end = std::min((box.u1 | 63) + 1, width);
+  const auto w = static_cast<std::size_t>(end - begin);
   const std::size_t row_size = w * n;
-  // Plain differences with one pixel of padding on both sides; their squares; three rows of
+  // Plain differences with one pixel more on both sides; their squares; three rows of
   // differences summed over three columns; the score of each pixel.
   rows.resize((row_size + 2 * n) + row_size + 3 * row_size + w);
   float* plain = rows.data() + n;
@@ -269,6 +257,9 @@ void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model) {
 
   const auto sigma = static_cast<float>(setup.threshold_sigma);
   const auto levels = static_cast<float>(setup.threshold_levels);
+  const auto at = [&](int u, int v) {
+    return static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
+  };
   // The sum of nine has nine times the variance of one pixel, 81 times its square.
   const auto pack = [&](int v, float variances, float limit, std::uint64_t* out) {
     if (n == 3) {
@@ -278,30 +269,36 @@ void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model) {
     } else {
       std::copy_n(squares, w, score);
     }
-    const float* precision = model.precision.data() + static_cast<std::size_t>(v) * w;
+    const float* precision = model.precision.data() + at(begin, v);
     const float least_sigma = variances * sigma * sigma;
     std::uint8_t* hit = hits.data();
+    std::fill_n(hit, hits.size(), std::uint8_t{0});
     for (std::size_t u = 0; u < w; ++u) {
       hit[u] = static_cast<std::uint8_t>((score[u] * precision[u] > least_sigma) & (score[u] > limit));
     }
-    pack_bits(hit, w, out);
+    pack_bits(hit, w, out + begin / 64);
   };
-  for (int v = 0; v <= height; ++v) {
+  const auto subtract = [&](int u, int v, float* out) {
+    const std::uint8_t* in = image.pixel(u, v);
+    const float* mean = model.mean.data() + at(u, v) * n;
+    for (std::size_t c = 0; c < n; ++c) out[c] = static_cast<float>(in[c]) - mean[c];
+  };
+  for (int v = std::max(box.v0 - 1, 0); v <= box.v1 + 1; ++v) {
     if (v < height) {
-      const std::uint8_t* in = image.pixel(0, v);
-      const float* mean = model.mean.data() + static_cast<std::size_t>(v) * row_size;
+      const std::uint8_t* in = image.pixel(begin, v);
+      const float* mean = model.mean.data() + at(begin, v) * n;
       for (std::size_t i = 0; i < row_size; ++i) plain[i] = static_cast<float>(in[i]) - mean[i];
-      std::copy_n(plain, n, plain - n);
-      std::copy_n(plain + row_size - n, n, plain + row_size);
+      subtract(std::max(begin - 1, 0), v, plain - n);
+      subtract(std::min(end, width - 1), v, plain + row_size);
       float* out = summed + static_cast<std::size_t>(v % 3) * row_size;
       const float* before = plain - n;
       const float* after = plain + n;
       for (std::size_t i = 0; i < row_size; ++i) out[i] = before[i] + plain[i] + after[i];
       for (std::size_t i = 0; i < row_size; ++i) squares[i] = plain[i] * plain[i];
-      pack(v, 1.0f, levels * levels, sure.row(v));
+      if (v >= box.v0 && v <= box.v1) pack(v, 1.0f, levels * levels, sure.row(v));
     }
-    if (v == 0) continue;
     const int here = v - 1;
+    if (here < box.v0) continue;
     const float* a = summed + static_cast<std::size_t>(std::max(here - 1, 0) % 3) * row_size;
     const float* b = summed + static_cast<std::size_t>(here % 3) * row_size;
     const float* c = summed + static_cast<std::size_t>(std::min(here + 1, height - 1) % 3) * row_size;
@@ -339,13 +336,17 @@ void Segmenter::Impl::detect_hard(const Image& image, const BackgroundModel& mod
   }
 }
 
-void Segmenter::Impl::mark_valid(const BackgroundModel& model, BinaryMask& valid) {
-  const auto w = static_cast<std::size_t>(width);
-  for (int v = 0; v < height; ++v) {
-    const float* precision = model.precision.data() + static_cast<std::size_t>(v) * w;
+/// Within whole words of the box.
+void Segmenter::Impl::mark_valid(const BackgroundModel& model, BinaryMask& valid, const PixelBox& box) {
+  const int begin = box.u0 & ~63, end = std::min((box.u1 | 63) + 1, width);
+  const auto w = static_cast<std::size_t>(end - begin);
+  std::fill(hits.begin(), hits.end(), std::uint8_t{0});
+  for (int v = box.v0; v <= box.v1; ++v) {
+    const float* precision = model.precision.data() + static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
+                             static_cast<std::size_t>(begin);
     std::uint8_t* hit = hits.data();
     for (std::size_t u = 0; u < w; ++u) hit[u] = static_cast<std::uint8_t>(precision[u] > 0.0f);
-    pack_bits(hit, w, valid.row(v));
+    pack_bits(hit, w, valid.row(v) + begin / 64);
   }
 }
 
@@ -517,7 +518,7 @@ void Segmenter::segment(const Image& image, BinaryMask& mask, BinaryMask& valid,
 
 void Segmenter::Impl::compare(const Image& image, const BackgroundModel& model, BinaryMask& mask, BinaryMask& valid,
                               std::vector<std::uint8_t>& coverage) {
-  mark_valid(model, valid);
+  mark_valid(model, valid, everything());
   if (setup.edges == EdgeKind::kHard) {
     detect_hard(image, model);
     components.remove_small(detected, setup.min_component_px);
@@ -530,7 +531,7 @@ void Segmenter::Impl::compare(const Image& image, const BackgroundModel& model, 
     }
     return;
   }
-  detect(image, model);
+  detect(image, model, everything());
   components.remove_small(detected, setup.min_component_px);
   components.fill_small_holes(detected, setup.max_hole_px);
   intersect(sure, detected);
@@ -655,23 +656,18 @@ void Segmenter::Impl::measure_edge_noise(const Image& image) {
   const BackgroundModel& model = learned.model();
   const auto n = static_cast<std::size_t>(channels);
   const auto unit = static_cast<float>(unit_of(width, height));
-  const PixelBox& box = evidence.box();
   ratios.clear();
-  for (int v = box.v0; v <= box.v1; ++v) {
-    for (int u = box.u0; u <= box.u1; ++u) {
-      const float outside = -evidence.depth(u, v) / unit;
-      if (outside < kBesideFrom_px || outside > kBesideTo_px) continue;
-      const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
-      if (model.precision[i] <= 0.0f) continue;
-      float square = 0.0f;
-      for (std::size_t c = 0; c < n; ++c) {
-        const float d = static_cast<float>(image.pixel(u, v)[c]) - model.mean[i * n + c];
-        square += d * d;
-      }
-      if (square > static_cast<float>(n) * kMostSpoilt * kMostSpoilt) continue;  // a held thing, somebody's arm
-      ratios.push_back(square * model.precision[i]);
+  evidence.for_each_outside(kBesideFrom_px * unit, kBesideTo_px * unit, [&](int u, int v) {
+    const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
+    if (model.precision[i] <= 0.0f) return;
+    float square = 0.0f;
+    for (std::size_t c = 0; c < n; ++c) {
+      const float d = static_cast<float>(image.pixel(u, v)[c]) - model.mean[i * n + c];
+      square += d * d;
     }
-  }
+    if (square > static_cast<float>(n) * kMostSpoilt * kMostSpoilt) return;  // a held thing, somebody's arm
+    ratios.push_back(square * model.precision[i]);
+  });
   constexpr std::size_t kFewest = 100;
   if (ratios.size() < kFewest) return;
   const auto at = ratios.begin() + static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(ratios.size()));
@@ -685,6 +681,46 @@ void Segmenter::Impl::forget_background() {
   learned_offline = false;
   turned = false;
   misfits = 0;
+}
+
+/// What is known of the background where the box is: as learned, or nothing.
+void Segmenter::Impl::start_local(const Image& image, bool holds, const PixelBox& box) {
+  if (local.width != width || local.height != height || local.channels != channels) {
+    local = BackgroundModel(width, height, channels);
+  }
+  const BackgroundModel& model = learned.model();
+  local.noise_sd = holds                      ? model.noise_sd
+                   : setup.noise_levels > 0.0 ? static_cast<float>(setup.noise_levels)
+                                              : noise_of(image);
+  if (box.empty()) return;
+  // A pixel more on each side, as far as neighbours are looked at, and whole words.
+  const PixelBox all = PixelBox{box.u0 & ~63, box.v0, box.u1 | 63, box.v1}.grown(1, width, height);
+  const auto n = static_cast<std::size_t>(channels), columns = static_cast<std::size_t>(all.width());
+  for (int v = all.v0; v <= all.v1; ++v) {
+    const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(all.u0);
+    float* precision = local.precision.data() + i;
+    if (!holds) {
+      std::fill_n(precision, columns, 0.0f);
+      continue;
+    }
+    std::copy_n(model.mean.data() + i * n, columns * n, local.mean.data() + i * n);
+    for (std::size_t u = 0; u < columns; ++u) precision[u] = model.precision[i + u] / edge_variance;
+  }
+}
+
+/// The background that nobody knows, about the outline of what is `sure`, where coverage asks for it.
+void Segmenter::Impl::average_beside(const Image& image) {
+  constexpr int kOut_px = 2, kIn_px = 4;
+  uncertain = sure;
+  morphology.erode(uncertain, kIn_px);
+  wanted = detected;
+  morphology.dilate(wanted, kOut_px);
+  for (int v = 0; v < height; ++v) {
+    for (int w = 0; w < wanted.words_per_row(); ++w) wanted.row(v)[w] &= ~uncertain.row(v)[w] & ~known.row(v)[w];
+  }
+  const double unit = unit_of(width, height);
+  average.around(image, sure, wanted, evidence.box(), static_cast<int>(kAverage_px * unit), local);
+  average.around(image, sure, wanted, evidence.box(), static_cast<int>(2.0 * kAverage_px * unit), local);
 }
 
 void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryMask& valid,
@@ -712,29 +748,22 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
     }
     return;
   }
-  if (holds) {
-    local = learned.model();
-    for (auto& precision : local.precision) precision /= edge_variance;
-    mark_valid(local, known);
-    detect(seen, local);
+  const bool everywhere = reach_px >= ColourEvidence::kEverywhere_px * unit;
+  evidence.look_at(*predicted.silhouette, reach_px, holds && everywhere);
+  detected.fill(false);
+  sure.fill(false);
+  known.fill(false);
+  start_local(seen, holds, evidence.box());
+  if (holds && !evidence.box().empty()) {
+    mark_valid(local, known, evidence.box());
+    detect(seen, local, evidence.box());
     components.remove_small(detected, setup.min_component_px);
     components.fill_small_holes(detected, setup.max_hole_px);
     intersect(sure, detected);
     components.fill_small_holes(sure, std::max(setup.max_hole_px, 4));
-  } else {
-    if (local.width != width || local.height != height || local.channels != channels) {
-      local = BackgroundModel(width, height, channels);
-    }
-    std::fill(local.precision.begin(), local.precision.end(), 0.0f);
-    local.noise_sd = setup.noise_levels > 0.0 ? static_cast<float>(setup.noise_levels) : noise_of(seen);
-    known.fill(false);
-    detected.fill(false);
-    sure.fill(false);
   }
-  const BackgroundModel* background = holds ? &local : nullptr;
   if (looks.channels != channels) looks = {};
-  const bool everywhere = reach_px >= ColourEvidence::kEverywhere_px * unit;
-  evidence.separate(seen, *predicted.silhouette, reach_px, looks, background, sure, robot);
+  evidence.separate(seen, looks, known, sure, robot);
   components.remove_small(robot, setup.min_component_px);
   components.fill_small_holes(robot, setup.max_hole_px);
   // A pixel beyond what is sure may be robot in part: as the background says, or beside what colours say.
@@ -750,8 +779,7 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
   // What lies beside a prediction that is far off is the robot.
   const bool beside_it = !from_stills || reach_px < static_cast<double>(kBesideTo_px) * unit;
   if (holds && !everywhere && beside_it) measure_edge_noise(seen);
-  average.around(seen, sure, evidence.box(), static_cast<int>(kAverage_px * unit), local);
-  average.around(seen, sure, evidence.box(), static_cast<int>(2.0 * kAverage_px * unit), local);
+  average_beside(seen);
   valid.fill(true);
   refine(seen, local, mask, valid, coverage);
   evidence.mark_weak(robot);
@@ -773,7 +801,7 @@ void Segmenter::Impl::adapt_auto(const Image& image, const BinaryMask& mask, con
   constexpr int kEager = 20;
   learned.update(seen, &robot, learned.frames_seen() < kEager);
   if (predicted.silhouette != nullptr && predicted.trusted) {
-    evidence.learn(seen, *predicted.silhouette, kLookShare, looks);
+    evidence.learn(seen, kLookShare, looks);
   }
 }
 

@@ -44,6 +44,34 @@ TEST(BentSilhouette, LiesWhereTheLensPutsIt) {
   }
 }
 
+/// Every pixel from where the lens has it, by itself.
+BinaryMask pixel_by_pixel(const BinaryMask& straight, double k1) {
+  BinaryMask bent(straight.width(), straight.height());
+  for (int v = 0; v < bent.height(); ++v) {
+    for (int u = 0; u < bent.width(); ++u) {
+      const Eigen::Vector2d seen((u - kCamera.cx) / kCamera.fx, (v - kCamera.cy) / kCamera.fy);
+      Eigen::Vector2d x = seen;
+      for (int i = 0; i < 5; ++i) x = seen / (1.0 + k1 * x.squaredNorm());
+      const auto su = static_cast<int>(std::lround(kCamera.fx * x.x() + kCamera.cx));
+      const auto sv = static_cast<int>(std::lround(kCamera.fy * x.y() + kCamera.cy));
+      if (su >= 0 && sv >= 0 && su < bent.width() && sv < bent.height() && straight.at(su, sv)) bent.set(u, v);
+    }
+  }
+  return bent;
+}
+
+// What lies away from outlines is not looked at pixel by pixel.
+TEST(BentSilhouette, EveryPixelIsWhatTheLensHasThere) {
+  for (const double k1 : {-0.2, -0.05, 0.03, 0.2}) {
+    for (const double radius : {3.0, 40.0, 110.0, 190.0}) {
+      for (const auto& [u, v] : {std::pair{160.0, 120.0}, {10.0, 30.0}, {319.0, 239.0}}) {
+        const auto straight = disc(u, v, radius);
+        EXPECT_EQ(bent_silhouette(straight, kCamera, k1), pixel_by_pixel(straight, k1)) << k1 << ", " << radius;
+      }
+    }
+  }
+}
+
 TEST(BentSilhouette, OfALensThatHardlyBendsIsTheSame) {
   const auto mask = disc(300.0, 220.0, 10.0);
   EXPECT_EQ(bent_silhouette(mask, kCamera, 0.003), mask);

@@ -61,6 +61,28 @@ std::size_t piece_size(const BinaryMask& mask, int u, int v, bool value, bool ei
   return n;
 }
 
+// Many steps at once are taken another way than few.
+TEST(MaskOperations, ManyStepsAreAsManySingleOnes) {
+  std::mt19937 random(13);
+  MaskMorphology morphology;
+  for (const auto& [width, height] : {std::pair{1, 1}, {7, 200}, {64, 30}, {65, 12}, {300, 90}}) {
+    for (const double density : {0.001, 0.02, 0.98, 0.999}) {
+      for (const int steps : {3, 4, 17, 63, 64, 65, 140}) {
+        const auto mask = random_mask(width, height, density, random);
+        auto eroded = mask, dilated = mask, eroded_singly = mask, dilated_singly = mask;
+        morphology.erode(eroded, steps);
+        morphology.dilate(dilated, steps);
+        for (int i = 0; i < steps; ++i) {
+          morphology.erode(eroded_singly);
+          morphology.dilate(dilated_singly);
+        }
+        EXPECT_EQ(eroded, eroded_singly) << width << "x" << height << ", " << steps << " steps";
+        EXPECT_EQ(dilated, dilated_singly) << width << "x" << height << ", " << steps << " steps";
+      }
+    }
+  }
+}
+
 TEST(MaskOperations, ErosionAndDilationMatchTheDefinition) {
   std::mt19937 random(11);
   MaskMorphology morphology;
@@ -76,6 +98,7 @@ TEST(MaskOperations, ErosionAndDilationMatchTheDefinition) {
   }
   BinaryMask nothing;
   morphology.erode(nothing);
+  morphology.dilate(nothing, 9);
   EXPECT_TRUE(nothing.empty());
 }
 

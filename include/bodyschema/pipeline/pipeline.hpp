@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
@@ -35,12 +36,15 @@ class Pipeline {
   /// A fresh decoder and synchroniser for this robot and rig.
   [[nodiscard]] ObservationStream make_stream() const;
 
+  using OnEstimate = std::function<void(const Estimate&)>;
   /// Fills in the observation's masks and takes one step of the estimator: segment(), estimate().
   /// @param next  the observation that will come next, where it has come already; null: unknown. Its
   ///   masks are found by another thread while the estimator is at work, which changes no result. It
   ///   is only read, and until this returns; std::logic_error when another one comes after all. No
   ///   effect where masks need estimates, which go by the estimate before.
-  Estimate process(Observation& observation, const Observation* next = nullptr);
+  /// @param on_estimate  gets the estimate as soon as it is there: before what the pictures teach of background and
+  ///   looks is learned, for the next ones
+  Estimate process(Observation& observation, const Observation* next = nullptr, const OnEstimate& on_estimate = {});
   /// Straightens the pictures and fills in the masks. A camera that repeats its last picture while
   /// the arm moves gets none: it is frozen; nor does one whose mask did not come (`vision.method: given`). False while
   /// the background is being learned.
@@ -125,6 +129,12 @@ class Pipeline {
     Microseconds utime = 0;
     std::vector<std::optional<Look>> of;
   };
+  /// What one camera's picture is to be learned from with.
+  struct Lesson {
+    bool given = false;
+    std::optional<BinaryMask> silhouette;  ///< where the robot was foreseen
+    bool trusted = false;                  ///< that was, with reason
+  };
   [[nodiscard]] static bool frozen(const PictureChange& change);
   /// @param alone  whether the other thread is free to help
   Looks look(const Observation& observation, bool alone);
@@ -132,7 +142,9 @@ class Pipeline {
   [[nodiscard]] PredictedRobot prediction(std::size_t camera, const std::optional<BinaryMask>& silhouette) const;
   [[nodiscard]] double reach_px(std::size_t camera) const;
   template <class OfCamera>
-  void for_each_eye(const OfCamera& of_camera);
+  void for_each_eye(const OfCamera& of_camera, bool alone);
+  void find_masks(Observation& observation);
+  void learn_from_masks(const Observation& observation, bool alone);
   Looks looks_at(const Observation& observation);
   void watch_background(const Observation& observation, std::size_t camera, bool learning);
 
@@ -153,7 +165,8 @@ class Pipeline {
   std::string configuration_hash_;
   std::string model_hash_;
   bool learning_ = false;
-  bool tracking_ = false;  ///< the estimate is good enough to predict where the robot is
+  std::vector<Lesson> lessons_;  ///< one per camera, of the last observation, until learned
+  bool tracking_ = false;        ///< the estimate is good enough to predict where the robot is
   /// How far off the last estimate may have put outlines, px of a 320x240 picture; negative: nobody knows.
   double outline_sd_px_ = -1.0;
   bool young_ = true;  ///< few postures were seen: the estimate may be a wrong one's

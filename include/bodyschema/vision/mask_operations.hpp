@@ -22,9 +22,9 @@ struct PixelBox {
 
 PixelBox bounding_box(const BinaryMask& mask);
 
-/// One step of erosion or dilation by a 3x3 square, in place. What lies beyond the border of the
+/// Erosion or dilation by a 3x3 square, `steps` times, in place. What lies beyond the border of the
 /// picture counts as the border pixel itself, so that a border is never an outline.
-/// Allocates nothing once a row buffer has grown. One per thread.
+/// Allocates nothing once its buffer has grown. One per thread.
 class MaskMorphology {
  public:
   void erode(BinaryMask& mask, int steps = 1);
@@ -33,6 +33,8 @@ class MaskMorphology {
  private:
   template <bool kErode>
   void step(BinaryMask& mask);
+  template <bool kErode>
+  void steps(BinaryMask& mask, int count);
   std::vector<std::uint64_t> rows_;
 };
 
