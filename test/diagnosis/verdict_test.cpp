@@ -234,7 +234,7 @@ TEST(Verdict, OfACrowdDoesNotSayThatNothingIsLeft) {
   EXPECT_EQ(crowd.verdict, "none");
   EXPECT_FALSE(crowd.crowded) << "one is no crowd";
   EXPECT_THAT(crowd.sentence, Not(HasSubstr("to its noise")));
-  EXPECT_THAT(crowd.sentence, HasSubstr("by less than 0.5 mm: elbow turns 4 %"));
+  EXPECT_THAT(crowd.sentence, HasSubstr("by less than any picture places them: elbow turns 4 %"));
   crowd.small_causes.push_back(gain_of_elbow());
   crowd = worded(std::move(crowd));
   EXPECT_TRUE(crowd.crowded);
