@@ -98,6 +98,7 @@ class Page {
     next_steps();
     causes();
     small_causes();
+    estimated();
     gain();
     if (!pictures.empty()) {
       page_.heading("Where it shows");
@@ -163,6 +164,14 @@ class Page {
     for (const auto& cause : d_.small_causes) items.push_back(cause.sentence);
     page_.paragraph(fmt::format("Also in the extended model, though it moves hand and outlines by less than {:.2g} mm:",
                                 d_.matters_mm));
+    page_.list(items);
+  }
+
+  void estimated() {
+    if (d_.estimated.empty()) return;
+    std::vector<std::string> items;
+    for (const auto& cause : d_.estimated) items.push_back(cause.sentence);
+    page_.paragraph("Estimated in any case, and in the extended model:");
     page_.list(items);
   }
 

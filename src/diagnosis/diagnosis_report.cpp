@@ -28,7 +28,8 @@ Json json_of(const HeldoutError& e) {
           {"hand_mm", number(e.hand_mm)},
           {"hand_deg", number(e.hand_deg)},
           {"outline_found", number(e.outline_found)},
-          {"outline_where_seen", number(e.outline_where_seen)}};
+          {"outline_where_seen", number(e.outline_where_seen)},
+          {"moved_px", number(e.moved_px)}};
 }
 
 Json json_of(const CauseName& c) {
@@ -111,6 +112,8 @@ std::string DiagnosisReport::to_json() const {
   for (const auto& c : causes) j["causes"].push_back(json_of(c));
   j["small_causes"] = Json::array();
   for (const auto& c : small_causes) j["small_causes"].push_back(json_of(c));
+  j["estimated"] = Json::array();
+  for (const auto& c : estimated) j["estimated"].push_back(json_of(c));
   j["not_testable"] = Json::array();
   for (const auto& n : not_testable) {
     auto entry = json_of(n.cause);

@@ -58,6 +58,40 @@ Eigen::VectorXd motion_of_all(Eigen::MatrixXd A, const Eigen::VectorXd& b, doubl
   return A.ldlt().solve(b);
 }
 
+/// What of the misfit goes if all that is seen may stand elsewhere, as a whole, in every block of the log: noise of
+/// pixels or of encoders is not alike for the length of a block.
+class MotionOfBlocks {
+ public:
+  explicit MotionOfBlocks(std::size_t blocks) : blocks_(blocks) {}
+  void add(std::size_t block, const Eigen::MatrixXd& A, const Eigen::VectorXd& b, double precision) {
+    auto& sum = blocks_[block];
+    if (sum.A.size() == 0) sum = {Eigen::MatrixXd::Zero(A.rows(), A.cols()), Eigen::VectorXd::Zero(b.size()), 0.0, 0.0};
+    sum.A += precision * A;
+    sum.b += precision * b;
+    sum.precision += precision;
+    sum.pictures += 1.0;
+  }
+  /// px^2 times weight, less what the noise alone takes up of so many numbers.
+  [[nodiscard]] double square() const {
+    double result = 0.0;
+    for (const auto& block : blocks_) {
+      if (block.pictures <= 0.0) continue;
+      const Eigen::VectorXd motion = motion_of_all(block.A, block.b, 1.0);
+      const double cost = 2.0 * motion.dot(block.b) - motion.dot(block.A * motion);
+      result += (cost - static_cast<double>(motion.size())) * block.pictures / block.precision;
+    }
+    return std::max(0.0, result);
+  }
+
+ private:
+  struct Sum {
+    Eigen::MatrixXd A;
+    Eigen::VectorXd b;
+    double precision = 0.0, pictures = 0.0;
+  };
+  std::vector<Sum> blocks_;
+};
+
 /// How much worse another explanation is, in standard deviations of the difference: on blocks that neither has seen,
 /// and in how far nuisances must depart from what is believed of them for it (log likelihoods that are d apart in the
 /// mean differ by a variance of 4 d).
@@ -146,6 +180,7 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
   }
   double square = 0.0, weight = 0.0, hand = 0.0, turn = 0.0, pictures = 0.0, found = 0.0, sampled = 0.0,
          where_seen = 0.0, sampled_seen = 0.0;
+  MotionOfBlocks motions(log.blocks);
   auto& measurement = fit_.measurement();
   for (std::size_t p = 0; p < log.base.size(); ++p) {
     const auto& evidence = log.at.evidence[p];
@@ -179,6 +214,7 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
       if (evidence.A(at, at) > 0.0) out.apparent_deg[j] = degrees(b[at] / evidence.A(at, at));
     }
     const Eigen::VectorXd motion = motion_of_all(evidence.A(rig, rig), b(rig), log.precision[p]);
+    motions.add(log.block_of[p], evidence.A(rig, rig), b(rig), log.precision[p]);
     const auto& picture = fit_.log().pictures()[p];
     const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera, rig,
                                                     measurement.projection().hand_link());
@@ -189,8 +225,9 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
     pictures += 1.0;
   }
   if (weight <= 0.0 || pictures <= 0.0) return {};
-  return {std::sqrt(square / weight), 1e3 * std::sqrt(hand / pictures), degrees(std::sqrt(turn / pictures)),
-          found / sampled, where_seen / sampled_seen};
+  return {std::sqrt(square / weight),          1e3 * std::sqrt(hand / pictures),
+          degrees(std::sqrt(turn / pictures)), found / sampled,
+          where_seen / sampled_seen,           std::sqrt(motions.square() / weight)};
 }
 
 void Findings::name_causes(const LogAbout& log, const std::vector<Candidate>& candidates) {
@@ -198,6 +235,11 @@ void Findings::name_causes(const LogAbout& log, const std::vector<Candidate>& ca
   covariance_ = all.covariance();
   report_.blocks = log.blocks;
   describe_causes(log, all, candidates);
+  name_estimated(log, all, candidates);
+}
+
+void Findings::name_estimated(const LogAbout& log, const BlockRegression& all,
+                              const std::vector<Candidate>& candidates) {
   std::vector<std::string> kinds;
   for (const auto& p : search_.state().parameters()) {
     const auto& kind = search_.state().model()[p.ref.effect].name();
@@ -226,6 +268,7 @@ void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candi
     report_.offsets_ci95_deg[name] = {offset - half, offset + half};
   }
   describe_causes(log, all, candidates);
+  name_estimated(log, all, candidates);
   check_outlines(log);
   check_surplus(log);
   exclude(log, all, candidates);
@@ -438,6 +481,7 @@ void Findings::check_outlines(const LogAbout& log) {
   report_.side_left_over = left.side;
   report_.noise_px = left.noise_px;
   report_.left_px = left.rms_px;
+  report_.rough_px = limits::kRough_px * picture_unit(fit_.log().rig().cameras.front().intrinsics);
 }
 
 void Findings::check_surplus(const LogAbout& log) {

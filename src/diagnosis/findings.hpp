@@ -26,7 +26,7 @@ class Findings {
       : fit_(fit), search_(search), options_(options), report_(report) {}
   /// The model without any cause.
   void before(const LogAbout& log);
-  /// The causes alone, and which of the effects that are estimated anyway stand out (report.estimated).
+  /// The causes alone, and the effects that are estimated anyway.
   /// @param candidates  all that are not in the model, about it
   void name_causes(const LogAbout& log, const std::vector<Candidate>& candidates);
   /// The final one. @param candidates  all that are not in it, about it
@@ -50,6 +50,8 @@ class Findings {
                              const Eigen::VectorXd& amount, const std::vector<Eigen::Index>& out);
   /// ... by what was found.
   [[nodiscard]] Size size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns);
+  /// Which of the effects that are estimated anyway stand out (report.estimated).
+  void name_estimated(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
   /// An effect of the state against a model that knows no effect of its kind: of joints of one kind that move the
   /// pictures alike the one is taken that explains most.
   void add_estimated(const LogAbout& log, const BlockRegression& all, const std::string& kind,

@@ -17,7 +17,8 @@ constexpr double kLeastFound = 0.6;     ///< share of the outline that must be f
 constexpr double kMostOfTheLog = 0.5;   ///< of the blocks: what is seen there beside the robot is no passer-by
 constexpr double kFlankFloors = 3.0;    ///< times kFloor_px: so far off a whole flank is not where a picture may put it
 constexpr double kNoiseRatio =
-    1.3;  ///< what is left over what of it differs between blocks: more is no noise of pixels
+    1.3;                           ///< what is left over what of it differs between blocks: more is no noise of pixels
+constexpr double kRough_px = 1.5;  ///< px of a 320x240 picture: the roughest outlines that segmentation makes
 constexpr double kLostContrast = 0.5;  ///< between the shares of two parts of the log that are seen
 
 // Statistical.

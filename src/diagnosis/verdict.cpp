@@ -76,6 +76,22 @@ std::string why_not(const DiagnosisReport& report) {
   if (!report.side_left_over.empty()) {
     return fmt::format("The model does not explain what is seen: {}.", report.side_left_over);
   }
+  if (report.rough_px > 0.0 && report.left_px > report.rough_px) {
+    return fmt::format(
+        "The model does not explain what is seen: outlines lie off by {:.2f} px, and no camera's are rougher than "
+        "{:.1f} "
+        "px where the model is right.",
+        report.left_px, report.rough_px);
+  }
+  const auto& after = report.after;
+  const double still_px = std::sqrt(std::max(0.0, after.rms_px * after.rms_px - after.moved_px * after.moved_px));
+  if (after.rms_px > limits::kNoiseRatio * still_px) {
+    return fmt::format(
+        "The model does not explain what is seen: outlines lie off by {:.2f} px, but by {:.2f} px if the robot may "
+        "stand "
+        "elsewhere in every part of the log. Something moves it that no known cause describes.",
+        after.rms_px, still_px);
+  }
   if (causes.empty() && report.noise_px > 0.0 && report.left_px > limits::kNoiseRatio * report.noise_px) {
     return fmt::format(
         "The model does not explain what is seen, and no known cause does: outlines lie off by {:.2f} "
@@ -99,7 +115,7 @@ std::string of_how_many(const DiagnosisReport& report) {
 /// Of a model that does not fit there are neither intervals nor limits.
 void forget_intervals(DiagnosisReport& report) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  for (auto* list : {&report.causes, &report.small_causes, &report.estimates}) {
+  for (auto* list : {&report.causes, &report.small_causes, &report.estimated, &report.estimates}) {
     for (auto& cause : *list) {
       for (auto& p : cause.parameters) p.ci95 = {kNone, kNone};
     }
@@ -144,34 +160,38 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles, const std::v
     }
     return text;
   };
-  list_of(report.estimated, false);
   const auto& causes = report.causes;
   const auto why = why_not(report);
   const bool unexplained = !why.empty() || std::any_of(causes.begin(), causes.end(), is_unexplained);
   if (unexplained) forget_intervals(report);
   // Of what matters to nobody, or only stands in for something, nobody asks which of several it is.
-  const auto list = list_of(report.causes, why.empty()), small = list_of(report.small_causes, false);
+  const auto list = list_of(report.causes, why.empty()), small = list_of(report.small_causes, false),
+             estimated = list_of(report.estimated, false);
   if (!why.empty()) {
     report.verdict = "unexplained";
     report.sentence = why;
     if (!list.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + list + ".";
     return;
   }
+  const auto taken_up =
+      estimated.empty() ? "" : " Of what is estimated in any case the pictures ask for: " + estimated + ".";
   report.crowded = causes.empty() && report.small_causes.size() > 1;
   if (!causes.empty()) {
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });
     report.verdict = unexplained ? "unexplained" : several ? "class" : "named";
-    report.sentence = capitalised(list) + ".";
+    report.sentence = capitalised(list) + "." + taken_up;
     return;
   }
   report.verdict = "none";
+  const std::string known = estimated.empty() ? "joint offsets" : "what is estimated in any case";
   report.sentence =
       small.empty()
-          ? "The model explains the log to its noise: nothing but joint offsets was found" + of_how_many(report) + "."
+          ? "The model explains the log to its noise: nothing but " + known + " was found" + of_how_many(report) + "."
           : fmt::format(
-                "Nothing that matters was found but joint offsets. What is there moves hand and "
-                "outlines by less than {:.2g} mm: {}.",
-                report.matters_mm, small);
+                "Nothing that matters was found but {}. What is there moves hand and "
+                "outlines by less than {:.2g} mm, or outlines by less than any picture places them: {}.",
+                known, report.matters_mm, small);
+  report.sentence += taken_up;
 }
 
 }  // namespace bodyschema::diagnosis

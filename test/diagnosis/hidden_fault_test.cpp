@@ -21,6 +21,7 @@ TEST(HiddenFault, NothingIsNone) {
   const auto report = answer({});
   EXPECT_EQ(report.verdict, "none") << report.sentence;
   EXPECT_TRUE(report.causes.empty()) << report.sentence;
+  EXPECT_TRUE(report.estimated.empty()) << report.sentence;
   EXPECT_LT(report.after.rms_px, 0.5);
   ASSERT_FALSE(report.exclusion_limits.empty());
   EXPECT_GT(report.blocks, 20u);
@@ -36,6 +37,24 @@ TEST(HiddenFault, AHandLargerThanItsMeshesIsNamedByItsPart) {
   EXPECT_TRUE(test::is_named(report)) << report.sentence;
   EXPECT_TRUE(test::names_only_part(report, "r_hand")) << report.sentence;
   expect_size(report, {"mesh_scale", "", "r_hand"}, "scale", 6.0);
+}
+
+/// The state holds offsets of the head, so the log is explained; the answer says so all the same.
+TEST(HiddenFault, ANeckThatStandsOffIsSaidThoughTheStateTakesItUp) {
+  test::Simulated what;
+  what.head_moves = true;
+  const auto report = answer({"head_offset:joint=neck_pitch,value=4"}, what);
+  ASSERT_EQ(report.estimated.size(), 1u) << report.sentence;
+  EXPECT_EQ(report.estimated[0].cause, (CauseName{"head_offset", "neck_pitch", ""}));
+  EXPECT_NEAR(report.estimated[0].parameters.at(0).estimate, 4.0, 1.0);
+  EXPECT_NE(report.sentence.find("neck_pitch"), std::string::npos) << report.sentence;
+}
+
+TEST(HiddenFault, AWobbleThatFollowsNothingIsNeverNone) {
+  const auto report = answer({"wobble:joint=r_wrist_pitch,period=10.7,value=1.4"});
+  EXPECT_EQ(report.verdict, "unexplained") << report.sentence;
+  const auto healthy = answer({});
+  EXPECT_LT(healthy.after.moved_px, 0.5 * report.before.moved_px);
 }
 
 TEST(HiddenFault, AThickerCoverIsNamedByItsPart) {

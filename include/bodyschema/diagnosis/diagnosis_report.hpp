@@ -73,6 +73,9 @@ struct HeldoutError {
   /// part alone. 1 where the source knows which point belongs to which.
   double outline_found = 1.0;
   double outline_where_seen = 1.0;  ///< the same in those pictures where enough of it was found to count
+  /// The part of `rms_px` (in squares) that goes where all that is seen may stand elsewhere in every block of the log:
+  /// something moves the robot that the model lacks.
+  double moved_px = 0.0;
 };
 
 /// One bar of the chart of all candidates: the largest |z| of it.
@@ -120,12 +123,15 @@ struct DiagnosisReport {
   /// What the final model leaves of the outlines, rms, and what of it differs from block to block. The rest is alike in
   /// all of them at the same places of the robot's surface: pixels do not err so, a model does.
   double left_px = 0.0, noise_px = 0.0;
+  /// No outline of a robot whose model is right is rougher, px of these pictures; 0: not asked.
+  double rough_px = 0.0;
   /// What the pictures show beside the robot through most of the log, where no outline is looked for: "14 cm2 beside
   /// the robot, in 96 % of the log". Something is held, or a part has no mesh. Empty: nothing.
   std::string not_in_model;
   /// Causes that are there, and in the extended model, and move hand and outlines by less than what matters.
   std::vector<DiagnosedCause> small_causes;
-  /// Effects of the state, estimated anyway, that stand out of this log; only where nothing is fitted (look).
+  /// Effects of the state, estimated in any case and in the extended model, that stand out of this log: against a model
+  /// that knows none of their kind.
   std::vector<DiagnosedCause> estimated;
   double matters_mm = 0.5;  ///< what matters
   bool crowded = false;     ///< nothing else was found, and of those several
