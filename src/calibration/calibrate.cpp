@@ -595,9 +595,7 @@ class Calibrator {
       if (kept.empty() || left_out.empty()) continue;
       const auto roles = log_->roles();
       const auto beliefs = Beliefs::from(configuration_, roles, rig_, pipeline_.options());
-      State start(roles, beliefs.state);
-      BatchFit part(fit, start, beliefs.tolerances, settings());
-      part.start_at(batch.state().x());
+      BatchFit part(fit, batch.state(), beliefs.tolerances, settings());  // what was found besides is in that state
       part.run(0.0, kept);
       sum += median_outline_distance_px(fit, part.state().model(), left_out) * static_cast<double>(left_out.size());
       n += static_cast<double>(left_out.size());

@@ -9,8 +9,8 @@ void require_places(const StereoRig& rig, const std::string& what) {
     if (camera.mount.knowledge != PlaceKnowledge::kUnknown) continue;
     throw ConfigurationError(
         camera.place + ": where camera '" + camera.name + "' is, is not known (pose: unknown), and " + what +
-        " needs it: 'bodyschema calibrate' finds it from the same log and writes cameras.yaml, to be "
-        "included behind this file");
+        " needs it: 'bodyschema calibrate' finds it from the same log and writes an estimator.yaml to "
+        "go on with");
   }
 }
 

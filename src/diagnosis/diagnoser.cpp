@@ -101,7 +101,7 @@ class Diagnoser {
     if (length < options_.shortest_log_s && postures < options_.fewest_postures) {
       throw DataError(
           fmt::format("{:.1f} s of pictures are too few; record at least {:.0f} s of motion, better 60 s, or {} "
-                      "postures{}",
+                      "postures held still{}",
                       length, options_.shortest_log_s, options_.fewest_postures,
                       postures > 1 ? fmt::format(" (it has {})", postures) : ""));
     }
