@@ -114,9 +114,8 @@ class ArmAnatomy {
     return segments;
   }
 
-  /// Each link once by the joint at its far end. One that turns about its own length also by the joint that turns it:
-  /// where on its axis that sits a URDF may choose freely, often at the near end, so that the robot's own may carry the
-  /// link, cover and all, further out.
+  /// Where on its axis a joint sits that turns a link about its own length, a URDF chooses freely, often at the near
+  /// end: so it may lie further out although no length in the URDF says so. Where one does, that is its link_length.
   [[nodiscard]] std::vector<ArmLink> links() const {
     constexpr double kApart_m = 0.02, kAbout = 0.9;
     std::vector<ArmLink> list;
@@ -130,7 +129,7 @@ class ArmAnatomy {
       const auto& name = info(joint).parent_link;
       const bool listed = !list.empty() && list.back().joint == before;
       if (!listed && joint_before(before) >= 0 && direction.dot(corrected_.shift_axis(before, 0)) > kAbout) {
-        list.push_back({name, before, length, {.along_m = 1.0}});
+        list.push_back({name, before, length, {.along_m = 1.0}, true});
       }
       JointAdjustment step;
       step.along_m = direction.dot(corrected_.shift_axis(joint, 0));

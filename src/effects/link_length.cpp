@@ -6,8 +6,8 @@
 
 namespace bodyschema::effects {
 
-/// A link of the arm is longer than nominal: the joint at its far end, the target, and all beyond lie further away
-/// from the joint before it, along the line between the two.
+/// A link of the arm is longer than nominal: the target, the joint at its far end, and all beyond lie further away
+/// from the joint before it, along the line between the two. Or the joint that turns the link does: with its cover.
 EffectKind link_length() {
   return {.name = "link_length",
           .targets =
@@ -38,9 +38,14 @@ EffectKind link_length() {
                                                [&](const ArmLink& l) { return l.joint == joint; });
                 const auto part = part_in_words(link->name);
                 // A link that is called by its place in the arm needs no more.
-                const auto where = part.starts_with("the link ") ? ", which ends at " + e.target().joint + "," : "";
-                return part + where + " is " + amounts[0] + by_sign(e.parameters()[0], " longer", " shorter") +
-                       " than in the URDF";
+                const auto where = part.starts_with("the link ")
+                                       ? std::string(", which ") + (link->takes_cover ? "turns with " : "ends at ") +
+                                             e.target().joint + ","
+                                       : std::string();
+                const auto& length = e.parameters()[0];
+                return part + where + " is " + amounts[0] + by_sign(length, " longer", " shorter") +
+                       " than in the URDF" +
+                       (link->takes_cover ? by_sign(length, ", its cover further out", ", its cover further in") : "");
               },
           .lookalikes = {"axis_shift"},
           .splitting_motion = "Show the hand near and far, and from palm and back.",

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "limits.hpp"
 
@@ -39,22 +40,31 @@ bool ShapeError::known() const {
 }
 
 double ShapeError::variance_px2(double floor_px, double fitted) const {
-  double square = 0.0, weight = 0.0, alike = 0.0, weight_square = 0.0;
+  if (parts_.empty()) return 0.0;
+  std::vector<double> errors;  // of the parts' means, squared
   for (const auto& [place, part] : parts_) {
     const double n = part.postures, mean = part.sum / n;
     // Chance cannot be told from shape in the first few.
     const double of_mean =
         part.seen < limits::kPosturesOfShape ? 0.0 : std::max(0.0, part.square / n - mean * mean) / (n - 1.0);
-    square += part.weight * part.weight / n * (mean * mean - of_mean);
-    alike += part.weight * part.weight / n;
+    errors.push_back(mean * mean - of_mean);
+  }
+  auto sorted = errors;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  double square = 0.0, weight = 0.0, alike = 0.0, weight_square = 0.0;
+  auto error = errors.begin();
+  for (const auto& [place, part] : parts_) {
+    const double own = part.weight * part.weight / part.postures;
+    square += own * std::max(*middle, *error++);
+    alike += own;
     weight += part.weight;
     weight_square += part.weight * part.weight;
   }
-  if (weight <= 0.0) return 0.0;
   // Parts that have a say: as many as equally large ones would be.
   const double parts = weight * weight / weight_square;
   const double left = parts / std::max(limits::kLeastLeft * parts, parts - fitted);
-  return std::max(0.0, left * square / alike - floor_px * floor_px) * alike / weight;
+  return std::max(0.0, left * square - floor_px * floor_px * alike) / weight;
 }
 
 }  // namespace bodyschema

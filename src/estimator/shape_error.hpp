@@ -13,11 +13,13 @@ namespace bodyschema {
 /// thing in the hand. No number of postures averages it out, and no disagreement between postures shows it; but what a
 /// fit could not take up of it stays as residuals that keep their sign, part by part.
 ///
-/// A variance component: the mean square over the parts of the mean residual over postures, less what chance leaves
-/// there by how the same residuals vary between postures. What a fit took up is not seen: as of any variance that is
+/// The middle of a sandwich, as of clustered residuals (Liang and Zeger, 1986): over the parts, the square of what a
+/// part moves a fit by, its mean residual over postures times the robust weight of its points, less what chance leaves
+/// there by how the same residuals vary between postures. A fingertip that is far off does not stand for the palm, nor
+/// what the fit set aside for what it followed; but the part that a fit follows leaves the errors to others: none errs
+/// by less than half of the parts do (their median). What a fit took up is not seen: as of any variance that is
 /// measured on what a fit leaves, degrees of freedom make up for it, those of as many parts as have a say of their own
-/// less those of the parameters that were fitted. A part counts by the robust weight of its points: what a fit sets aside
-/// (the edge of another finger beside a narrow gap) does not move it. Lengths are px of a 320x240 picture.
+/// less those of the parameters that were fitted. Lengths are px of a 320x240 picture.
 class ShapeError {
  public:
   /// Adds one posture's picture.

@@ -78,6 +78,12 @@ TEST(JointRoles, OfAnEyeThatTiltsByItselfThePanTurnsAboutTheVertical) {
   }
 }
 
+Names joints_of(const JointRoles& roles, const std::vector<ArmLink>& links) {
+  Names names;
+  for (const auto& link : links) names.push_back(roles.names[static_cast<std::size_t>(link.joint)]);
+  return names;
+}
+
 /// Bodies between the arm's joints, fingers counted to the hand, and the links between joints that lie apart.
 TEST(JointRoles, SegmentsHoldEveryPartOnceAndLinksAreAsLongAsTheRobotsAre) {
   const auto configuration = Configuration::load(std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/robot.yaml");
@@ -98,12 +104,14 @@ TEST(JointRoles, SegmentsHoldEveryPartOnceAndLinksAreAsLongAsTheRobotsAre) {
   // Lengths by walking from joint to joint, and what a longer link does to the hand.
   Names links;
   for (const auto& link : roles.links) links.push_back(link.name);
-  EXPECT_EQ(links, (Names{"r_shoulder_1", "r_upper_arm", "r_forearm"}));
-  CorrectedKinematics kinematics(model, {setup.hand_link}, {"root_link"});
+  EXPECT_EQ(links, (Names{"r_shoulder_1", "r_upper_arm", "r_upper_arm", "r_forearm", "r_forearm"}));
+  EXPECT_EQ(joints_of(roles, roles.links),
+            (Names{"r_shoulder_roll", "r_shoulder_yaw", "r_elbow", "r_wrist_prosup", "r_wrist_pitch"}));
+  CorrectedKinematics kinematics(model, {setup.hand_link, "r_forearm", "r_upper_arm"}, {"root_link"});
   const auto q = setup.default_joints(*model);
   for (const auto& link : roles.links) {
     EXPECT_GT(link.length_m, 0.1);
-    std::vector<Pose> before(1), after(1);
+    std::vector<Pose> before(3), after(3);
     auto c = roles.no_corrections();
     kinematics.compute(q, c, 0, before);
     auto& adjustment = c.adjustments[static_cast<std::size_t>(link.joint)];
@@ -112,6 +120,12 @@ TEST(JointRoles, SegmentsHoldEveryPartOnceAndLinksAreAsLongAsTheRobotsAre) {
     adjustment.shift_2_m = 0.01 * link.per_metre.shift_2_m;
     kinematics.compute(q, c, 0, after);
     EXPECT_NEAR((after[0].translation() - before[0].translation()).norm(), 0.01, 1e-6) << link.name;
+    // A link that turns about its own length goes with the joint that turns it, not with the one at its end.
+    const std::size_t own = link.name == "r_forearm" ? 1 : 2;
+    const double cover_m = (after[own].translation() - before[own].translation()).norm();
+    if (link.name != "r_shoulder_1") {
+      EXPECT_NEAR(cover_m, link.takes_cover ? 0.01 : 0.0, 1e-6) << link.name;
+    }
   }
 }
 

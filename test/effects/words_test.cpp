@@ -19,6 +19,12 @@ std::string said(const std::string& name, const EffectTarget& target, const std:
 TEST(Words, OfALengthArePlain) {
   EXPECT_EQ(said("link_length", {"s_yaw", ""}, {0.006}, {"6.2 mm (5.9 to 6.5)"}),
             "the upper arm is 6.2 mm (5.9 to 6.5) longer than in the URDF");
+  auto roles = test::roles();
+  roles.links.back().takes_cover = true;
+  const auto forearm = make_effect("link_length", {"prosup", ""}, roles);
+  forearm->parameters()[0].value = -0.004;
+  EXPECT_EQ(effect_kind("link_length").sentence(*forearm, roles, std::vector<std::string>{"4 mm"}),
+            "the forearm is 4 mm shorter than in the URDF, its cover further in");
 }
 
 TEST(Words, OfPartsAreThoseOfAnArm) {

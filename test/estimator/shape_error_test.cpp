@@ -42,6 +42,32 @@ TEST(ShapeError, WhatAFitTookUpIsMadeUpFor) {
   EXPECT_NEAR(shape.variance_px2(0.0, 9.0), 2.0 * shape.variance_px2(0.0, 0.0), 1e-9) << "no more than half of it";
 }
 
+/// A fingertip beside the gap to the next one, whose edges the pictures lack: a fit has hardly listened to it.
+TEST(ShapeError, WhatAFitSetAsideHardlyCounts) {
+  ShapeError shape;
+  auto points = outline({0.0, 0.0, 0.0, 1.0});
+  for (auto& point : points) point.weight = point.part == 3 ? 0.1 : 1.0;
+  for (int i = 0; i < 6; ++i) shape.add(points, 0, 1.0);
+  // The square of what moves the fit by it, over all that holds it.
+  EXPECT_NEAR(shape.variance_px2(0.0, 0.0), 0.8 * 0.8 / 24.8, 1e-9);
+}
+
+/// Of two parts a fit follows the larger: the smaller one's error is not the larger one's too.
+TEST(ShapeError, ASmallPartThatIsFarOffDoesNotStandForALargeOne) {
+  ShapeError shape;
+  auto points = outline({0.0, 0.0, 0.0, 1.0});
+  for (auto& point : points) point.part = point.part < 2 ? 0 : point.part;
+  for (int i = 0; i < 6; ++i) shape.add(points, 0, 1.0);
+  EXPECT_NEAR(shape.variance_px2(0.0, 0.0), 8.0 * 8.0 / 32.0, 1e-9);
+}
+
+/// What a fit follows shows no residual: where most of the parts are off, so is what they are off from.
+TEST(ShapeError, APartThatAFitFollowsIsNotBetterThanMost) {
+  ShapeError shape;
+  for (int i = 0; i < 6; ++i) shape.add(outline({0.0, 1.0, -1.0, 1.0}), 0, 1.0);
+  EXPECT_NEAR(shape.variance_px2(0.0, 0.0), 8.0, 1e-9);
+}
+
 TEST(ShapeError, WhatDiffersFromPostureToPostureIsNone) {
   ShapeError shape;
   std::mt19937_64 random(test::seed());

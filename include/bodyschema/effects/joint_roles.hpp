@@ -18,12 +18,15 @@ struct BodySegment {
   std::vector<std::size_t> parts;  ///< positions in RobotSetup's rendered links
 };
 
-/// A link between two joints of the arm that lie apart, and how its length changes.
+/// A link between two joints of the arm that lie apart, and how its length changes: by the joint at its far end, which
+/// alone moves. Of a link that turns about its own length also by the joint that turns it: that moves with all beyond,
+/// the link's cover first.
 struct ArmLink {
-  std::string name;           ///< the URDF's link between them, which carries `joint`
-  Eigen::Index joint = -1;    ///< the joint at its far end, RobotModel order
-  double length_m = 0.0;      ///< from the arm's joint before to this one
+  std::string name;           ///< the URDF's link between them
+  Eigen::Index joint = -1;    ///< the joint that moves, RobotModel order
+  double length_m = 0.0;      ///< from joint to joint
   JointAdjustment per_metre;  ///< of `joint`: what one metre more of length does
+  bool takes_cover = false;   ///< `joint` turns the link
 };
 
 /// Which joints and parts play which role on this robot, by position in RobotModel order; in that order too, so from
