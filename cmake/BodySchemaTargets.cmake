@@ -66,13 +66,15 @@ function(bodyschema_patient variable seconds)
   set(${variable} ${limit} PARENT_SCOPE)
 endfunction()
 
-# bodyschema_test(<folder> SOURCES ... [LINKS lib...] [LABELS ...] [TIMEOUT seconds] [RUN_SERIAL] [LONG] [FRESH])
+# bodyschema_test(<folder> SOURCES ... [LINKS lib...] [LABELS ...] [TIMEOUT seconds] [RUN_SERIAL] [LONG] [LONG_TESTS ...]
+#                 [FRESH])
 #   One GoogleTest program per folder of test/, named test_<folder>. RUN_SERIAL: no other test beside its own.
-#   LONG: logs of many pictures, label long; outside the default suite, ctest -C long -L long runs them.
+#   LONG: logs of many pictures, label long; outside the default suite, ctest -C long -L long runs them. LONG_TESTS: only
+#   these of the program, as suite.test.
 #   FRESH: draws from BODYSCHEMA_SEED (test/random_seed.hpp), which is fixed in the default suite; ctest -C fresh -L fresh
 #   runs it with a seed that nobody has seen, and prints that.
 function(bodyschema_test folder)
-  cmake_parse_arguments(ARG "RUN_SERIAL;LONG;FRESH" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "RUN_SERIAL;LONG;FRESH" "TIMEOUT" "SOURCES;LINKS;LABELS;LONG_TESTS" ${ARGN})
   find_package(GTest REQUIRED)
   set(target test_${folder})
   add_executable(${target} ${ARG_SOURCES})
@@ -90,10 +92,17 @@ function(bodyschema_test folder)
   bodyschema_patient(timeout ${ARG_TIMEOUT})
   set(patience BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE})
   if(ARG_LONG)
-    bodyschema_long_tests(${target} ${ARG_SOURCES})
+    bodyschema_tests_of(long_tests ${ARG_SOURCES})
+    bodyschema_long_tests(${target} ${long_tests})
   else()
     include(GoogleTest)
-    gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60
+    bodyschema_long_tests(${target} ${ARG_LONG_TESTS})
+    set(filter)
+    if(ARG_LONG_TESTS)
+      list(JOIN ARG_LONG_TESTS ":" left_out)
+      set(filter TEST_FILTER "-${left_out}")
+    endif()
+    gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60 ${filter}
       PROPERTIES TIMEOUT ${timeout} LABELS "${ARG_LABELS}" RUN_SERIAL ${ARG_RUN_SERIAL} ENVIRONMENT ${patience})
   endif()
   if(ARG_FRESH)
@@ -103,15 +112,23 @@ function(bodyschema_test folder)
   endif()
 endfunction()
 
-# One ctest for each TEST or TEST_F of some sources, of the configuration long (gtest_discover_tests knows none).
-macro(bodyschema_long_tests program)
+# The names of each TEST or TEST_F of some sources (gtest_discover_tests knows no configurations).
+macro(bodyschema_tests_of names)
+  set(${names})
   foreach(source ${ARGN})
     file(STRINGS ${source} lines REGEX "^TEST(_F)?\\(")
     foreach(line IN LISTS lines)
       string(REGEX REPLACE "^TEST(_F)?\\(([A-Za-z0-9]+), *([A-Za-z0-9]+)\\).*" "\\2.\\3" name "${line}")
-      add_test(NAME long.${name} CONFIGURATIONS long COMMAND ${program} --gtest_filter=${name})
-      set_tests_properties(long.${name} PROPERTIES TIMEOUT ${timeout} LABELS "long;${ARG_LABELS}"
-        RUN_SERIAL ${ARG_RUN_SERIAL} ENVIRONMENT ${patience})
+      list(APPEND ${names} ${name})
     endforeach()
+  endforeach()
+endmacro()
+
+# One ctest for each of these tests, of the configuration long.
+macro(bodyschema_long_tests program)
+  foreach(name ${ARGN})
+    add_test(NAME long.${name} CONFIGURATIONS long COMMAND ${program} --gtest_filter=${name})
+    set_tests_properties(long.${name} PROPERTIES TIMEOUT ${timeout} LABELS "long;${ARG_LABELS}"
+      RUN_SERIAL ${ARG_RUN_SERIAL} ENVIRONMENT ${patience})
   endforeach()
 endmacro()

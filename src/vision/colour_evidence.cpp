@@ -371,7 +371,7 @@ void ColourEvidence::separate(const Image& image, const RobotLooks& looks, const
   robot.fill(false);
   if (box_.empty()) return;
   within(static_cast<float>(reach_px_), near_);
-  const bool anywhere = reach_px_ >= kEverywhere_px;
+  const bool anywhere = reach_px_ >= kEverywhere_px * unit_;
   bool asked = false;
   for (int v = box_.v0; v <= box_.v1; ++v) {
     for (int w = box_.u0 >> 6; w <= box_.u1 >> 6; ++w) {

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "bodyschema/geometry/binary_mask.hpp"
@@ -44,7 +46,7 @@ class ColourEvidence {
   /// Calls function(u, v) for pixels outside of the prediction whose distance from its outline lies between these,
   /// px, as far as `look_at` measured it: as far as the prediction may be off, and a little further.
   template <class Function>
-  void for_each_outside(float from_px, float to_px, Function&& function) const;
+  void for_each_outside(float from_px, float to_px, Function&& function);
 
  private:
   struct Side {
@@ -117,11 +119,13 @@ void ColourEvidence::for_each_in(const BinaryMask& mask, Function&& function) co
 }
 
 template <class Function>
-void ColourEvidence::for_each_outside(float from_px, float to_px, Function&& function) const {
-  for_each_in(band_, [&](int u, int v) {
-    const float px = distance_[index(u, v)];
-    if (px >= from_px && px <= to_px && !predicted_.at(u, v)) function(u, v);
-  });
+void ColourEvidence::for_each_outside(float from_px, float to_px, Function&& function) {
+  within(to_px, near_);
+  within(std::nextafter(from_px, 0.0f), work_);
+  for (int v = box_.v0; v <= box_.v1; ++v) {
+    for (int w = box_.u0 >> 6; w <= box_.u1 >> 6; ++w) near_.row(v)[w] &= ~(work_.row(v)[w] | predicted_.row(v)[w]);
+  }
+  for_each_in(near_, std::forward<Function>(function));
 }
 
 }  // namespace bodyschema

@@ -149,13 +149,17 @@ struct Segmenter::Impl {
     return setup.method == SegmentationMethod::kLearnedBackground || setup.method == SegmentationMethod::kAuto;
   }
   [[nodiscard]] const BackgroundModel& background() const;
-  void detect(const Image& image, const BackgroundModel& model, const PixelBox& box);
+  /// @param variance  of the background, times what the model says
+  void detect(const Image& image, const BackgroundModel& model, float variance, const PixelBox& box);
   void detect_hard(const Image& image, const BackgroundModel& model);
   /// Refines `detected` and `sure` to coverage and cleans up.
   void refine(const Image& image, const BackgroundModel& model, BinaryMask& mask, BinaryMask& valid,
               std::vector<std::uint8_t>& coverage);
   void soften(BinaryMask& mask, std::vector<std::uint8_t>& coverage) const;
   void mark_valid(const BackgroundModel& model, BinaryMask& valid, const PixelBox& box);
+  [[nodiscard]] int light_grid() const {
+    return std::max(kLightGrid, static_cast<int>(std::lround(kLightGrid * unit_of(width, height))));
+  }
   [[nodiscard]] PixelBox everything() const { return {0, 0, width - 1, height - 1}; }
   /// The whole picture against a background that is known.
   void compare(const Image& image, const BackgroundModel& model, BinaryMask& mask, BinaryMask& valid,
@@ -170,8 +174,7 @@ struct Segmenter::Impl {
   /// Whether the learned background is what this picture shows away from the robot.
   [[nodiscard]] bool background_holds(const Image& image);
   void forget_background();
-  void start_local(const Image& image, bool holds, const PixelBox& box);
-  void average_beside(const Image& image);
+  void find_background(const Image& image, bool holds);
   /// How much more than elsewhere the background varies beside the robot: what compression makes of an outline.
   void measure_edge_noise(const Image& image);
 
@@ -242,7 +245,7 @@ const BackgroundModel& Segmenter::Impl::background() const {
 /// Within whole words of the box. `sure`: the pixel itself differs from the background. `detected`: the mean of its 3x3
 /// square does, which sees a third of that contrast; it reaches one pixel farther out.
 BODYSCHEMA_WIDE_VECTORS
-void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model, const PixelBox& box) {
+void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model, float variance, const PixelBox& box) {
   const auto n = static_cast<std::size_t>(channels);
   const int begin = box.u0 & ~63, end = std::min((box.u1 | 63) + 1, width);
   const auto w = static_cast<std::size_t>(end - begin);
@@ -274,7 +277,7 @@ void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model, c
     std::uint8_t* hit = hits.data();
     std::fill_n(hit, hits.size(), std::uint8_t{0});
     for (std::size_t u = 0; u < w; ++u) {
-      hit[u] = static_cast<std::uint8_t>((score[u] * precision[u] > least_sigma) & (score[u] > limit));
+      hit[u] = static_cast<std::uint8_t>((score[u] * (precision[u] / variance) > least_sigma) & (score[u] > limit));
     }
     pack_bits(hit, w, out + begin / 64);
   };
@@ -531,7 +534,7 @@ void Segmenter::Impl::compare(const Image& image, const BackgroundModel& model, 
     }
     return;
   }
-  detect(image, model, everything());
+  detect(image, model, 1.0f, everything());
   components.remove_small(detected, setup.min_component_px);
   components.fill_small_holes(detected, setup.max_hole_px);
   intersect(sure, detected);
@@ -578,17 +581,18 @@ const Image& Segmenter::Impl::in_known_light(const Image& image) {
   constexpr std::size_t kFewest = 300;
   std::array<std::array<std::size_t, 2 * kSteps + 1>, 3> counts{};
   std::size_t all = 0;
-  for (int v = 1; v < height; v += kLightGrid) {
-    for (int u = 1; u < width; u += kLightGrid) {
+  const int step = light_grid();
+  for (int v = step / 2; v < height; v += step) {
+    for (int u = step / 2; u < width; u += step) {
       const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
       if (model.precision[i] <= 0.0f || beside.at(u, v)) continue;
       ++all;
       for (std::size_t c = 0; c < static_cast<std::size_t>(channels); ++c) {
         const float had = std::max(model.mean[i * static_cast<std::size_t>(channels) + c], 1.0f);
         const float has = std::max(static_cast<float>(image.pixel(u, v)[c]), 1.0f);
-        const float step = std::log(has / had) / std::log(kPerStep);
+        const float change = std::log(has / had) / std::log(kPerStep);
         ++counts[c]
-                [static_cast<std::size_t>(std::clamp(static_cast<int>(std::lround(step)), -kSteps, kSteps) + kSteps)];
+                [static_cast<std::size_t>(std::clamp(static_cast<int>(std::lround(change)), -kSteps, kSteps) + kSteps)];
       }
     }
   }
@@ -627,8 +631,9 @@ bool Segmenter::Impl::background_holds(const Image& image) {
   if (model.channels != image.channels) return false;
   std::size_t all = 0, same = 0;
   const auto n = static_cast<std::size_t>(channels);
-  for (int v = 1; v < height; v += kLightGrid) {
-    for (int u = 1; u < width; u += kLightGrid) {
+  const int step = light_grid();
+  for (int v = step / 2; v < height; v += step) {
+    for (int u = step / 2; u < width; u += step) {
       const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
       if (model.precision[i] <= 0.0f || beside.at(u, v)) continue;
       float square = 0.0f;
@@ -683,40 +688,31 @@ void Segmenter::Impl::forget_background() {
   misfits = 0;
 }
 
-/// What is known of the background where the box is: as learned, or nothing.
-void Segmenter::Impl::start_local(const Image& image, bool holds, const PixelBox& box) {
+/// The background about the outline of what is `sure`, where coverage asks for it: as learned, or as it is nearby.
+void Segmenter::Impl::find_background(const Image& image, bool holds) {
+  const BackgroundModel& model = learned.model();
   if (local.width != width || local.height != height || local.channels != channels) {
     local = BackgroundModel(width, height, channels);
   }
-  const BackgroundModel& model = learned.model();
   local.noise_sd = holds                      ? model.noise_sd
                    : setup.noise_levels > 0.0 ? static_cast<float>(setup.noise_levels)
                                               : noise_of(image);
-  if (box.empty()) return;
-  // A pixel more on each side, as far as neighbours are looked at, and whole words.
-  const PixelBox all = PixelBox{box.u0 & ~63, box.v0, box.u1 | 63, box.v1}.grown(1, width, height);
-  const auto n = static_cast<std::size_t>(channels), columns = static_cast<std::size_t>(all.width());
-  for (int v = all.v0; v <= all.v1; ++v) {
-    const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(all.u0);
-    float* precision = local.precision.data() + i;
-    if (!holds) {
-      std::fill_n(precision, columns, 0.0f);
-      continue;
-    }
-    std::copy_n(model.mean.data() + i * n, columns * n, local.mean.data() + i * n);
-    for (std::size_t u = 0; u < columns; ++u) precision[u] = model.precision[i + u] / edge_variance;
-  }
-}
-
-/// The background that nobody knows, about the outline of what is `sure`, where coverage asks for it.
-void Segmenter::Impl::average_beside(const Image& image) {
   constexpr int kOut_px = 2, kIn_px = 4;
   uncertain = sure;
   morphology.erode(uncertain, kIn_px);
   wanted = detected;
   morphology.dilate(wanted, kOut_px);
+  const auto n = static_cast<std::size_t>(channels);
   for (int v = 0; v < height; ++v) {
-    for (int w = 0; w < wanted.words_per_row(); ++w) wanted.row(v)[w] &= ~uncertain.row(v)[w] & ~known.row(v)[w];
+    for (int w = 0; w < wanted.words_per_row(); ++w) {
+      for (std::uint64_t bits = wanted.row(v)[w] &= ~uncertain.row(v)[w]; bits != 0; bits &= bits - 1) {
+        const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
+                       64 * static_cast<std::size_t>(w) + static_cast<std::size_t>(std::countr_zero(bits));
+        local.precision[i] = holds ? model.precision[i] / edge_variance : 0.0f;
+        for (std::size_t c = i * n; holds && c < (i + 1) * n; ++c) local.mean[c] = model.mean[c];
+      }
+      wanted.row(v)[w] &= ~known.row(v)[w];
+    }
   }
   const double unit = unit_of(width, height);
   average.around(image, sure, wanted, evidence.box(), static_cast<int>(kAverage_px * unit), local);
@@ -753,10 +749,9 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
   detected.fill(false);
   sure.fill(false);
   known.fill(false);
-  start_local(seen, holds, evidence.box());
   if (holds && !evidence.box().empty()) {
-    mark_valid(local, known, evidence.box());
-    detect(seen, local, evidence.box());
+    mark_valid(learned.model(), known, evidence.box());
+    detect(seen, learned.model(), edge_variance, evidence.box());
     components.remove_small(detected, setup.min_component_px);
     components.fill_small_holes(detected, setup.max_hole_px);
     intersect(sure, detected);
@@ -778,8 +773,8 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
   }
   // What lies beside a prediction that is far off is the robot.
   const bool beside_it = !from_stills || reach_px < static_cast<double>(kBesideTo_px) * unit;
+  find_background(seen, holds);
   if (holds && !everywhere && beside_it) measure_edge_noise(seen);
-  average_beside(seen);
   valid.fill(true);
   refine(seen, local, mask, valid, coverage);
   evidence.mark_weak(robot);

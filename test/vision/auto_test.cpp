@@ -133,6 +133,28 @@ TEST(AutomaticMasks, FewStillsShowTheBackgroundBesideWhereTheRobotIs) {
   }
 }
 
+// Lengths that belong to the decision grow with the picture, all of them.
+TEST(AutomaticMasks, AThingFurtherOffThanTheRobotMayBeIsNotTakenForItInLargePictures) {
+  std::mt19937 random(5);
+  Scene scene = large(Texture::kClutter);
+  scene.width = 640;
+  scene.height = 480;
+  std::vector<Image> empty;
+  for (int i = 0; i < 8; ++i) empty.push_back(scene.picture(random));
+  Segmenter segmenter(automatic(), "left", scene.width, scene.height);
+  segmenter.learn(empty);
+  scene.shapes = large_hand(250.0, 240.0);
+  const auto robot = scene.true_mask();
+  constexpr double kReach_px = 40.0;
+  const auto box = bounding_box(robot);
+  const double u = box.u1 + kReach_px + 25.0, v = 0.5 * (box.v0 + box.v1);
+  scene.shapes.push_back({u, v, u, v, 12.0});
+  Output out;
+  segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage, {&robot, kReach_px, false});
+  EXPECT_GT(iou(out.mask, robot), 0.95);
+  EXPECT_LT(bounding_box(out.mask).u1, box.u1 + kReach_px);
+}
+
 TEST(AutomaticMasks, APredictionThatIsFarOffIsPutRight) {
   for (const auto texture : {Texture::kPlain, Texture::kGradient, Texture::kClutter}) {
     std::mt19937 random(21);
