@@ -32,6 +32,10 @@ constexpr float kMostEvidence = 2.0f;
 // Log odds by which a pixel as far off as the prediction may be belongs to the side that is predicted.
 constexpr float kPrediction = 0.7f;
 
+// What all pictures show beside what this one shows there: as much.
+constexpr float kScene = 0.5f;
+// From here on a pixel has the colours of the rest: log odds, mean of its neighbourhood.
+constexpr float kDeny = 0.5f;
 // Less than this in the mean of a pixel's neighbourhood says nothing: log odds.
 constexpr float kWeak = 0.25f;
 
@@ -183,7 +187,7 @@ void ColourEvidence::spread(Side& side) const {
 }
 
 /// Log likelihood ratio of every pixel of the box.
-void ColourEvidence::weigh(const RobotLooks& looks, double reach_px) {
+void ColourEvidence::weigh(const RobotLooks& looks, const SceneColours* colours, double reach_px) {
   const std::size_t n = palette_.size();
   evidence_.resize(depth_.size());
   const float whole = rough_ ? kWholeCountRough : kWholeCount;
@@ -200,17 +204,21 @@ void ColourEvidence::weigh(const RobotLooks& looks, double reach_px) {
       }
       const auto tile = static_cast<std::size_t>(row * columns_ + (u - box_.u0) / tile_px_);
       const std::size_t k = cell_[i];
-      const float robot = (robot_.near[tile * n + k] + robot_all * robot_.all[k] +
-                           (known > 0.0f ? known * looks.share[palette_[k]] : 0.0f)) /
-                          (robot_.total[tile] + whole + known);
-      const float rest = (rest_.near[tile * n + k] + rest_all * rest_.all[k]) / (rest_.total[tile] + whole);
+      float robot = (robot_.near[tile * n + k] + robot_all * robot_.all[k] +
+                     (known > 0.0f ? known * looks.share[palette_[k]] : 0.0f)) /
+                    (robot_.total[tile] + whole + known);
+      float rest = (rest_.near[tile * n + k] + rest_all * rest_.all[k]) / (rest_.total[tile] + whole);
+      if (colours != nullptr) {
+        robot += kScene * (colours->robot.share[palette_[k]] - robot);
+        rest += kScene * (colours->rest.share[palette_[k]] - rest);
+      }
       evidence_[i] = std::clamp(std::log((robot + kFloor) / (rest + kFloor)), -kMostEvidence, kMostEvidence);
     }
   }
 }
 
 /// Mean evidence of a small square, and the prediction's say.
-void ColourEvidence::decide(double reach_px, int smoothing, const BackgroundModel* background,
+void ColourEvidence::decide(double reach_px, int smoothing, bool may_deny, const BackgroundModel* background,
                             const BinaryMask& differs, BinaryMask& robot) {
   const int w = box_.width(), h = box_.height();
   const auto width = static_cast<std::size_t>(w);
@@ -229,8 +237,19 @@ void ColourEvidence::decide(double reach_px, int smoothing, const BackgroundMode
   }
   const float share = 1.0f / static_cast<float>((2 * smoothing + 1) * (2 * smoothing + 1));
   robot.fill(false);
+  if (denied_.width() != robot.width() || denied_.height() != robot.height()) {
+    denied_ = BinaryMask(robot.width(), robot.height());
+  }
+  denied_.fill(false);
   std::size_t i = 0;
   for (int y = 0; y < h; ++y) {
+    const auto mean = [&](int x) {
+      float sum = 0.0f;
+      for (int k = -smoothing; k <= smoothing; ++k) {
+        sum += sums_[static_cast<std::size_t>(std::clamp(y + k, 0, h - 1)) * width + static_cast<std::size_t>(x)];
+      }
+      return sum * share;
+    };
     for (int x = 0; x < w; ++x, ++i) {
       const float d = depth_[i];
       smooth_[i] = kMostEvidence;
@@ -238,22 +257,25 @@ void ColourEvidence::decide(double reach_px, int smoothing, const BackgroundMode
       if (background != nullptr &&
           background->precision[static_cast<std::size_t>(v) * static_cast<std::size_t>(background->width) +
                                 static_cast<std::size_t>(u)] > 0.0f) {
-        if (differs.at(u, v) && (d >= -far || far >= everywhere)) robot.set(u, v);
+        if (!differs.at(u, v) || (d < -far && far < everywhere)) continue;
+        if (may_deny && d <= far && mean(x) < -kDeny) {
+          denied_.set(u, v);
+        } else {
+          robot.set(u, v);
+        }
         continue;
       }
       if (d < -far) continue;
-      float sum = 0.0f;
-      for (int k = -smoothing; k <= smoothing; ++k) {
-        sum += sums_[static_cast<std::size_t>(std::clamp(y + k, 0, h - 1)) * width + static_cast<std::size_t>(x)];
-      }
-      if (d <= far) smooth_[i] = sum * share;
-      if (d > far || sum * share + kPrediction * d / far > 0.0f) robot.set(u, v);
+      const float own = mean(x);
+      if (d <= far) smooth_[i] = own;
+      if (d > far || own + kPrediction * d / far > 0.0f) robot.set(u, v);
     }
   }
 }
 
 void ColourEvidence::separate(const Image& image, const BinaryMask& predicted, double reach_px, const RobotLooks& looks,
-                              const BackgroundModel* background, const BinaryMask& differs, BinaryMask& robot) {
+                              const SceneColours* colours, const BackgroundModel* background, const BinaryMask& differs,
+                              BinaryMask& robot) {
   const double unit = unit_of(image);
 
   robot.fill(false);
@@ -276,8 +298,8 @@ void ColourEvidence::separate(const Image& image, const BinaryMask& predicted, d
   }
   for (int round = 0;; ++round) {
     collect(robot_, rest_);
-    weigh(looks, reach_px);
-    decide(reach_px, rough_ ? 2 : 1, background, differs, robot);
+    weigh(looks, colours, reach_px);
+    decide(reach_px, rough_ ? 2 : 1, colours != nullptr, background, differs, robot);
     if (round > 0) break;
     i = 0;
     for (int v = box_.v0; v <= box_.v1; ++v) {

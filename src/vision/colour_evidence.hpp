@@ -8,6 +8,7 @@
 #include "bodyschema/vision/background_model.hpp"
 #include "bodyschema/vision/mask_operations.hpp"
 #include "bodyschema/vision/robot_looks.hpp"
+#include "bodyschema/vision/scene_colours.hpp"
 
 namespace bodyschema {
 
@@ -23,13 +24,17 @@ class ColourEvidence {
   /// @param predicted  where the robot is thought to be
   /// @param reach_px   how far off that may be
   /// @param looks      the robot's colours as known before
+  /// @param colours    those of both sides in all pictures; null: not known
   /// @param background pixels whose background is known say themselves whether they differ, in `differs`; null: none is
   /// @param robot      out: pixels taken for robot
   void separate(const Image& image, const BinaryMask& predicted, double reach_px, const RobotLooks& looks,
-                const BackgroundModel* background, const BinaryMask& differs, BinaryMask& robot);
+                const SceneColours* colours, const BackgroundModel* background, const BinaryMask& differs,
+                BinaryMask& robot);
   /// Pixels near the outline whose colour, with those around, told nothing in the last `separate`: what was decided
   /// there is the prediction, not the picture.
   void mark_weak(BinaryMask& weak);
+  /// Pixels of a known background that differed in the last `separate`, and whose colours are those of the rest.
+  [[nodiscard]] const BinaryMask& denied() const { return denied_; }
   /// The robot's colours where it was predicted in the last `separate`.
   /// @param share  of the new ones in `looks`
   void learn(const Image& image, const BinaryMask& predicted, float share, RobotLooks& looks);
@@ -55,9 +60,9 @@ class ColourEvidence {
   void find_cells(const Image& image);
   void collect(Side& robot, Side& rest) const;
   void spread(Side& side) const;
-  void weigh(const RobotLooks& looks, double reach_px);
-  void decide(double reach_px, int smoothing, const BackgroundModel* background, const BinaryMask& differs,
-              BinaryMask& robot);
+  void weigh(const RobotLooks& looks, const SceneColours* colours, double reach_px);
+  void decide(double reach_px, int smoothing, bool may_deny, const BackgroundModel* background,
+              const BinaryMask& differs, BinaryMask& robot);
 
   PixelBox box_;
   double unit_ = 1.0;   ///< px of a 320x240 picture in this one
@@ -70,6 +75,7 @@ class ColourEvidence {
   std::vector<std::uint16_t> number_;   ///< of every cell, in `palette_`
   std::vector<float> evidence_, sums_, smooth_;
   Side robot_, rest_;
+  BinaryMask denied_;
   MaskMorphology morphology_;
 };
 

@@ -185,6 +185,7 @@ struct Segmenter::Impl {
   /// Whether the learned background is what this picture shows away from the robot.
   [[nodiscard]] bool background_holds(const Image& image);
   void forget_background();
+  void doubt_background();
   /// How much more than elsewhere the background varies beside the robot: what compression makes of an outline.
   void measure_edge_noise(const Image& image);
 
@@ -203,6 +204,7 @@ struct Segmenter::Impl {
   BackgroundModel local;                         // statistics: of the last frame, next to the robot
   ColourEvidence evidence;                       // auto
   RobotLooks looks;                              // auto
+  SceneColours colours;                          // auto
   LocalAverage average;                          // auto
   BinaryMask known, beside;                      // auto: pixels with a known background; the robot and all around it
   Image relit;                                   // auto: the last picture in the light of the learned background
@@ -560,6 +562,10 @@ void Segmenter::know_looks(RobotLooks looks) {
   impl_->looks = std::move(looks);
 }
 
+void Segmenter::know_colours(SceneColours colours) {
+  impl_->colours = std::move(colours);
+}
+
 void Segmenter::camera_turned() {
   impl_->turned = true;
 }
@@ -687,6 +693,21 @@ void Segmenter::Impl::forget_background() {
   misfits = 0;
 }
 
+/// Where the background differs, and by its colours is no robot, it is as if nobody knew it.
+void Segmenter::Impl::doubt_background() {
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      if (!evidence.denied().at(u, v)) continue;
+      local.precision[static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u)] =
+          0.0f;
+    }
+    for (int w = 0; w < known.words_per_row(); ++w) {
+      known.row(v)[w] &= ~evidence.denied().row(v)[w];
+      detected.row(v)[w] &= ~evidence.denied().row(v)[w];
+    }
+  }
+}
+
 void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryMask& valid,
                                    std::vector<std::uint8_t>& coverage, const PredictedRobot& predicted) {
   const double unit = unit_of(width, height);
@@ -734,7 +755,9 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
   const BackgroundModel* background = holds ? &local : nullptr;
   if (looks.channels != channels) looks = {};
   const bool everywhere = reach_px >= ColourEvidence::kEverywhere_px * unit;
-  evidence.separate(seen, *predicted.silhouette, reach_px, looks, background, sure, robot);
+  const bool both = colours.known() && colours.robot.channels == channels && colours.rest.channels == channels;
+  evidence.separate(seen, *predicted.silhouette, reach_px, looks, both ? &colours : nullptr, background, sure, robot);
+  if (both && holds) doubt_background();
   components.remove_small(robot, setup.min_component_px);
   components.fill_small_holes(robot, setup.max_hole_px);
   // A pixel beyond what is sure may be robot in part: as the background says, or beside what colours say.
