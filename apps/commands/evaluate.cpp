@@ -39,7 +39,7 @@ void add_evaluate(CLI::App& app) {
   command->add_flag(
       "--masks", a->options.masks,
       "diagnosis: logs of masks with noisy outlines, 40 s at 5 Hz, instead of pictures; five times as fast");
-  command->add_option("--rows", a->options.rows, "Of `everyday` and `honesty`, these rows only");
+  command->add_option("--rows", a->options.rows, "Of `everyday`, `honesty` and `real`, these rows only");
   command->add_option("--seconds", a->options.everyday_s, "Of `everyday`, length of a log, s")
       ->capture_default_str()
       ->check(number_in(5, 3600));

@@ -46,8 +46,9 @@ constexpr double kNear_px = 2.5;  ///< physical, px of a 320x240 picture: residu
 /// Physical, px of a 320x240 picture, median: masks that are made about a prediction follow it, right or wrong; those
 /// about the right one end at the robot itself.
 constexpr double kOwnMasks_px = 1.0;
-constexpr double kBeyondBelief_sd = 4.0;    ///< statistical
-constexpr double kDisagreement = 4.0;       ///< statistical: mean NIS per direction
+constexpr double kSame_px = 0.2;          ///< physical, px of a 320x240 picture: outlines that differ by less are alike
+constexpr double kBeyondBelief_sd = 4.0;  ///< statistical
+constexpr double kDisagreement = 4.0;     ///< statistical: mean NIS per direction
 constexpr std::size_t kFewestPostures = 3;  ///< fewer cannot disagree
 
 int threads_of(const CalibrationOptions& options) {
@@ -63,6 +64,8 @@ bool to_be_searched(const CameraModel& camera) {
 constexpr std::array kReaches = {40.0, 30.0, 20.0, 12.0, 8.0, 6.0, 5.0};
 constexpr std::array kReachesMoved = {16.0, 12.0, 8.0, 6.0, 5.0, 4.0, 4.0};
 static_assert(kReaches.size() == kReachesMoved.size());
+/// Statistical. Masks never look less far than outlines still err: what lies beyond, they take for the other side.
+constexpr double kWithin_sd = 4.0;
 constexpr double kWide_px = 12.0;  ///< ... and then once more, to see whether it makes a difference
 constexpr std::array kReachesAgain = {6.0, 4.0, 4.0};
 constexpr int kMostChecks = 3;
@@ -70,7 +73,7 @@ constexpr double kSettled_sd = 2.0;  ///< statistical
 /// Physical. Outlines that may be further off than this, px of a 320x240 picture, are looked for by what moved.
 constexpr double kRough_px = 30.0, kAnywhere_px = 1e3;
 constexpr double kHardlyKnown_rad = radians(3.0);  ///< ... and so are those of a camera that may be turned by more
-constexpr std::size_t kRawKept = 64;               ///< observations of such a log whose pictures are looked at
+constexpr std::size_t kRawKept = 128;              ///< observations of such a log whose pictures are looked at
 
 class Calibrator {
  public:
@@ -188,9 +191,10 @@ class Calibrator {
   /// Masks and fit by turns, masks ever nearer to what the fit of all postures says.
   void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
     const auto& reaches = best ? kReachesMoved : kReaches;
-    for (const double reach_px : reaches) {
-      if (reach_px > believed_px_ && reach_px > reaches.back()) continue;
-      with_masks_anew(masks, fit, best, reach_px);
+    for (std::size_t i = 0; i < reaches.size(); ++i) {
+      if (i + 1 < reaches.size() && reaches[i + 1] > believed_px_) continue;  // the next one looks far enough
+      if (best && reaches[i] < kWithin_sd * best->noise().front().sd_px()) break;
+      with_masks_anew(masks, fit, best, reaches[i]);
     }
   }
 
@@ -586,7 +590,7 @@ class Calibrator {
     const auto postures = batch.postures();
     if (postures < 2 * kFewestPostures - 1) return;
     const std::size_t folds = std::min(kFolds, postures);
-    double sum = 0.0, n = 0.0;
+    double sum = 0.0, before = 0.0, n = 0.0;
     for (std::size_t fold = 0; fold < folds; ++fold) {
       std::vector<std::size_t> kept, left_out;
       for (std::size_t p = 0; p < log_->pictures().size(); ++p) {
@@ -597,10 +601,19 @@ class Calibrator {
       const auto beliefs = Beliefs::from(configuration_, roles, rig_, pipeline_.options());
       BatchFit part(fit, batch.state(), beliefs.tolerances, settings());  // what was found besides is in that state
       part.run(0.0, kept);
-      sum += median_outline_distance_px(fit, part.state().model(), left_out) * static_cast<double>(left_out.size());
-      n += static_cast<double>(left_out.size());
+      const auto count = static_cast<double>(left_out.size());
+      sum += count * median_outline_distance_px(fit, part.state().model(), left_out);
+      before += count * median_outline_distance_px(fit, ErrorModel(roles), left_out);
+      n += count;
     }
-    if (n > 0.0) result_.outline_px.heldout = sum / n;
+    if (n <= 0.0) return;
+    result_.outline_px.heldout = sum / n;
+    helps_ = sum / n < before / n + kSame_px * picture_unit(rig_.cameras.front().intrinsics);
+    if (helps_) return;
+    for (auto& joint : result_.joints) {
+      joint.told = false;
+      joint.untold_why = "postures left out of the fit look further off with it than without";
+    }
   }
 
   /// What of the robot's predicted outline lies near an edge in the pictures.
@@ -666,6 +679,13 @@ class Calibrator {
                  fmt::format("Not converged: {:.0f} % of the predicted outline lies near an edge of the robot in the "
                              "pictures, expected at least {:.0f} %; check masks, robot and cameras' intrinsics.",
                              100.0 * found.share * found.seen, 100.0 * kLeastFound));
+    }
+    if (!helps_) {
+      return say(
+          CalibrationState::kNotConverged,
+          fmt::format("Not converged: on postures left out of the fit outlines lie {:.1f} px off, no nearer than "
+                      "with robot and cameras as they are configured; nothing of it is to be applied.",
+                      *result_.outline_px.heldout));
     }
     const double after_px = result_.outline_px.after / picture_unit(rig_.cameras.front().intrinsics);
     if (pipeline_.masks_need_estimates() && after_px > kOwnMasks_px) {
@@ -751,6 +771,7 @@ class Calibrator {
   std::string unsettled_;  ///< a joint whose offset depends on how masks were made
   double believed_px_ = kAnywhere_px;
   std::vector<bool> loose_;  ///< parts that are drawn and have no say
+  bool helps_ = true;        ///< outlines of postures that were left out come nearer
   double ambiguity_ = 0.0;
   double only_ = kAlone;  ///< misfit of the second best place over that of the best
   Calibration result_;

@@ -12,6 +12,9 @@ namespace bodyschema {
 namespace {
 
 constexpr std::size_t kFewestFrames = 3;  ///< of which two can agree against the third
+/// Physical. Pictures further apart than this, s, and than so many times the usual distance, are of another recording:
+/// what stands before the cameras may have been moved between.
+constexpr double kPause_s = 5.0, kPauseShare = 5.0;
 /// Statistical. Share of the pictures' pixels that show what stands still, where cameras do.
 constexpr double kStands = 0.5;
 
@@ -36,17 +39,37 @@ VisionSetup with_auto(VisionSetup vision) {
 
 }  // namespace
 
+std::vector<std::size_t> recordings_of(const std::vector<Observation>& kept) {
+  std::vector<double> apart;
+  for (std::size_t i = 1; i < kept.size(); ++i) apart.push_back(seconds(kept[i].utime - kept[i - 1].utime));
+  auto sorted = apart;
+  std::sort(sorted.begin(), sorted.end());
+  const double pause_s = sorted.empty() ? kPause_s : std::max(kPause_s, kPauseShare * sorted[sorted.size() / 2]);
+  std::vector<std::size_t> list(kept.size(), 0);
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i < kept.size(); ++i) {
+    const bool pause = apart[i - 1] > pause_s && i - begin >= kFewestFrames && kept.size() - i >= kFewestFrames;
+    if (pause) begin = i;
+    list[i] = list[i - 1] + (pause ? 1 : 0);
+  }
+  return list;
+}
+
 RawPictures::RawPictures(PictureLog& log, const VisionSetup& vision, const std::vector<Observation>& kept)
-    : log_(log), vision_(with_auto(vision)), kept_(kept) {
+    : log_(log), vision_(with_auto(vision)), kept_(kept), recording_(recordings_of(kept)) {
+  const std::size_t count = recording_.empty() ? 1 : recording_.back() + 1;
   for (const auto& camera : log.rig().cameras) {
-    segmenters_.emplace_back(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height);
+    auto& own = segmenters_.emplace_back();
+    for (std::size_t r = 0; r < count; ++r) {
+      own.emplace_back(vision_, camera.name, camera.intrinsics.width, camera.intrinsics.height);
+    }
     shown_.push_back(camera.has_distortion() ? Undistorter(camera).valid() : BinaryMask());
   }
 }
 
-void RawPictures::segment(std::size_t camera, const Image& image, const PredictedRobot& predicted,
-                          CameraObservation& out) {
-  segmenters_[camera].segment(image, out.mask, out.valid, out.coverage, predicted);
+void RawPictures::segment(std::size_t camera, std::size_t i, const PredictedRobot& predicted, CameraObservation& out) {
+  segmenters_[camera][recording_[i]].segment(kept_[i].cameras[camera]->image, out.mask, out.valid, out.coverage,
+                                             predicted);
   const BinaryMask& shown = shown_[camera];
   for (int v = 0; v < shown.height(); ++v) {
     for (int w = 0; w < shown.words_per_row(); ++w) {
@@ -61,16 +84,18 @@ bool RawPictures::cameras_stood_still() {
   for (const auto& full : kept_) moved_.push_back(without_pictures(full));
   std::size_t all = 0, known = 0;
   for (std::size_t c = 0; c < segmenters_.size(); ++c) {
-    std::vector<Image> frames;
-    for (const auto& full : kept_) {
-      if (full.cameras[c] && !full.cameras[c]->image.empty()) frames.push_back(full.cameras[c]->image);
+    for (std::size_t r = 0; r < segmenters_[c].size(); ++r) {
+      std::vector<Image> frames;
+      for (std::size_t i = 0; i < kept_.size(); ++i) {
+        if (recording_[i] == r && moved_[i].cameras[c]) frames.push_back(kept_[i].cameras[c]->image);
+      }
+      if (frames.size() < kFewestFrames) return false;
+      segmenters_[c][r].learn(frames);
     }
-    if (frames.size() < kFewestFrames) return false;
-    segmenters_[c].learn(frames);
     for (std::size_t i = 0; i < kept_.size(); ++i) {
       auto& camera = moved_[i].cameras[c];
       if (!camera) continue;
-      segment(c, kept_[i].cameras[c]->image, {}, *camera);
+      segment(c, i, {}, *camera);
       all += static_cast<std::size_t>(camera->mask.width()) * static_cast<std::size_t>(camera->mask.height());
       known += camera->valid.count();
     }
@@ -89,26 +114,29 @@ PictureLog RawPictures::about(std::span<const Corrections> corrections, double r
   MaskMorphology morphology;
   for (std::size_t c = 0; c < segmenters_.size(); ++c) {
     const double reach = reach_px * picture_unit(log_.rig().cameras[c].intrinsics);
-    std::vector<Image> frames;
-    std::vector<BinaryMask> predicted, robots;
-    std::vector<std::size_t> where;
-    for (std::size_t i = 0; i < kept_.size(); ++i) {
-      if (!seen[i].cameras[c]) continue;
-      const auto p = picture_of(c, seen[i].cameras[c]->utime);
-      if (p == log_.pictures().size()) {
-        seen[i].cameras[c].reset();
-        continue;
+    std::vector<BinaryMask> predicted(kept_.size());
+    SceneColourCounts colours;
+    for (std::size_t r = 0; r < segmenters_[c].size(); ++r) {
+      std::vector<Image> frames;
+      std::vector<BinaryMask> robots;
+      for (std::size_t i = 0; i < kept_.size(); ++i) {
+        if (recording_[i] != r || !seen[i].cameras[c]) continue;
+        const auto p = picture_of(c, seen[i].cameras[c]->utime);
+        if (p == log_.pictures().size()) {
+          seen[i].cameras[c].reset();
+          continue;
+        }
+        frames.push_back(kept_[i].cameras[c]->image);
+        predicted[i] = preview.draw(log_.pictures()[p].joints.q, corrections[p], c);
+        robots.push_back(predicted[i]);
+        morphology.dilate(robots.back(), static_cast<int>(reach));
+        colours.add(frames.back(), predicted[i], reach, robots.back());
       }
-      where.push_back(i);
-      frames.push_back(kept_[i].cameras[c]->image);
-      predicted.push_back(preview.draw(log_.pictures()[p].joints.q, corrections[p], c));
-      robots.push_back(predicted.back());
-      morphology.dilate(robots.back(), static_cast<int>(reach));
+      segmenters_[c][r].learn(frames, robots);
     }
-    segmenters_[c].learn(frames, robots);
-    for (std::size_t k = 0; k < where.size(); ++k) {
-      auto& camera = *seen[where[k]].cameras[c];
-      segment(c, frames[k], PredictedRobot(&predicted[k], reach, false), camera);
+    for (auto& segmenter : segmenters_[c]) segmenter.know_colours(colours.shares());
+    for (std::size_t i = 0; i < kept_.size(); ++i) {
+      if (seen[i].cameras[c]) segment(c, i, PredictedRobot(&predicted[i], reach, false), *seen[i].cameras[c]);
     }
   }
   return replace(seen, false);

@@ -9,6 +9,10 @@
 
 namespace bodyschema {
 
+/// Of each observation, in order of time, which recording it is of: after a pause that is long by itself and beside
+/// what is usual between them another begins, in which camera and room may stand otherwise.
+std::vector<std::size_t> recordings_of(const std::vector<Observation>& kept);
+
 /// Masks of pictures that come without, made anew each time the robot is known better. What stands still before a still
 /// camera is known from the other postures, be they ten; what is left is judged by the colours on both sides of the
 /// predicted outline, and where these do not differ it says nothing (Segmenter, `auto`).
@@ -37,11 +41,13 @@ class RawPictures {
   VisionSetup vision_;
   const std::vector<Observation>& kept_;
   /// Masks of one picture; what lies beyond the edge of a straightened picture does not count.
-  void segment(std::size_t camera, const Image& image, const PredictedRobot& predicted, CameraObservation& out);
+  /// @param i  of `kept`
+  void segment(std::size_t camera, std::size_t i, const PredictedRobot& predicted, CameraObservation& out);
 
-  std::vector<Segmenter> segmenters_;  ///< one per camera
-  std::vector<BinaryMask> shown_;      ///< by camera, where its lens shows something; empty: everywhere
-  std::vector<Observation> moved_;     ///< masks of what moves
+  std::vector<std::size_t> recording_;              ///< of each observation: backgrounds hold within one
+  std::vector<std::vector<Segmenter>> segmenters_;  ///< by camera and recording
+  std::vector<BinaryMask> shown_;                   ///< by camera, where its lens shows something; empty: everywhere
+  std::vector<Observation> moved_;                  ///< masks of what moves
 };
 
 }  // namespace bodyschema

@@ -11,15 +11,17 @@
 namespace bodyschema {
 namespace {
 
-/// What each joint does to the rendered links beyond the hand's frame.
+/// What each joint does to the rendered links beyond the hand's frame. Those of the arm do as much where there are two.
 class FingerJoints {
  public:
-  FingerJoints(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup)
+  FingerJoints(const std::shared_ptr<const RobotModel>& model, const RobotSetup& setup,
+               const std::vector<Eigen::Index>& arm)
       : links_(with_hand(setup)), kinematics_(model, links_), q_(setup.default_joints(*model)), X_WB_(links_.size()),
         turned_(links_.size()) {
     kinematics_.compute(q_, X_WB_);
     for (Eigen::Index j = 0; j < model->joint_count(); ++j) {
-      if (!kinematics_.moves(j, links_.size() - 1)) add(j);
+      const bool arms = std::find(arm.begin(), arm.end(), j) != arm.end();
+      if (!arms && !kinematics_.moves(j, links_.size() - 1)) add(j);
     }
   }
 
@@ -212,7 +214,7 @@ JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSe
       roles.right_pan = joint;
     }
   }
-  roles.fingers = FingerJoints(model, setup).curling();
+  roles.fingers = FingerJoints(model, setup, roles.arm).curling();
   const ArmAnatomy anatomy(model, setup, cameras, roles.arm);
   roles.segments = anatomy.segments();
   roles.links = anatomy.links();

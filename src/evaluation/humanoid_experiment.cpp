@@ -19,8 +19,9 @@
 #include "real_trial.hpp"
 
 /// A physical humanoid that looks at its own two hands with one camera in its head (Unitree G1): sixteen episodes, each
-/// calibrated alone. Nobody knows its true offsets. What is measured: whether the answers agree with each other about
-/// where the hand is, and how far the model lies from outlines that were drawn by hand in pictures of other episodes.
+/// calibrated alone, then half of them together. Nobody knows its true offsets. What is measured: whether the answers
+/// agree with each other about where the hand is, and how far the model lies from outlines that were drawn by hand in
+/// pictures of other episodes.
 namespace bodyschema {
 namespace {
 
@@ -28,6 +29,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kEpisodesAmongAll = 3;  ///< where everything is evaluated, which takes long
 constexpr double kRate_hz = 3.0;              ///< pictures a second that a calibration looks at
+constexpr double kRateTogether_hz = 1.5;      ///< ... where it looks at many episodes
 constexpr std::size_t kCommonPostures = 10;
 constexpr double kRows_hz = 30.0;  ///< of the recording
 
@@ -81,31 +83,92 @@ class HumanoidExperiment {
     }
     if (answers_.empty()) return;
     outlines();
-    repeats();
+    repeats(answers_, "repeat");
     told();
+    if (context_.options.experiment != "all") together(episodes);
   }
 
  private:
   static Configuration configuration() { return Configuration::load(find_data_file("config/g1/estimator.yaml")); }
 
   void answer(const std::set<std::int64_t>& episodes) {
-    const auto target = ImportTarget::from(configuration(), find_data_file("config/g1/lerobot.yaml"));
-    LerobotOptions import;
-    import.episodes = fmt::format("{}", fmt::join(episodes, ","));
     const auto out = LerobotOutput::of(work_ / "logs");
-    import_lerobot(set_, target, import, out, [](const std::string&) {});
+    import(episodes, out);
     ProgressBar bar("G1", episodes.size());
     for (const auto episode : episodes) {
-      CalibrationOptions options;
-      options.log = out.log_of(episode);
-      options.out = work_ / fmt::format("calibration_{}", episode);
-      options.picture_rate_hz = kRate_hz;
-      options.quiet = true;
-      Answer answer{episode, calibrate(configuration(), options), view_.nominal()};
-      answer.model.take(answer.calibration);
-      answers_.push_back(std::move(answer));
+      answers_.push_back(answer_of(episode, out.log_of(episode), kRate_hz));
       bar.set(answers_.size());
     }
+  }
+
+  void import(const std::set<std::int64_t>& episodes, const LerobotOutput& out) const {
+    const auto target = ImportTarget::from(configuration(), find_data_file("config/g1/lerobot.yaml"));
+    LerobotOptions options;
+    options.episodes = fmt::format("{}", fmt::join(episodes, ","));
+    import_lerobot(set_, target, options, out, [](const std::string&) {});
+  }
+
+  [[nodiscard]] Answer answer_of(std::int64_t episode, const fs::path& log, double rate_hz) const {
+    CalibrationOptions options;
+    options.log = log;
+    options.out = work_ / fmt::format("calibration_{}", episode);
+    options.picture_rate_hz = rate_hz;
+    options.quiet = true;
+    Answer answer{episode, calibrate(configuration(), options), view_.nominal()};
+    answer.model.take(answer.calibration);
+    return answer;
+  }
+
+  /// Every second episode in one log, and the others: two answers that share no picture, each asked about the other's.
+  void together(const std::set<std::int64_t>& episodes) {
+    const std::vector<std::int64_t> all(episodes.begin(), episodes.end());
+    std::vector<Answer> halves;
+    Distances before, after;
+    std::vector<double> by_half;
+    std::size_t told = 1000;
+    std::string states;
+    for (std::size_t half = 0; half < 2; ++half) {
+      std::set<std::int64_t> own;
+      for (std::size_t i = half; i < all.size(); i += 2) own.insert(all[i]);
+      const auto out = LerobotOutput::of(work_ / fmt::format("half_{}.lcmlog", half));
+      import(own, out);
+      const auto& answer =
+          halves.emplace_back(answer_of(-1 - static_cast<std::int64_t>(half), out.path, kRateTogether_hz));
+      Distances other;
+      for (const auto& picture : drawn_) {
+        if (own.contains(picture.episode)) continue;
+        before.add(distances(picture, view_.nominal()));
+        other.add(distances(picture, answer.model));
+      }
+      by_half.push_back(median(other.all()));
+      after.add(other);
+      const auto& joints = answer.calibration.joints;
+      told = std::min(told, static_cast<std::size_t>(std::count_if(joints.begin(), joints.end(), [](const auto& j) {
+                        return j.told && j.name.starts_with("right");
+                      })));
+      states += fmt::format("{}{}", half > 0 ? ", " : "", to_string(answer.calibration.state));
+    }
+    context_.table += fmt::format("\n{:<44} {:>9} {:>9} {:>9} {:>9}\n", "G1, half of the episodes together, twice",
+                                  "before", "after", "worst", "demanded");
+    row("drawn outlines of the other half, px, median", before.all(), after.all(),
+        *std::max_element(by_half.begin(), by_half.end()));
+    row("  right arm", before.right, after.right, 0.0);
+    row("  left arm", before.left, after.left, 0.0);
+    context_.table += fmt::format("{:<44} {:>9} {:>9} {:>9} {:>9}\n  states: {}\n",
+                                  "joints of the right arm told, fewest", "", told, "", 4, states);
+    context_.summary["real"]["g1"]["together"] = {{"before_px", median(before.all())},
+                                                  {"after_px", median(after.all())},
+                                                  {"right_px", median(after.right)},
+                                                  {"left_px", median(after.left)},
+                                                  {"after_px_by_half", by_half},
+                                                  {"right_told", told},
+                                                  {"states", states}};
+    repeats(halves, "together_repeat");
+  }
+
+  void row(const char* name, const std::vector<double>& a, const std::vector<double>& b, double worst) {
+    context_.table += fmt::format("{:<44} {:>9.1f} {:>9.1f} {:>9} {:>9}\n", name, median(a), median(b),
+                                  worst > 0.0 ? fmt::format("{:.1f}", worst) : "", worst > 0.0 ? "4" : "");
   }
 
   // --- outlines drawn by hand -------------------------------------------------------------------
@@ -164,10 +227,6 @@ class HumanoidExperiment {
     context_.table += fmt::format("\n{:<44} {:>9} {:>9} {:>9} {:>9}\n",
                                   fmt::format("G1, head camera, {} episodes alone", answers_.size()), "before", "after",
                                   "worst", "demanded");
-    const auto row = [&](const char* name, const std::vector<double>& a, const std::vector<double>& b, double worst) {
-      context_.table += fmt::format("{:<44} {:>9.1f} {:>9.1f} {:>9} {:>9}\n", name, median(a), median(b),
-                                    worst > 0.0 ? fmt::format("{:.1f}", worst) : "", worst > 0.0 ? "4" : "");
-    };
     row("drawn outlines of other episodes, px, median", before.all(), after.all(),
         *std::max_element(by_answer.begin(), by_answer.end()));
     row("  right arm", before.right, after.right, 0.0);
@@ -198,14 +257,14 @@ class HumanoidExperiment {
   // --- do the answers agree ---------------------------------------------------------------------
 
   /// Where each answer has the right hand in the camera, in postures that are the same for all.
-  void repeats() {
+  void repeats(const std::vector<Answer>& answers, const char* key) {
     std::vector<double> mm, deg;
     std::vector<double> nominal_mm;
     const std::size_t step = std::max<std::size_t>(1, drawn_.size() / kCommonPostures);
     for (std::size_t i = 0; i < drawn_.size() && mm.size() < kCommonPostures; i += step) {
       const auto q = joints(drawn_[i].episode, drawn_[i].row);
       std::vector<Pose> poses;
-      for (const auto& answer : answers_) poses.push_back(view_.hand(answer.model, q));
+      for (const auto& answer : answers) poses.push_back(view_.hand(answer.model, q));
       Eigen::Vector3d middle = Eigen::Vector3d::Zero();
       for (const auto& pose : poses) middle += pose.translation() / static_cast<double>(poses.size());
       double squares = 0.0, turns = 0.0;
@@ -229,10 +288,10 @@ class HumanoidExperiment {
     context_.table += fmt::format("{:<44} {:>9} {:>9.2f} {:>9.2f} {:>9}\n", "  deg", "", rms(deg),
                                   *std::max_element(deg.begin(), deg.end()), 1);
     context_.table += fmt::format("{:<44} {:>9.1f}\n", "  nominal model from their mean, mm", rms(nominal_mm));
-    context_.summary["real"]["g1"]["repeat"] = {{"postures", mm.size()},
-                                                {"hand_mm", rms(mm)},
-                                                {"hand_deg", rms(deg)},
-                                                {"nominal_from_mean_mm", rms(nominal_mm)}};
+    context_.summary["real"]["g1"][key] = {{"postures", mm.size()},
+                                           {"hand_mm", rms(mm)},
+                                           {"hand_deg", rms(deg)},
+                                           {"nominal_from_mean_mm", rms(nominal_mm)}};
   }
 
   static Eigen::Matrix3d mean_rotation(const std::vector<Pose>& poses) {

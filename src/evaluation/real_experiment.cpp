@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
 #include <thread>
 
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/evidence/outline_distance.hpp"
 #include "bodyschema/imports/camera_pose_file.hpp"
@@ -46,6 +49,8 @@ struct Demand {
 };
 constexpr Demand kSets[] = {{"lbr_zed5", "LBR, 5 postures", 0.4, 0.1, 0.6, 4},
                             {"lbr_zed10", "LBR, 10 postures", 0.25, 0.05, 0.4, 7}};
+constexpr const char* kBoard = "panda_1";
+constexpr const char* kHumanoid = "g1";
 /// How far off the camera is where it is said to be known roughly.
 constexpr double kRough_deg = 5.0, kRough_m = 0.05;
 
@@ -183,25 +188,34 @@ class RealExperiment {
     context_.table +=
         fmt::format("\n{:<34} {:>6} {:>7} {:>7} {:>7} {:>6} {:>5} {:>8} {:>8} {:>6}\n", "real robots, camera unknown",
                     "seeds", "rms deg", "repeat", "worst z", "rms z", "told", "cam mm", "cam deg", "good");
-    for (const auto& demand : kSets) offsets_found(demand);
+    each_set([&](const Demand& demand) { offsets_found(demand); });
     context_.table +=
         "truth: offsets hidden in the encoders; the robots' own are taken to be right to 0.1 deg. witness: the "
         "published pose\nleft_dr, the turn about the first joint's axis taken out. rms z without the first joint.\n";
     context_.table +=
         fmt::format("\n{:<34} {:>6} {:>7} {:>7} {:>7} {:>6} {:>5} {:>8} {:>8} {:>6}\n", "pictures without masks",
                     "seeds", "rms deg", "repeat", "worst z", "rms z", "told", "cam mm", "cam deg", "good");
-    for (const auto& demand : kSets) offsets_found_without_masks(demand);
+    each_set([&](const Demand& demand) { offsets_found_without_masks(demand); });
     context_.table += fmt::format("\n{:<34} {:>10} {:>10} {:>10}\n", "the same pictures, by others' poses",
                                   "outline px", "left out", "depth mm");
-    for (const auto& demand : kSets) others(demand);
+    each_set([&](const Demand& demand) { others(demand); });
     context_.table +=
         "witness: masks and depth; medians. Others' poses with the encoders as they are; ours with offsets hidden, "
         "before and after.\n";
-    board();
-    run_humanoid(context_);
+    if (wanted(kBoard)) board();
+    if (wanted(kHumanoid)) run_humanoid(context_);
   }
 
  private:
+  [[nodiscard]] bool wanted(const std::string& row) const {
+    const auto& rows = context_.options.rows;
+    return rows.empty() || std::find(rows.begin(), rows.end(), row) != rows.end();
+  }
+  void each_set(const std::function<void(const Demand&)>& visit) const {
+    for (const auto& demand : kSets) {
+      if (wanted(demand.set)) visit(demand);
+    }
+  }
   [[nodiscard]] std::string work_of(const std::string& name) { return fmt::format("{}_{}", name, works_++); }
 
   RealTrial trial(const Demand& demand, std::uint64_t seed, std::vector<std::int64_t> postures, bool masks = true,
@@ -448,6 +462,13 @@ class RealExperiment {
 }  // namespace
 
 void run_real(ExperimentContext& context) {
+  std::vector<std::string> names = {kBoard, kHumanoid};
+  for (const auto& demand : kSets) names.emplace_back(demand.set);
+  for (const auto& name : context.options.rows) {
+    if (context.options.experiment != "real" || std::find(names.begin(), names.end(), name) != names.end()) continue;
+    throw ConfigurationError("--rows: real has no row '" + name + "'; did you mean '" + nearest_name(name, names) +
+                             "'?");
+  }
   RealExperiment(context).run();
 }
 

@@ -37,6 +37,10 @@ constexpr float kAside_px = 4.0f;
 // Log odds by which a pixel as far off as the prediction may be belongs to the side that is predicted.
 constexpr float kPrediction = 0.7f;
 
+// What all pictures show beside what this one shows there: as much.
+constexpr float kScene = 0.5f;
+// From here on a pixel has the colours of the rest: log odds, mean of its neighbourhood.
+constexpr float kDeny = 0.5f;
 // Less than this in the mean of a pixel's neighbourhood says nothing: log odds.
 constexpr float kWeak = 0.25f;
 
@@ -296,7 +300,8 @@ void ColourEvidence::collect(const BinaryMask& pixels, Side& side) const {
 }
 
 /// Log likelihood ratio of a colour in a tile, by that and its neighbours.
-float ColourEvidence::evidence_of(const RobotLooks& looks, std::size_t tile, std::size_t cell) const {
+float ColourEvidence::evidence_of(const RobotLooks& looks, const SceneColours* colours, std::size_t tile,
+                                  std::size_t cell) const {
   const std::size_t n = palette_.size();
   const float whole = rough_ ? kWholeCountRough : kWholeCount;
   const float known = looks.known() ? (rough_ ? kWholeCountRough : kKnownCount) : 0.0f;
@@ -312,15 +317,19 @@ float ColourEvidence::evidence_of(const RobotLooks& looks, std::size_t tile, std
     }
   }
   const float robot_all = whole / std::max(robot_.count, 1.0f), rest_all = whole / std::max(rest_.count, 1.0f);
-  const float robot =
+  float robot =
       (robot_near + robot_all * robot_.all[cell] + (known > 0.0f ? known * looks.share[palette_[cell]] : 0.0f)) /
       (robot_total + whole + known);
-  const float rest = (rest_near + rest_all * rest_.all[cell]) / (rest_total + whole);
+  float rest = (rest_near + rest_all * rest_.all[cell]) / (rest_total + whole);
+  if (colours != nullptr) {
+    robot += kScene * (colours->robot.share[palette_[cell]] - robot);
+    rest += kScene * (colours->rest.share[palette_[cell]] - rest);
+  }
   return std::clamp(std::log((robot + kFloor) / (rest + kFloor)), -kMostEvidence, kMostEvidence);
 }
 
 /// Log likelihood ratio of pixels that are judged and of those around.
-void ColourEvidence::weigh(const RobotLooks& looks) {
+void ColourEvidence::weigh(const RobotLooks& looks, const SceneColours* colours) {
   const std::size_t n = palette_.size();
   evidence_.resize(distance_.size());
   known_evidence_.assign(static_cast<std::size_t>(columns_ * rows_) * n, std::numeric_limits<float>::quiet_NaN());
@@ -333,7 +342,7 @@ void ColourEvidence::weigh(const RobotLooks& looks) {
     }
     const std::size_t tile = tile_of(u, v);
     float& known = known_evidence_[tile * n + cell_[i]];
-    if (std::isnan(known)) known = evidence_of(looks, tile, cell_[i]);
+    if (std::isnan(known)) known = evidence_of(looks, colours, tile, cell_[i]);
     evidence_[i] = known;
   });
 }
@@ -344,10 +353,10 @@ void ColourEvidence::decide(BinaryMask& robot) {
   const auto far = static_cast<float>(reach_px_);
   sums_.resize(distance_.size());
   smooth_.resize(distance_.size());
-  clear(work_, judged_);  // rows around those that are judged
+  clear(work_, judged_);  // rows around those that are judged or doubted
   for (int v = box_.v0; v <= box_.v1; ++v) {
     for (int k = std::max(v - around, box_.v0); k <= std::min(v + around, box_.v1); ++k) {
-      for (int w = box_.u0 >> 6; w <= box_.u1 >> 6; ++w) work_.row(v)[w] |= judged_.row(k)[w];
+      for (int w = box_.u0 >> 6; w <= box_.u1 >> 6; ++w) work_.row(v)[w] |= judged_.row(k)[w] | doubted_.row(k)[w];
     }
   }
   for_each_in(work_, [&](int u, int v) {
@@ -356,19 +365,29 @@ void ColourEvidence::decide(BinaryMask& robot) {
     sums_[index(u, v)] = sum;
   });
   const float share = 1.0f / static_cast<float>((2 * around + 1) * (2 * around + 1));
-  for_each_in(judged_, [&](int u, int v) {
+  const auto mean = [&](int u, int v) {
     float sum = 0.0f;
     for (int k = -around; k <= around; ++k) sum += sums_[index(u, std::clamp(v + k, box_.v0, box_.v1))];
+    return sum * share;
+  };
+  for_each_in(judged_, [&](int u, int v) {
     const std::size_t i = index(u, v);
     const float depth = predicted_.at(u, v) ? distance_[i] : -distance_[i];
-    smooth_[i] = sum * share;
-    robot.set(u, v, sum * share + kPrediction * depth / far > 0.0f);
+    smooth_[i] = mean(u, v);
+    robot.set(u, v, smooth_[i] + kPrediction * depth / far > 0.0f);
+  });
+  for_each_in(doubted_, [&](int u, int v) {
+    const bool denied = mean(u, v) < -kDeny;
+    denied_.set(u, v, denied);
+    robot.set(u, v, !denied);
   });
 }
 
-void ColourEvidence::separate(const Image& image, const RobotLooks& looks, const BinaryMask& known,
-                              const BinaryMask& differs, BinaryMask& robot) {
+void ColourEvidence::separate(const Image& image, const RobotLooks& looks, const SceneColours* colours,
+                              const BinaryMask& known, const BinaryMask& differs, BinaryMask& robot) {
   robot.fill(false);
+  clear(denied_, predicted_);
+  clear(doubted_, predicted_);
   if (box_.empty()) return;
   within(static_cast<float>(reach_px_), near_);
   const bool anywhere = reach_px_ >= kEverywhere_px * unit_;
@@ -380,18 +399,22 @@ void ColourEvidence::separate(const Image& image, const RobotLooks& looks, const
       const auto reached = anywhere ? ~std::uint64_t{0} : inside | near;
       robot.row(v)[w] = box & ((k & differs.row(v)[w] & reached) | (~k & inside & ~near));
       judged_.row(v)[w] = box & ~k & near;
-      asked = asked || judged_.row(v)[w] != 0;
+      if (colours != nullptr) doubted_.row(v)[w] = robot.row(v)[w] & k & ~(inside & ~near);
+      asked = asked || (judged_.row(v)[w] | doubted_.row(v)[w]) != 0;
     }
   }
   if (!asked) return;
   weighed_ = judged_;
+  for (int v = box_.v0; v <= box_.v1; ++v) {
+    for (int w = box_.u0 >> 6; w <= box_.u1 >> 6; ++w) weighed_.row(v)[w] |= doubted_.row(v)[w];
+  }
   morphology_.dilate(weighed_, smoothing());
   find_cells(image);
   find_sides();
   for (int round = 0;; ++round) {
     collect(robot_pixels_, robot_);
     collect(rest_pixels_, rest_);
-    weigh(looks);
+    weigh(looks, colours);
     decide(robot);
     if (round > 0) break;
     // Then, where it may be far off, from what that decides.

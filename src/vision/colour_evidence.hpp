@@ -12,6 +12,7 @@
 #include "bodyschema/vision/background_model.hpp"
 #include "bodyschema/vision/mask_operations.hpp"
 #include "bodyschema/vision/robot_looks.hpp"
+#include "bodyschema/vision/scene_colours.hpp"
 
 namespace bodyschema {
 
@@ -30,13 +31,16 @@ class ColourEvidence {
   /// @param whole      look at all of the picture where the prediction may be as far off as says nothing
   void look_at(const BinaryMask& predicted, double reach_px, bool whole);
   /// @param looks    the robot's colours as known before
+  /// @param colours  those of both sides in all pictures; null: not known
   /// @param known    pixels whose background is known: they say themselves whether they differ, in `differs`
   /// @param robot    out: pixels taken for robot
-  void separate(const Image& image, const RobotLooks& looks, const BinaryMask& known, const BinaryMask& differs,
-                BinaryMask& robot);
+  void separate(const Image& image, const RobotLooks& looks, const SceneColours* colours, const BinaryMask& known,
+                const BinaryMask& differs, BinaryMask& robot);
   /// Pixels near the outline whose colour, with those around, told nothing in the last `separate`: what was decided
   /// there is the prediction, not the picture.
   void mark_weak(BinaryMask& weak);
+  /// Pixels of a known background that differed in the last `separate`, and whose colours are those of the rest.
+  [[nodiscard]] const BinaryMask& denied() const { return denied_; }
   /// The robot's colours where it was predicted.
   /// @param share  of the new ones in `looks`
   void learn(const Image& image, float share, RobotLooks& looks);
@@ -65,8 +69,9 @@ class ColourEvidence {
   void find_sides_again(const BinaryMask& robot);
   void find_cells(const Image& image);
   void collect(const BinaryMask& pixels, Side& side) const;
-  void weigh(const RobotLooks& looks);
-  [[nodiscard]] float evidence_of(const RobotLooks& looks, std::size_t tile, std::size_t cell) const;
+  void weigh(const RobotLooks& looks, const SceneColours* colours);
+  [[nodiscard]] float evidence_of(const RobotLooks& looks, const SceneColours* colours, std::size_t tile,
+                                  std::size_t cell) const;
   void decide(BinaryMask& robot);
   [[nodiscard]] int smoothing() const { return rough_ ? 2 : 1; }
   /// Calls function(u, v) for pixels of the box.
@@ -93,6 +98,8 @@ class ColourEvidence {
   BinaryMask band_;                        ///< in whose words distances are measured; elsewhere they are larger
   BinaryMask near_;                        ///< no further from the outline than the prediction may be off
   BinaryMask judged_;                      ///< near, and of unknown background: colours decide
+  BinaryMask doubted_;                     ///< of known background that differs: colours may deny it
+  BinaryMask denied_;                      ///< ... and do
   BinaryMask weighed_;                     ///< these and those around, whose evidence they take in
   BinaryMask robot_pixels_, rest_pixels_;  ///< robot for certain, background for certain
   BinaryMask work_;

@@ -174,6 +174,8 @@ struct Segmenter::Impl {
   /// Whether the learned background is what this picture shows away from the robot.
   [[nodiscard]] bool background_holds(const Image& image);
   void forget_background();
+  /// Where the background differs, and by its colours is no robot, it is as if nobody knew it.
+  void doubt_background();
   void find_background(const Image& image, bool holds);
   /// How much more than elsewhere the background varies beside the robot: what compression makes of an outline.
   void measure_edge_noise(const Image& image);
@@ -193,6 +195,7 @@ struct Segmenter::Impl {
   BackgroundModel local;                         // statistics: of the last frame, next to the robot
   ColourEvidence evidence;                       // auto
   RobotLooks looks;                              // auto
+  SceneColours colours;                          // auto
   LocalAverage average;                          // auto
   BinaryMask known, beside;                      // auto: pixels with a known background; the robot and all around it
   Image relit;                                   // auto: the last picture in the light of the learned background
@@ -564,6 +567,10 @@ void Segmenter::know_looks(RobotLooks looks) {
   impl_->looks = std::move(looks);
 }
 
+void Segmenter::know_colours(SceneColours colours) {
+  impl_->colours = std::move(colours);
+}
+
 void Segmenter::camera_turned() {
   impl_->turned = true;
 }
@@ -688,6 +695,15 @@ void Segmenter::Impl::forget_background() {
   misfits = 0;
 }
 
+void Segmenter::Impl::doubt_background() {
+  for (int v = 0; v < height; ++v) {
+    for (int w = 0; w < known.words_per_row(); ++w) {
+      known.row(v)[w] &= ~evidence.denied().row(v)[w];
+      detected.row(v)[w] &= ~evidence.denied().row(v)[w];
+    }
+  }
+}
+
 /// The background about the outline of what is `sure`, where coverage asks for it: as learned, or as it is nearby.
 void Segmenter::Impl::find_background(const Image& image, bool holds) {
   const BackgroundModel& model = learned.model();
@@ -708,8 +724,9 @@ void Segmenter::Impl::find_background(const Image& image, bool holds) {
       for (std::uint64_t bits = wanted.row(v)[w] &= ~uncertain.row(v)[w]; bits != 0; bits &= bits - 1) {
         const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) +
                        64 * static_cast<std::size_t>(w) + static_cast<std::size_t>(std::countr_zero(bits));
-        local.precision[i] = holds ? model.precision[i] / edge_variance : 0.0f;
-        for (std::size_t c = i * n; holds && c < (i + 1) * n; ++c) local.mean[c] = model.mean[c];
+        const bool as_learned = holds && (evidence.denied().row(v)[w] >> std::countr_zero(bits) & 1) == 0;
+        local.precision[i] = as_learned ? model.precision[i] / edge_variance : 0.0f;
+        for (std::size_t c = i * n; as_learned && c < (i + 1) * n; ++c) local.mean[c] = model.mean[c];
       }
       wanted.row(v)[w] &= ~known.row(v)[w];
     }
@@ -758,7 +775,9 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
     components.fill_small_holes(sure, std::max(setup.max_hole_px, 4));
   }
   if (looks.channels != channels) looks = {};
-  evidence.separate(seen, looks, known, sure, robot);
+  const bool both = colours.known() && colours.robot.channels == channels && colours.rest.channels == channels;
+  evidence.separate(seen, looks, both ? &colours : nullptr, known, sure, robot);
+  doubt_background();
   components.remove_small(robot, setup.min_component_px);
   components.fill_small_holes(robot, setup.max_hole_px);
   // A pixel beyond what is sure may be robot in part: as the background says, or beside what colours say.

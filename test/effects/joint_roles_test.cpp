@@ -26,7 +26,7 @@ Robot robot(const std::string& file, const std::vector<std::string>& overrides =
   const auto configuration = Configuration::load(std::string(BODYSCHEMA_SOURCE_DIR) + "/config/" + file, overrides);
   const auto setup = RobotSetup::from(configuration.section("robot"));
   const auto rig = StereoRig::from(configuration.section("cameras"));
-  return {JointRoles::of(setup.load(), setup, rig)};
+  return {JointRoles::of(load_robot(setup, rig), setup, rig)};
 }
 
 std::string name_of(const Robot& robot, Eigen::Index joint) {
@@ -144,6 +144,14 @@ TEST(JointRoles, OfTheOfficialIcub) {
   for (const auto& name : fingers) EXPECT_EQ(name.find("_0_joint"), std::string::npos) << name;
   EXPECT_EQ(r.roles.neck.size(), 4u);
   EXPECT_TRUE(r.roles.has_pans());
+}
+
+/// The other arm's joints move what is drawn, and not the hand that is named; they are no fingers for that.
+TEST(JointRoles, OfARobotWithTwoArms) {
+  SKIP_WITHOUT("real/robots/g1");
+  const auto r = robot("g1/robot.yaml");
+  EXPECT_EQ(r.roles.arm.size(), 14u);
+  EXPECT_EQ(r.names(r.roles.fingers), Names{});
 }
 
 }  // namespace

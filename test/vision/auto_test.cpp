@@ -348,6 +348,42 @@ TEST(AutomaticMasks, AHeldThingBesideTheRobotIsNoNoise) {
   EXPECT_LT(static_cast<double>(missing), 0.03 * static_cast<double>(predicted.count()));
 }
 
+/// What the robot takes the light from differs from its background as much as the robot does.
+TEST(AutomaticMasks, TheRobotsShadowIsNoRobot) {
+  std::mt19937 random(35);
+  Scene scene = large(Texture::kPlain);
+  Segmenter segmenter(automatic(), "left", scene.width, scene.height);
+  std::vector<Image> frames;
+  std::vector<BinaryMask> predicted, robots;
+  SceneColourCounts colours;
+  constexpr double kReach_px = 16.0;
+  for (const double u : {60.0, 100.0, 150.0, 200.0, 240.0}) {
+    scene.shapes = large_hand(u, 120.0);
+    const BinaryMask robot = scene.true_mask();
+    frames.push_back(scene.picture(random));
+    for (int v = 12; v < scene.height; ++v) {
+      for (int w = 12; w < scene.width; ++w) {
+        if (robot.at(w, v) || !robot.at(w - 12, v - 12)) continue;
+        for (int c = 0; c < 3; ++c)
+          frames.back().pixel(w, v)[c] = static_cast<std::uint8_t>(0.75 * frames.back().pixel(w, v)[c]);
+      }
+    }
+    predicted.push_back(prediction(scene, 4.0, -3.0));
+    robots.push_back(predicted.back());
+    MaskMorphology().dilate(robots.back(), static_cast<int>(kReach_px));
+    colours.add(frames.back(), predicted.back(), 4.0, predicted.back());
+  }
+  segmenter.learn(frames, robots);
+  Output out;
+  const PredictedRobot about(&predicted.back(), kReach_px, false);
+  segmenter.segment(frames.back(), out.mask, out.valid, out.coverage, about);
+  EXPECT_LT(iou(out.mask, scene.true_mask()), 0.9);  // it is taken for robot where nothing is known of colours
+  segmenter.know_colours(colours.shares());
+  segmenter.segment(frames.back(), out.mask, out.valid, out.coverage, about);
+  std::printf("    seed 35: IoU %.3f\n", iou(out.mask, scene.true_mask()));
+  EXPECT_GT(iou(out.mask, scene.true_mask()), 0.95);
+}
+
 TEST(AutomaticMasks, WithoutPredictionAndBackgroundThereIsNothingToGoBy) {
   std::mt19937 random(1);
   Scene scene;

@@ -25,7 +25,7 @@ struct EvaluationOptions {
   /// Choices of the command line ("filter.particles=500"), in force in `simulated` already. Those about
   /// estimating are applied to the recording's robots too; its robot, cameras and bus are its own.
   std::vector<std::string> overrides;
-  std::vector<std::string> rows;  ///< of `everyday` and `honesty`: only these; empty: all
+  std::vector<std::string> rows;  ///< of `everyday`, `honesty` and `real`: only these; empty: all
   double everyday_s = 30.0;       ///< length of each of its logs, s
 };
 

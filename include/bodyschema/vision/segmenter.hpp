@@ -10,6 +10,7 @@
 #include "bodyschema/geometry/image.hpp"
 #include "bodyschema/vision/background_model.hpp"
 #include "bodyschema/vision/robot_looks.hpp"
+#include "bodyschema/vision/scene_colours.hpp"
 #include "bodyschema/vision/vision_setup.hpp"
 
 namespace bodyschema {
@@ -95,6 +96,9 @@ class Segmenter {
   /// `auto`: the robot's colours as learned, or as told: those of an earlier run, of pictures with as many channels.
   [[nodiscard]] const RobotLooks& looks() const;
   void know_looks(RobotLooks looks);
+  /// What both sides look like in pictures to come (`auto`): a background that differs is not taken for the robot where
+  /// it has the colours of the rest, a shadow, and nothing that hides the robot is split between both.
+  void know_colours(SceneColours colours);
 
   /// The background as now known; empty before anything is.
   [[nodiscard]] const BackgroundModel& background() const;
