@@ -98,7 +98,7 @@ TEST_F(BeliefsOfOwnRobot, AToleranceOfWhatIsEstimatedWidensTheBelief) {
   const double alone = find(read(load()).state, "mesh_scale")->sd.at(0);
   EXPECT_NEAR(find(beliefs.state, "mesh_scale")->sd.at(0), std::hypot(alone, 0.01), 1e-12);
   EXPECT_EQ(find(beliefs.tolerances, "mesh_scale"), nullptr);
-  EXPECT_EQ(beliefs.tolerances.size(), 4u);  // three links and the baseline
+  EXPECT_EQ(beliefs.tolerances.size(), 6u);  // three links, two of them with their covers too, and the baseline
   EXPECT_NEAR(find(beliefs.tolerances, "baseline")->sd.at(0), 5e-4, 1e-12);
 }
 
