@@ -137,9 +137,9 @@ std::string cameras_yaml(const Calibration& c) {
       text += fmt::format("      - [{:.9f}, {:.9f}, {:.9f}, {:.9f}]\n", X(r, 0), X(r, 1), X(r, 2), X(r, 3));
     }
     if (camera.estimated) {
-      text += fmt::format("    pose: roughly\n    pose_sd_deg: {:.4f}\n    pose_sd_mm: {:.3f}\n",
-                          std::max(1e-3, degrees(sd_rad) / std::sqrt(3.0)),
-                          std::max(1e-2, 1e3 * sd_m / std::sqrt(3.0)));
+      text +=
+          fmt::format("    pose: roughly\n    pose_sd_deg: {:.4f}\n    pose_sd_mm: {:.3f}\n",
+                      std::max(1e-3, degrees(sd_rad) / std::sqrt(3.0)), std::max(1e-2, 1e3 * sd_m / std::sqrt(3.0)));
     } else {
       text += "    pose: known\n";
     }
@@ -158,7 +158,8 @@ std::string estimator_yaml(const CalibrationOptions& options) {
   std::string quoted;
   for (const char c : before.generic_string()) quoted += c == '\'' ? "''" : std::string(1, c);
   return fmt::format(
-      "# The configuration that was calibrated, with its cameras where they were found.\ninclude: ['{}', cameras.yaml]\n",
+      "# The configuration that was calibrated, with its cameras where they were found.\ninclude: ['{}', "
+      "cameras.yaml]\n",
       quoted);
 }
 

@@ -16,8 +16,8 @@ namespace bodyschema {
 /// A variance component: the mean square over the parts of the mean residual over postures, less what chance leaves
 /// there by how the same residuals vary between postures. What a fit took up is not seen: as of any variance that is
 /// measured on what a fit leaves, degrees of freedom make up for it, those of as many parts as have a say of their own
-/// less those of the parameters that were fitted. A part counts by the robust weight of its points: what a fit sets aside
-/// (the edge of another finger beside a narrow gap) does not move it. Lengths are px of a 320x240 picture.
+/// less those of the parameters that were fitted. A part counts by the robust weight of its points: what a fit sets
+/// aside (the edge of another finger beside a narrow gap) does not move it. Lengths are px of a 320x240 picture.
 class ShapeError {
  public:
   /// Adds one posture's picture.

@@ -83,8 +83,9 @@ TEST_F(FrameModelOfOwnRobot, HeadThatTurnsLeavesNoPartStill) {
 }
 
 TEST(FrameModel, BaseIsStillBeforeCamerasThatStandStill) {
-  const auto configuration = Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/arm7/robot.yaml",
-                                                 {"robot.rendered_links=[base, link2, hand]"});
+  const auto configuration =
+      Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/arm7/robot.yaml",
+                          {"robot.rendered_links=[base, link2, hand]"});
   const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
   const auto robot = setup.load();
   const StereoRig rig = StereoRig::from(configuration.section("cameras"));
