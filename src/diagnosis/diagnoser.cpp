@@ -41,6 +41,7 @@ class Diagnoser {
     Findings findings(fit_, search_, options_, report_);
     const auto begin = search_.about(options_.block_s);
     findings.before(begin);
+    if (options_.fit_only) return std::move(report_);
     find_causes();
     search_.polish(block_s_);
     progress(0.85);

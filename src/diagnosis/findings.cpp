@@ -58,12 +58,12 @@ Eigen::VectorXd motion_of_all(Eigen::MatrixXd A, const Eigen::VectorXd& b, doubl
   return A.ldlt().solve(b);
 }
 
-/// What of the misfit goes if all that is seen may stand elsewhere, as a whole, in every block of the log: noise of
-/// pixels or of encoders is not alike for the length of a block.
+/// What of the misfit goes if all that is seen may stand elsewhere, as a whole, in every short block of the log: noise
+/// of pixels or of encoders is not alike for its length. Not the longer ones of a log whose blocks err alike: that is
+/// just what is asked for.
 class MotionOfBlocks {
  public:
-  explicit MotionOfBlocks(std::size_t blocks) : blocks_(blocks) {}
-  void add(std::size_t block, const Eigen::MatrixXd& A, const Eigen::VectorXd& b, double precision) {
+  void add(long block, const Eigen::MatrixXd& A, const Eigen::VectorXd& b, double precision) {
     auto& sum = blocks_[block];
     if (sum.A.size() == 0) sum = {Eigen::MatrixXd::Zero(A.rows(), A.cols()), Eigen::VectorXd::Zero(b.size()), 0.0, 0.0};
     sum.A += precision * A;
@@ -74,8 +74,7 @@ class MotionOfBlocks {
   /// px^2 times weight, less what the noise alone takes up of so many numbers.
   [[nodiscard]] double square() const {
     double result = 0.0;
-    for (const auto& block : blocks_) {
-      if (block.pictures <= 0.0) continue;
+    for (const auto& [number, block] : blocks_) {
       const Eigen::VectorXd motion = motion_of_all(block.A, block.b, 1.0);
       const double cost = 2.0 * motion.dot(block.b) - motion.dot(block.A * motion);
       result += (cost - static_cast<double>(motion.size())) * block.pictures / block.precision;
@@ -89,7 +88,7 @@ class MotionOfBlocks {
     Eigen::VectorXd b;
     double precision = 0.0, pictures = 0.0;
   };
-  std::vector<Sum> blocks_;
+  std::map<long, Sum> blocks_;
 };
 
 /// How much worse another explanation is, in standard deviations of the difference: on blocks that neither has seen,
@@ -180,7 +179,7 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
   }
   double square = 0.0, weight = 0.0, hand = 0.0, turn = 0.0, pictures = 0.0, found = 0.0, sampled = 0.0,
          where_seen = 0.0, sampled_seen = 0.0;
-  MotionOfBlocks motions(log.blocks);
+  MotionOfBlocks motions;
   auto& measurement = fit_.measurement();
   for (std::size_t p = 0; p < log.base.size(); ++p) {
     const auto& evidence = log.at.evidence[p];
@@ -214,7 +213,7 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
       if (evidence.A(at, at) > 0.0) out.apparent_deg[j] = degrees(b[at] / evidence.A(at, at));
     }
     const Eigen::VectorXd motion = motion_of_all(evidence.A(rig, rig), b(rig), log.precision[p]);
-    motions.add(log.block_of[p], evidence.A(rig, rig), b(rig), log.precision[p]);
+    motions.add(static_cast<long>(report_.samples[p].time_s / options_.block_s), evidence.A(rig, rig), b(rig), log.precision[p]);
     const auto& picture = fit_.log().pictures()[p];
     const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera, rig,
                                                     measurement.projection().hand_link());

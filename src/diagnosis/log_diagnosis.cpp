@@ -44,6 +44,7 @@ class LogDiagnosis {
     diagnosis.noise = pipeline_.options().noise;
     diagnosis.spacing_px = pipeline_.options().outline_spacing_px;
     diagnosis.starts = starts();
+    diagnosis.fit_only = options_.fit_only;
     diagnosis.progress = [&](double share) {
       if (bar) bar->set(static_cast<std::uint64_t>(100.0 * share));
     };

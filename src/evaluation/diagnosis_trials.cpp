@@ -25,20 +25,20 @@ using simulator::FaultSpec;
 
 using HandTruth = std::map<std::pair<Microseconds, std::size_t>, Eigen::Vector3d>;
 
-/// Faults of covers, cameras and held things, which draw_fault does not draw; sizes from invisible to gross.
+/// Faults of covers, cameras and held things, which draw_fault does not draw.
 struct Drawn {
   const char* spec;
-  double least, most;  ///< of `value`, in its unit; 0: it has none
+  double value;  ///< in its unit, to begin with; 0: it has none
 };
-constexpr std::array<Drawn, 9> kCoversAndCameras = {{{"mesh_scale:part=hand", 0.3, 8.0},
-                                                     {"mesh_scale:part=forearm", 0.3, 8.0},
-                                                     {"cover_dilation:part=hand", 0.1, 3.0},
-                                                     {"cover_dilation:part=forearm", 0.1, 3.0},
-                                                     {"camera_rotation:source=left,axis=x", 0.1, 2.0},
-                                                     {"camera_rotation:source=right,axis=z", 0.1, 2.0},
-                                                     {"held:thing=stick", 0.0, 0.0},
-                                                     {"held:thing=bottle", 0.0, 0.0},
-                                                     {"held:thing=box", 0.0, 0.0}}};
+constexpr std::array<Drawn, 9> kCoversAndCameras = {{{"mesh_scale:part=hand", 2.0},
+                                                     {"mesh_scale:part=forearm", 2.0},
+                                                     {"cover_dilation:part=hand", 1.0},
+                                                     {"cover_dilation:part=forearm", 1.0},
+                                                     {"camera_rotation:source=left,axis=x", 0.5},
+                                                     {"camera_rotation:source=right,axis=z", 0.5},
+                                                     {"held:thing=stick", 0.0},
+                                                     {"held:thing=bottle", 0.0},
+                                                     {"held:thing=box", 0.0}}};
 constexpr double kShareOfCoversAndCameras = 0.25;
 
 std::string argument(const FaultSpec& fault, const char* key) {
@@ -68,37 +68,58 @@ double hand_error_mm(const DiagnosisReport& report, const HandTruth& truth, Rema
 /// A robot that is simulated, and the configuration with which its logs are diagnosed.
 class TrialRobot {
  public:
-  TrialRobot(const Configuration& simulated, Configuration diagnosed, bool masks)
+  /// @param of_masks  `diagnosed` for pictures that are masks
+  TrialRobot(const Configuration& simulated, Configuration diagnosed, Configuration of_masks, bool masks)
       : setup_(RobotSetup::from(simulated.section("robot"))), rig_(StereoRig::from(simulated.section("cameras"))),
         robot_(load_robot(setup_, rig_)), roles_(JointRoles::of(robot_, setup_, rig_)),
         settings_(simulator::SimulatorSettings::from(simulated.section("simulator"))),
-        configuration_(std::move(diagnosed)), masks_(masks), size_(masks ? kMasks : kPictures) {
-    settings_.camera_rate_hz = size_.rate_hz;
-    if (!masks_) return;
+        pictures_{std::move(diagnosed), settings_, kPictures, false}, of_masks_{std::move(of_masks), settings_, kMasks,
+                                                                                true},
+        kind_(masks ? of_masks_ : pictures_) {
+    pictures_.settings.camera_rate_hz = kPictures.rate_hz;
+    of_masks_.settings.camera_rate_hz = kMasks.rate_hz;
     constexpr double kOutline_px = 0.3;
-    settings_.outline_noise.sd_px = kOutline_px;
-    settings_.background_frames = settings_.entry_frames = 0;
+    of_masks_.settings.outline_noise.sd_px = kOutline_px;
+    of_masks_.settings.background_frames = of_masks_.settings.entry_frames = 0;
   }
+  TrialRobot(const TrialRobot&) = delete;
+  TrialRobot& operator=(const TrialRobot&) = delete;
 
-  [[nodiscard]] std::vector<FaultSpec> draw(Row row, std::uint64_t seed) const {
+  Outcome run(Row row, std::uint64_t seed) const;
+
+ private:
+  /// How logs are made and diagnosed.
+  struct Kind {
+    Configuration configuration;
+    simulator::SimulatorSettings settings;
+    LogSize size;
+    bool masks;
+  };
+
+  /// Single causes of all sizes, from invisible to gross; of several, and of those outside the catalogue, such as
+  /// matter by themselves; in the background, such as are not seen alone.
+  [[nodiscard]] std::vector<FaultSpec> draw(Row row, const simulator::SimulationPlan& plan) const {
+    const auto seed = plan.seed;
     simulator::FaultSite site(robot_, setup_, rig_);
     site.begin_s = 0.0;
-    site.end_s = size_.seconds;
+    site.end_s = kMasks.seconds;
     simulator::Random random(seed, "size of the fault");
-    if (row == kSingle && random.uniform(0.0, 1.0) < kShareOfCoversAndCameras) return {draw_cover_or_camera(random)};
+    const auto [lowest, highest] = row == kSingle ? std::pair(0.15, 6.0) : std::pair(1.2, 4.0);
+    const auto wanted = [&, low = lowest, ratio = highest / lowest] {
+      return low * std::pow(ratio, random.uniform(0.0, 1.0));
+    };
+    if (row == kSingle && random.uniform(0.0, 1.0) < kShareOfCoversAndCameras) {
+      return {sized(draw_cover_or_camera(random), wanted(), plan)};
+    }
     simulator::DrawOptions options;
     options.outside_catalogue = row == kOutside;
     std::vector<FaultSpec> faults;
-    // Single causes of all sizes, from invisible to gross; of several, those that are well seen alone; in the
-    // background, those that are not.
-    const auto [lowest, highest] = row == kSingle       ? std::pair(0.3, 15.0)
-                                   : row == kBackground ? std::pair(0.2, 0.8)
-                                                        : std::pair(4.0, 10.0);
     constexpr int kCrowd = 9;
     const int count = row == kNull ? 0 : row == kTwo ? 2 : row == kBackground ? kCrowd : 1;
     for (int i = 0; i < count; ++i) {
-      options.multiple_of_detectable = lowest * std::pow(highest / lowest, random.uniform(0.0, 1.0));
-      faults.push_back(simulator::draw_fault(seed + 100000u * static_cast<std::uint64_t>(i), site, options));
+      options.multiple_of_detectable = row == kBackground ? random.uniform(0.2, 0.8) : 3.0;
+      auto fault = simulator::draw_fault(seed + 100000u * static_cast<std::uint64_t>(i), site, options);
+      faults.push_back(row == kBackground ? std::move(fault) : sized(std::move(fault), wanted(), plan));
       options.exclude.push_back(faults.back().name);
     }
     return faults;
@@ -116,16 +137,35 @@ class TrialRobot {
     return answers;
   }
 
-  Outcome run(Row row, std::uint64_t seed) const;
-
- private:
   static FaultSpec draw_cover_or_camera(simulator::Random& random) {
     const auto& drawn = kCoversAndCameras[random.below(kCoversAndCameras.size())];
     auto fault = FaultSpec::parse(drawn.spec);
-    if (drawn.most <= 0.0) return fault;
+    if (drawn.value <= 0.0) return fault;
     // A cover is never drilled out: it is as moulded, or thicker.
     const double sign = fault.name == "cover_dilation" ? 1.0 : random.sign();
-    return fault.set("value", sign * drawn.least * std::pow(drawn.most / drawn.least, random.uniform(0.0, 1.0)));
+    return fault.set("value", sign * drawn.value);
+  }
+
+  /// The fault with the size that is wanted (Outcome::size): by itself, in a log of masks of the same motion. Offsets
+  /// and the usual nuisances are fitted, nothing else; what the same log leaves without the fault is noise.
+  [[nodiscard]] FaultSpec sized(FaultSpec fault, double wanted, simulator::SimulationPlan plan) const {
+    if (is_held(fault)) return fault;
+    constexpr int kRounds = 3;
+    constexpr double kNear = 1.25, kMost = 8.0;  // times what it begins with: more is no robot
+    const double begin = std::abs(fault.value());
+    plan.faults = {};
+    const Outcome healthy = outcome_of(of_masks_, plan, true);
+    for (int round = 0; round < kRounds; ++round) {
+      plan.faults = {fault};
+      Outcome seen = outcome_of(of_masks_, plan, true);
+      const auto beyond = [](double all, double noise) { return std::sqrt(std::max(0.0, all * all - noise * noise)); };
+      const double size = std::max(beyond(seen.size_mm, healthy.size_mm) / kMatters_mm,
+                                   beyond(seen.size_px, healthy.size_px) / kMatters_px);
+      const double factor = std::min(wanted / std::max(size, wanted / kMost), kMost * begin / std::abs(fault.value()));
+      if (factor < kNear && factor > 1.0 / kNear) break;
+      fault.set("value", fault.value() * factor);
+    }
+    return fault;
   }
 
   /// The segment of the diagnosis that is called so here: the hand, or what comes before it.
@@ -137,11 +177,11 @@ class TrialRobot {
     return part;
   }
 
-  void simulate(const simulator::SimulationPlan& plan, const fs::path& file, HandTruth& truth) const {
-    simulator::Simulator simulator(robot_, setup_, rig_, settings_, plan);
+  static HandTruth simulate(const Kind& kind, simulator::Simulator simulator, const fs::path& file) {
+    HandTruth truth;
     LogWriter log(file);
     simulator::FramePublisher::Options format;
-    if (masks_) format.format = simulator::PictureFormat::kMasks;
+    if (kind.masks) format.format = simulator::PictureFormat::kMasks;
     simulator::FramePublisher publisher(simulator.joint_names(), format);
     while (const auto frame = simulator.next()) {
       publisher.publish(*frame, log);
@@ -149,42 +189,34 @@ class TrialRobot {
         if (frame->cameras[c]) truth[{frame->cameras[c]->utime, c}] = frame->truth[c].X_CP.translation();
       }
     }
+    return truth;
   }
+
+  [[nodiscard]] Outcome outcome_of(const Kind& kind, simulator::SimulationPlan plan, bool fit_only) const;
 
   RobotSetup setup_;
   StereoRig rig_;
   std::shared_ptr<const RobotModel> robot_;
   JointRoles roles_;
   simulator::SimulatorSettings settings_;
-  Configuration configuration_;
-  bool masks_;
-  LogSize size_;
+  Kind pictures_, of_masks_;
+  const Kind& kind_;  ///< of the trials; sizes are measured on masks
 };
 
-Outcome TrialRobot::run(Row row, std::uint64_t seed) const {
+Outcome TrialRobot::outcome_of(const Kind& kind, simulator::SimulationPlan plan, bool fit_only) const {
   static std::atomic<int> number{0};
   const auto file = fs::temp_directory_path() / fmt::format("bodyschema_{}_diagnosis_{}.log", getpid(), number++);
-  Outcome outcome;
-  outcome.row = row;
-  outcome.seed = seed;
-  outcome.faults = draw(row, seed);
-  for (const auto& fault : outcome.faults) outcome.answers.push_back(answers_to(fault));
-  simulator::SimulationPlan plan;
-  plan.seed = seed;
-  plan.motion = simulator::Motion::kBabble;
-  plan.seconds = size_.seconds;
-  plan.faults = outcome.faults;
-  if (masks_) plan.output = simulator::Output::kSilhouettes;
-  simulator::Random random(seed, "offsets");
-  for (const auto& joint : setup_.estimated_joints) plan.offsets_deg[joint] = random.uniform(-7.0, 7.0);
-  HandTruth truth;
-  simulate(plan, file, truth);
+  plan.seconds = kind.size.seconds;
+  if (kind.masks) plan.output = simulator::Output::kSilhouettes;
+  const auto truth = simulate(kind, {robot_, setup_, rig_, kind.settings, plan}, file);
   LogDiagnosisOptions options;
   options.log = file;
-  options.picture_rate_hz = size_.rate_hz;
+  options.picture_rate_hz = kind.size.rate_hz;
   options.threads = 1;  // other logs run beside this one
   options.quiet = true;
-  outcome.report = diagnose_log(configuration_, options);
+  options.fit_only = fit_only;
+  Outcome outcome;
+  outcome.report = diagnose_log(kind.configuration, options);
   std::error_code error;
   fs::remove(file, error);
   outcome.size_mm = hand_error_mm(outcome.report, truth, &ResidualSample::before);
@@ -193,10 +225,25 @@ Outcome TrialRobot::run(Row row, std::uint64_t seed) const {
   return outcome;
 }
 
+Outcome TrialRobot::run(Row row, std::uint64_t seed) const {
+  simulator::SimulationPlan plan;
+  plan.seed = seed;
+  plan.motion = simulator::Motion::kBabble;
+  simulator::Random random(seed, "offsets");
+  for (const auto& joint : setup_.estimated_joints) plan.offsets_deg[joint] = random.uniform(-7.0, 7.0);
+  plan.faults = draw(row, plan);
+  Outcome outcome = outcome_of(kind_, plan, false);
+  outcome.row = row;
+  outcome.seed = seed;
+  outcome.faults = plan.faults;
+  for (const auto& fault : outcome.faults) outcome.answers.push_back(answers_to(fault));
+  return outcome;
+}
+
 /// What a configuration needs for pictures that are masks.
-std::vector<std::string> vision_of(const ExperimentContext& context) {
-  if (!context.options.masks) return {};
-  return {"vision.method=single_colour", "vision.background_rgb=[0, 0, 0]"};
+std::vector<std::string> with_masks(std::vector<std::string> overrides) {
+  overrides.insert(overrides.end(), {"vision.method=single_colour", "vision.background_rgb=[0, 0, 0]"});
+  return overrides;
 }
 
 std::optional<TrialRobot> official_robot(const ExperimentContext& context) {
@@ -207,10 +254,10 @@ std::optional<TrialRobot> official_robot(const ExperimentContext& context) {
   const std::vector<std::string> overrides = {
       "robot.urdf=" + (models / "iCub_manual/robots/iCubGazeboV2_5_visuomanip/model.urdf").string(),
       "robot.mesh_search_roots=[\"" + models.string() + "\"]"};
-  auto diagnosed = overrides;
-  for (auto& wish : vision_of(context)) diagnosed.push_back(std::move(wish));
+  const auto estimator = folder / "estimator.yaml";
   return std::optional<TrialRobot>(std::in_place, Configuration::load(folder / "simulator.yaml", overrides),
-                                   Configuration::load(folder / "estimator.yaml", diagnosed), context.options.masks);
+                                   Configuration::load(estimator, overrides),
+                                   Configuration::load(estimator, with_masks(overrides)), context.options.masks);
 }
 
 }  // namespace
@@ -257,9 +304,9 @@ bool is_not_explained_away(const Outcome& o) {
 }
 
 std::vector<Outcome> run(ExperimentContext& context) {
-  const TrialRobot own(context.simulated,
-                       Configuration::load(context.recorded / "icub_right" / "estimator.yaml", vision_of(context)),
-                       context.options.masks);
+  const auto estimator = context.recorded / "icub_right" / "estimator.yaml";
+  const TrialRobot own(context.simulated, Configuration::load(estimator),
+                       Configuration::load(estimator, with_masks({})), context.options.masks);
   const auto official = official_robot(context);
   constexpr long kEveryFourth = 4;
   struct Job {

@@ -24,6 +24,7 @@ struct DiagnosisOptions {
   OutlineNoise::Prior noise;        ///< of outlines, before any was seen
   std::size_t most_pictures = 400;  ///< that a fit looks at; tests look at all
   std::uint64_t seed = 1;           ///< of the sign flips
+  bool fit_only = false;            ///< what offsets and nuisances leave (report.before), and no causes are asked for
   /// Where the fit starts besides the beliefs' centre: values of the state's parameters, SI.
   std::vector<Eigen::VectorXd> starts{};
   std::function<void(double)> progress{};  ///< called with the share done

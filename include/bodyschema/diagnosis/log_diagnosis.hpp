@@ -14,7 +14,8 @@ struct LogDiagnosisOptions {
   std::filesystem::path out;      ///< folder, created; empty: nothing is written
   double picture_rate_hz = 10.0;  ///< pictures used per second and camera
   int threads = 2;
-  bool quiet = false;  ///< no progress bars
+  bool quiet = false;     ///< no progress bars
+  bool fit_only = false;  ///< DiagnosisOptions::fit_only
 };
 
 /// Diagnoses a recorded log: encoders and pictures in, report.json, report.html and extended_model.yaml out.
