@@ -129,7 +129,7 @@ class ArmAnatomy {
       if (length < kApart_m) continue;
       const Eigen::Vector3d direction = along / length;
       const auto& name = info(joint).parent_link;
-      const bool listed = !list.empty() && list.back().joint == before;
+      const bool listed = std::any_of(list.begin(), list.end(), [&](const ArmLink& l) { return l.joint == before; });
       if (!listed && joint_before(before) >= 0 && direction.dot(corrected_.shift_axis(before, 0)) > kAbout) {
         list.push_back({name, before, length, {.along_m = 1.0}, true});
       }

@@ -152,6 +152,10 @@ TEST(JointRoles, OfARobotWithTwoArms) {
   const auto r = robot("g1/robot.yaml");
   EXPECT_EQ(r.roles.arm.size(), 14u);
   EXPECT_EQ(r.names(r.roles.fingers), Names{});
+  // A joint has one length, although several links of the tree may follow it: a second one would be the same number.
+  auto joints = joints_of(r.roles, r.roles.links);
+  std::sort(joints.begin(), joints.end());
+  EXPECT_EQ(std::adjacent_find(joints.begin(), joints.end()), joints.end());
 }
 
 }  // namespace
