@@ -166,10 +166,12 @@ class Diagnoser {
 
   void find_causes() {
     block_s_ = options_.block_s;
-    for (std::size_t round = 0; round < limits::kMostCauses; ++round) {
-      const bool taken = take_one(round);
-      progress(0.2 + 0.1 * static_cast<double>(round + 1));
-      if (taken) {
+    for (std::size_t round = 0; round < limits::kMostRounds; ++round) {
+      const bool full = search_.causes().size() >= limits::kMostCauses;
+      const bool taken = !full && take_one(round);
+      progress(0.2 + 0.6 * static_cast<double>(round + 1) / static_cast<double>(limits::kMostRounds));
+      // One that others have made needless since makes room for the next.
+      if (taken || (full && drop_one())) {
         asked_.reset();
         continue;
       }

@@ -213,7 +213,8 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
       if (evidence.A(at, at) > 0.0) out.apparent_deg[j] = degrees(b[at] / evidence.A(at, at));
     }
     const Eigen::VectorXd motion = motion_of_all(evidence.A(rig, rig), b(rig), log.precision[p]);
-    motions.add(static_cast<long>(report_.samples[p].time_s / options_.block_s), evidence.A(rig, rig), b(rig), log.precision[p]);
+    motions.add(static_cast<long>(report_.samples[p].time_s / options_.block_s), evidence.A(rig, rig), b(rig),
+                log.precision[p]);
     const auto& picture = fit_.log().pictures()[p];
     const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera, rig,
                                                     measurement.projection().hand_link());

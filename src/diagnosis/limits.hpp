@@ -35,6 +35,7 @@ constexpr double kGenericGain = 2.0;      ///< a free curve must explain so much
 constexpr double kRounding = 1e-7;  ///< share of a column beyond others: less is rounding
 constexpr double kWide = 4.0;       ///< typical sizes: a belief that is none
 constexpr std::size_t kMostCauses = 6;
+constexpr std::size_t kMostRounds = 10;    ///< causes taken or dropped, blocks made longer
 constexpr std::size_t kMostTried = 4;      ///< candidates a round that are fitted for real
 constexpr double kWorthATrial_z = 2.5;     ///< less does not stand out even of one candidate's noise
 constexpr std::size_t kFewestBlocks = 16;  ///< blocks are not made longer where fewer would be left
