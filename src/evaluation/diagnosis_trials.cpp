@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "bodyschema/bus/log.hpp"
+#include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/diagnosis/log_diagnosis.hpp"
 #include "bodyschema/simulator/random.hpp"
@@ -146,6 +147,16 @@ class TrialRobot {
     return fault.set("value", sign * drawn.value);
   }
 
+  /// Whether it lies within what the simulator takes.
+  [[nodiscard]] bool can_be_played(const FaultSpec& fault) const {
+    try {
+      simulator::make_fault(fault, simulator::FaultSite(robot_, setup_, rig_));
+      return true;
+    } catch (const ConfigurationError&) {
+      return false;
+    }
+  }
+
   /// The fault with the size that is wanted (Outcome::size): by itself, in a log of masks of the same motion. Offsets
   /// and the usual nuisances are fitted, nothing else; what the same log leaves without the fault is noise.
   [[nodiscard]] FaultSpec sized(FaultSpec fault, double wanted, simulator::SimulationPlan plan) const {
@@ -163,7 +174,10 @@ class TrialRobot {
                                    beyond(seen.size_px, healthy.size_px) / kMatters_px);
       const double factor = std::min(wanted / std::max(size, wanted / kMost), kMost * begin / std::abs(fault.value()));
       if (factor < kNear && factor > 1.0 / kNear) break;
-      fault.set("value", fault.value() * factor);
+      FaultSpec scaled = fault;
+      scaled.set("value", fault.value() * factor);
+      if (!can_be_played(scaled)) break;
+      fault = std::move(scaled);
     }
     return fault;
   }

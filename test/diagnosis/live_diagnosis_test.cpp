@@ -122,8 +122,8 @@ TEST(LiveDiagnosis, SaysWhatTheStateHasTakenUp) {
   EXPECT_GT(finding.hand_mm, 0.5);
 }
 
-/// Tested about one linearisation, a longer link also seems to lie aside a little: that does not change its name. It is the
-/// joint that turns the link, which the simulator moves with its cover.
+/// Tested about one linearisation, a longer link also seems to lie aside a little: that does not change its name. It is
+/// the joint that turns the link, which the simulator moves with its cover.
 TEST(LiveDiagnosis, ALongerLinkKeepsItsName) {
   const auto said = listen("link_length:joint=r_shoulder_yaw,value=12", 50.0);
   ASSERT_TRUE(named(said.news.back(), "link_length")) << said.per_frame.back();
