@@ -3,9 +3,9 @@
 #include <cstdio>
 #include <memory>
 
-#include "bodyschema/core/installation.hpp"
 #include "../common_options.hpp"
 #include "../print_configuration.hpp"
+#include "bodyschema/core/installation.hpp"
 #include "commands.hpp"
 
 namespace bodyschema::apps {

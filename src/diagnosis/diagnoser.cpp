@@ -345,6 +345,13 @@ class Diagnoser {
         if (bar.label == label_of(candidate)) bar.z_after = std::max(bar.z_after, candidate.z());
       }
     }
+    // A model that holds as many causes as it may, and is asked for more, has some that stand in for others.
+    if (search_.causes().size() >= limits::kMostCauses) {
+      const auto trials = trials_of(field, false);
+      report_.more_asked = std::any_of(trials.begin(), trials.end(), [&](const Trial& trial) {
+        return trial.candidate->z() >= threshold_of(trial.candidate->stated);
+      });
+    }
     return std::move(field.candidates);
   }
 

@@ -76,20 +76,21 @@ std::string why_not(const DiagnosisReport& report) {
   if (!report.side_left_over.empty()) {
     return fmt::format("The model does not explain what is seen: {}.", report.side_left_over);
   }
+  if (report.more_asked) {
+    return fmt::format("More is wrong than {} causes explain: the log asks for another one.", limits::kMostCauses);
+  }
   if (report.rough_px > 0.0 && report.left_px > report.rough_px) {
     return fmt::format(
-        "The model does not explain what is seen: outlines lie off by {:.2f} px, and no camera's are rougher than "
-        "{:.1f} "
-        "px where the model is right.",
+        "The model does not explain what is seen: outlines lie off by {:.2f} px, and where the model is right "
+        "none are rougher than {:.1f} px.",
         report.left_px, report.rough_px);
   }
   const auto& after = report.after;
   const double still_px = std::sqrt(std::max(0.0, after.rms_px * after.rms_px - after.moved_px * after.moved_px));
   if (after.rms_px > limits::kNoiseRatio * still_px) {
     return fmt::format(
-        "The model does not explain what is seen: outlines lie off by {:.2f} px, but by {:.2f} px if the robot may "
-        "stand "
-        "elsewhere in every part of the log. Something moves it that no known cause describes.",
+        "The model does not explain what is seen: outlines lie off by {:.2f} px, but by {:.2f} px if the robot "
+        "may stand elsewhere in every part of the log. Something moves it that no known cause describes.",
         after.rms_px, still_px);
   }
   if (causes.empty() && report.noise_px > 0.0 && report.left_px > limits::kNoiseRatio * report.noise_px) {

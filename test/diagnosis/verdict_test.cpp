@@ -102,6 +102,16 @@ TEST(Verdict, OfARobotThatStandsElsewhereInEveryPartOfTheLogIsNeitherNoneNorName
   }
 }
 
+/// Six causes and a seventh that is asked for: one of the six may have a part of it.
+TEST(Verdict, OfALogThatAsksForMoreThanAModelHoldsNothingIsNamed) {
+  auto report = report_of({gain_of_elbow()});
+  report.more_asked = true;
+  report = worded(report);
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, testing::StartsWith("More is wrong than 6 causes explain"));
+  EXPECT_TRUE(report.exclusion_limits.empty());
+}
+
 TEST(Verdict, KeepsTheLettersOfAJointsName) {
   DiagnosedCause cause = gain_of_elbow();
   cause.cause.joint = "w_yaw";

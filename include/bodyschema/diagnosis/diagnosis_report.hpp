@@ -125,6 +125,8 @@ struct DiagnosisReport {
   double left_px = 0.0, noise_px = 0.0;
   /// No outline of a robot whose model is right is rougher, px of these pictures; 0: not asked.
   double rough_px = 0.0;
+  /// As many causes were found as are looked for, and the log asks for another one.
+  bool more_asked = false;
   /// What the pictures show beside the robot through most of the log, where no outline is looked for: "14 cm2 beside
   /// the robot, in 96 % of the log". Something is held, or a part has no mesh. Empty: nothing.
   std::string not_in_model;
