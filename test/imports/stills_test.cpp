@@ -203,6 +203,13 @@ TEST_F(Stills, AJointThatMattersAndHasNoColumnIsAsked) {
   EXPECT_EQ(import(target("import: {joints: {joint_1: joint1}}\n")).joints.size(), 7u);
 }
 
+// As `bodyschema new-robot` writes it where it does not know which column is which joint.
+TEST_F(Stills, WhereAllColumnsAreLeftOutTheyAreNamed) {
+  stills_.write("joints.csv", "posture,A1,A2\n0,1,2\n");
+  EXPECT_THAT(error_of(target("import: {joints: {A1: \"-\", A2: \"-\"}}\n")),
+              HasSubstr("no joint readings; import.joints leaves out A1, A2: say there which joint each is"));
+}
+
 TEST_F(Stills, AMappingToNoJointIsAnErrorOfTheConfiguration) {
   try {
     (void)target("import: {joints: {A1: joint_one}}\n");
