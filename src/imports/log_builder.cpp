@@ -66,7 +66,7 @@ ImportTarget ImportTarget::from(const Configuration& configuration, const std::f
   for (const auto* list : {&target.mapping.cameras, &target.mapping.masks}) {
     for (const auto& [camera, source] : *list) {
       const auto& rig = target.rig.cameras;
-      if (std::any_of(rig.begin(), rig.end(), [&](const auto& c) { return c.name == camera; })) continue;
+      if (std::any_of(rig.begin(), rig.end(), [&name = camera](const auto& c) { return c.name == name; })) continue;
       std::vector<std::string> names;
       for (const auto& c : rig) names.push_back(c.name);
       throw ConfigurationError(fmt::format("import.{}: '{}' is no camera of the configuration, which has {}",
