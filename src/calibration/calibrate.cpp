@@ -591,6 +591,7 @@ class Calibrator {
     if (postures < 2 * kFewestPostures - 1) return;
     const std::size_t folds = std::min(kFolds, postures);
     double sum = 0.0, before = 0.0, n = 0.0;
+    std::vector<double> own;
     for (std::size_t fold = 0; fold < folds; ++fold) {
       std::vector<std::size_t> kept, left_out;
       for (std::size_t p = 0; p < log_->pictures().size(); ++p) {
@@ -602,12 +603,16 @@ class Calibrator {
       BatchFit part(fit, batch.state(), beliefs.tolerances, settings());  // what was found besides is in that state
       part.run(0.0, kept);
       const auto count = static_cast<double>(left_out.size());
-      sum += count * median_outline_distance_px(fit, part.state().model(), left_out);
+      own.push_back(median_outline_distance_px(fit, part.state().model(), left_out));
+      sum += count * own.back();
       before += count * median_outline_distance_px(fit, ErrorModel(roles), left_out);
       n += count;
     }
     if (n <= 0.0) return;
-    result_.outline_px.heldout = sum / n;
+    std::sort(own.begin(), own.end());
+    result_.outline_px.heldout = 0.5 * (own[own.size() / 2] + own[(own.size() - 1) / 2]);
+    result_.outline_px.heldout_worst = own.back();
+    heldout_mean_px_ = sum / n;
     helps_ = sum / n < before / n + kSame_px * picture_unit(rig_.cameras.front().intrinsics);
     if (helps_) return;
     for (auto& joint : result_.joints) {
@@ -683,9 +688,9 @@ class Calibrator {
     if (!helps_) {
       return say(
           CalibrationState::kNotConverged,
-          fmt::format("Not converged: on postures left out of the fit outlines lie {:.1f} px off, no nearer than "
+          fmt::format("Not converged: on postures left out of the fit outlines lie {:.1f} px off on average, no nearer than "
                       "with robot and cameras as they are configured; nothing of it is to be applied.",
-                      *result_.outline_px.heldout));
+                      heldout_mean_px_));
     }
     const double after_px = result_.outline_px.after / picture_unit(rig_.cameras.front().intrinsics);
     if (pipeline_.masks_need_estimates() && after_px > kOwnMasks_px) {
@@ -771,6 +776,7 @@ class Calibrator {
   std::string unsettled_;  ///< a joint whose offset depends on how masks were made
   double believed_px_ = kAnywhere_px;
   std::vector<bool> loose_;  ///< parts that are drawn and have no say
+  double heldout_mean_px_ = 0.0;
   bool helps_ = true;        ///< outlines of postures that were left out come nearer
   double ambiguity_ = 0.0;
   double only_ = kAlone;  ///< misfit of the second best place over that of the best

@@ -66,7 +66,10 @@ Json to_json(const Calibration& c, const std::string& root) {
                              {"X_camera_hand", matrix_json(view.X_camera_hand)}});
   }
   json["outline_px"] = {{"before", c.outline_px.before}, {"after", c.outline_px.after}};
-  if (c.outline_px.heldout) json["outline_px"]["heldout"] = *c.outline_px.heldout;
+  if (c.outline_px.heldout) {
+    json["outline_px"]["heldout"] = *c.outline_px.heldout;
+    json["outline_px"]["heldout_worst"] = *c.outline_px.heldout_worst;
+  }
   json["parameters"] = Json::array();
   for (const auto& p : c.parameters) json["parameters"].push_back(parameter_json(p));
   json["effects"] = Json::array();
@@ -103,6 +106,25 @@ Correction correction_of(const Calibration& c, bool all) {
     correction.sd_rad.emplace_back(joint.name, joint.sd_rad);
   }
   return correction;
+}
+
+/// How hands are mounted, as far as that is told: the offsets hold together with it.
+void add_mounts(const BatchFit& batch, const PictureLog& log, const Pipeline& pipeline, bool all,
+                Correction& correction) {
+  constexpr double kTold = 1.0 / 3.0;  // of what was believed
+  const auto& state = batch.state();
+  ErrorModel mounts(log.roles());
+  for (std::size_t e = 0; e < state.model().size(); ++e) {
+    const Effect& effect = state.model()[e];
+    if (effect.name() != "hand_mount") continue;
+    bool told = true;
+    for (std::size_t p = 0; p < effect.parameters().size(); ++p) {
+      const auto k = state.find(effect.name(), effect.target(), p);
+      told &= k < 0 || std::sqrt(batch.estimate().covariance(k, k)) < kTold * state.prior_sd()[k];
+    }
+    if (told || all) mounts.add(effect.clone());
+  }
+  add_effects(mounts, log.robot(), pipeline.setup(), log.rig(), correction);
 }
 
 std::string offsets_yaml(const Calibration& c, bool all) {
@@ -217,7 +239,7 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
   page.heading("How well it fits");
   rows = {{"before", fmt::format("{:.2f}", c.outline_px.before)}, {"after", fmt::format("{:.2f}", c.outline_px.after)}};
   if (c.outline_px.heldout)
-    rows.push_back({"postures left out of the fit", fmt::format("{:.2f}", *c.outline_px.heldout)});
+    rows.push_back({"postures left out of the fit", fmt::format("{:.2f}, worst fifth {:.2f}", *c.outline_px.heldout, *c.outline_px.heldout_worst)});
   page.table({"outline to outline, median", "px"}, rows);
   page.paragraph(
       fmt::format("{} pictures of {} distinct postures. One point of an outline errs by {:.2f} px, {:.0f} neighbours "
@@ -275,7 +297,8 @@ void write_calibration(const Calibration& calibration, const BatchFit& batch, Pi
   replace_file(options.out / "offsets.yaml", offsets_yaml(calibration, options.all_parameters));
   replace_file(options.out / "cameras.yaml", cameras_yaml(calibration));
   if (!options.configuration.empty()) replace_file(options.out / "estimator.yaml", estimator_yaml(options));
-  const Correction correction = correction_of(calibration, options.all_parameters);
+  Correction correction = correction_of(calibration, options.all_parameters);
+  add_mounts(batch, log, pipeline, options.all_parameters, correction);
   write_corrected_urdf(pipeline.setup().model.urdf, correction, options.out / "corrected.urdf");
   write_ros_files(options.out / "ros", pipeline.setup().model.urdf, options.out / "corrected.urdf", correction,
                   ros_cameras_of(calibration, log.rig()));
@@ -304,7 +327,9 @@ std::string to_table(const Calibration& c) {
   for (const auto& effect : c.effects) text += "\nalso: " + effect.sentence;
   text += fmt::format(
       "\n\noutlines, median distance: {:.2f} px before, {:.2f} px after{}\n", c.outline_px.before, c.outline_px.after,
-      c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out", *c.outline_px.heldout) : "");
+      c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out (worst fifth {:.2f})", *c.outline_px.heldout,
+                                         *c.outline_px.heldout_worst)
+                           : "");
   if (!c.next_posture_rad.empty()) {
     text += "to tell " + c.next_posture_for + " better, record this posture as well (deg; check it for collisions):";
     for (const auto& [joint, angle] : c.next_posture_rad) text += fmt::format(" {} {:.0f}", joint, degrees(angle));

@@ -230,7 +230,8 @@ std::vector<Candidate> catalogue_candidates(LogFit& fit, const LogAbout& log,
   std::vector<Candidate> list;
   ErrorModel catalogue(roles);
   for (const auto& kind : effect_kinds()) {
-    if (kind.get().name == "joint_offset" || kind.get().timing == EffectTiming::kFromATime) continue;
+    if (kind.get().name == "joint_offset" || kind.get().where_believed) continue;
+    if (kind.get().timing == EffectTiming::kFromATime) continue;
     for (const auto& target : kind.get().targets(roles)) {
       const CauseName cause{kind.get().name, target.joint, target.source};
       if (is_excluded(untestable, cause) || std::find(log.found.begin(), log.found.end(), cause) != log.found.end())

@@ -43,16 +43,21 @@ CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model
       joints_[j].moves_something |= listed.moves(static_cast<Eigen::Index>(j), l);
     }
     if (!joints_[j].moves_something) continue;
-    const auto at = std::find(all.begin() + static_cast<std::ptrdiff_t>(link_count_ + camera_count_), all.end(),
-                              joints[j].parent_link);
-    joints_[j].parent = static_cast<std::size_t>(at - all.begin());
-    if (at == all.end()) all.push_back(joints[j].parent_link);
+    const auto position = [&](const std::string& link) {
+      const auto at = std::find(all.begin() + static_cast<std::ptrdiff_t>(link_count_ + camera_count_), all.end(), link);
+      const auto index = static_cast<std::size_t>(at - all.begin());
+      if (at == all.end()) all.push_back(link);
+      return index;
+    };
+    joints_[j].parent = position(joints[j].parent_link);
+    joints_[j].child = position(joints[j].child_link);
   }
   fk_ = std::make_unique<ForwardKinematics>(model_, all);
   X_W_.resize(all.size(), Pose::Identity());
   q_.setZero(model_->joint_count());
   fk_->compute(q_, X_W_);
   moves_.resize(joints.size() * all.size());
+  carries_.resize(moves_.size());
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (!joints_[j].moves_something) continue;
     const auto axis = fk_->joint_axis(static_cast<Eigen::Index>(j));
@@ -70,6 +75,7 @@ CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model
     }
     for (std::size_t l = 0; l < all.size(); ++l) {
       moves_[j * all.size() + l] = fk_->moves(static_cast<Eigen::Index>(j), l);
+      carries_[j * all.size() + l] = moves_[j * all.size() + l] && all[l] != joints[j].child_link;
     }
   }
 }
@@ -85,8 +91,13 @@ void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q, co
   // Tip first: each C uses plain frames, so the product builds up from the right.
   for (auto j = joints_.size(); j-- > 0;) {
     const auto& adjustment = corrections.adjustments[j];
-    if (adjustment.is_zero() || !joints_[j].moves_something) continue;
+    if (!joints_[j].moves_something) continue;
     const auto joint = static_cast<Eigen::Index>(j);
+    if (adjustment.mounts()) {
+      mount(joint, camera, adjustment, X_CB);
+      if (rig_moves && carries_[j * X_W_.size() + link_count_]) X_WF = mount_C_ * X_WF;
+    }
+    if (adjustment.is_zero()) continue;
     const auto axis = fk_->joint_axis(joint);
     const Eigen::Vector3d tilt =
         adjustment.tilt_1_rad * tilt_axis(joint, 0) + adjustment.tilt_2_rad * tilt_axis(joint, 1);
@@ -114,6 +125,18 @@ void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q, co
   X_WC_.pretranslate(-corrections.base_shift_m);
   const Pose X_CW = X_WC_.inverse(Eigen::Isometry);
   for (auto& X : X_CB.first(link_count_)) X = X_CW * X;
+}
+
+void CorrectedKinematics::mount(Eigen::Index joint, std::size_t camera, const JointAdjustment& adjustment,
+                                std::span<Pose> X_WB) {
+  const Pose& X_WL = X_W_[joints_[static_cast<std::size_t>(joint)].child];
+  mount_C_ =
+      X_WL * small_motion(adjustment.mount_shift_m, adjustment.mount_turn_rad) * X_WL.inverse(Eigen::Isometry);
+  const auto first = static_cast<std::size_t>(joint) * X_W_.size();
+  for (std::size_t l = 0; l < link_count_; ++l) {
+    if (carries_[first + l]) X_WB[l] = mount_C_ * X_WB[l];
+  }
+  if (carries_[first + link_count_ + camera]) X_WC_ = mount_C_ * X_WC_;
 }
 
 Eigen::Vector3d CorrectedKinematics::tilt_axis(Eigen::Index joint, int which) const {

@@ -142,7 +142,35 @@ class ArmAnatomy {
     return list;
   }
 
+  /// Rendered links, or the hand's frame, that are fixed to the link which the arm's last joint turns. Fingers are not.
+  [[nodiscard]] std::vector<Mount> mounts() const {
+    std::vector<Mount> list;
+    for (std::size_t part = 0; part <= rendered_.size(); ++part) {
+      const auto joint = last_that_moves(part);
+      if (joint < 0 || info(joint).child_link == links_[part] || !is_last(joint)) continue;
+      bool jointed = false;
+      for (Eigen::Index j = joint + 1; j < model_.joint_count(); ++j) jointed |= kinematics_.moves(j, part);
+      const bool listed = std::any_of(list.begin(), list.end(), [&](const Mount& m) { return m.joint == joint; });
+      if (!jointed && !listed) list.push_back({links_[part], joint, mount_axis(part, joint)});
+    }
+    return list;
+  }
+
  private:
+  [[nodiscard]] Eigen::Vector3d mount_axis(std::size_t part, Eigen::Index joint) const {
+    constexpr double kApart_m = 1e-3;
+    const Pose& X_WL = X_WB_[rendered_.size() + 1 + arm_.size() + position(joint)];
+    const Eigen::Vector3d on = X_WB_[part].translation() - X_WL.translation();
+    const Eigen::Vector3d axis_W = on.norm() > kApart_m ? Eigen::Vector3d(on.normalized())
+                                                        : Eigen::Vector3d(kinematics_.joint_axis(joint).direction_W);
+    return X_WL.linear().transpose() * axis_W;
+  }
+  /// Whether no other joint of the arm is further out.
+  [[nodiscard]] bool is_last(Eigen::Index joint) const {
+    return std::none_of(arm_.begin(), arm_.end(), [&](Eigen::Index other) {
+      return other != joint && kinematics_.moves(joint, rendered_.size() + 1 + position(other));
+    });
+  }
   std::vector<std::string> links_of(const RobotSetup& setup) const {
     auto links = setup.model.rendered_links;
     links.push_back(setup.hand_link);
@@ -218,6 +246,7 @@ JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSe
   const ArmAnatomy anatomy(model, setup, cameras, roles.arm);
   roles.segments = anatomy.segments();
   roles.links = anatomy.links();
+  roles.mounts = anatomy.mounts();
   return roles;
 }
 

@@ -4,6 +4,8 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/effects/corrected_kinematics.hpp"
+#include "bodyschema/effects/effect_kind.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
 
 namespace bodyschema {
@@ -31,11 +33,17 @@ void HumanoidModel::take(const Calibration& calibration) {
   intrinsics = calibration.cameras.front().intrinsics;
   for (const auto& parameter : calibration.parameters) {
     if (parameter.name == "latency") lag_s = 1e-3 * parameter.value;
+    const std::string mount = "hand_mount of ";
+    if (parameter.name.starts_with(mount)) {
+      mounts[parameter.name.substr(mount.size())] =
+          parameter.unit == "deg" ? radians(parameter.value) : 1e-3 * parameter.value;
+    }
   }
 }
 
 HumanoidView::HumanoidView(const Configuration& configuration) : pipeline_(configuration) {
   const auto& camera = pipeline_.rig().cameras.front();
+  roles_ = JointRoles::of(pipeline_.shared_robot(), pipeline_.setup(), pipeline_.rig());
   carrier_ = camera.mount.parent.empty() ? camera.link : camera.mount.parent;
   nominal_.intrinsics = camera.intrinsics;
   const auto q = pipeline_.setup().default_joints(pipeline_.robot());
@@ -65,13 +73,8 @@ BinaryMask HumanoidView::silhouette(const HumanoidModel& model, const std::map<s
     parts.push_back({.mesh = mesh.mesh});
     links.push_back(mesh.link);
   }
-  links.push_back(carrier_);
-  ForwardKinematics kinematics(pipeline_.shared_robot(), links);
-  std::vector<Pose> X_WB(links.size());
-  kinematics.compute(joints(model, encoders), X_WB);
-  const Pose X_CW = (X_WB.back() * model.X_link_optical).inverse(Eigen::Isometry);
   std::vector<Eigen::Isometry3f> X_CB;
-  for (std::size_t b = 0; b < parts.size(); ++b) X_CB.emplace_back((X_CW * X_WB[b]).cast<float>());
+  for (const auto& X : places(model, encoders, links)) X_CB.emplace_back(X.cast<float>());
   simulator::Rasterizer rasterizer(std::move(parts), model.intrinsics.width, model.intrinsics.height, 1);
   CameraModel camera;
   camera.intrinsics = model.intrinsics;
@@ -80,10 +83,23 @@ BinaryMask HumanoidView::silhouette(const HumanoidModel& model, const std::map<s
 }
 
 Pose HumanoidView::hand(const HumanoidModel& model, const std::map<std::string, double>& encoders) const {
-  ForwardKinematics kinematics(pipeline_.shared_robot(), {pipeline_.setup().hand_link, carrier_});
-  std::vector<Pose> X_WL(2);
-  kinematics.compute(joints(model, encoders), X_WL);
-  return (X_WL[1] * model.X_link_optical).inverse(Eigen::Isometry) * X_WL[0];
+  return places(model, encoders, {pipeline_.setup().hand_link}).front();
+}
+
+std::vector<Pose> HumanoidView::places(const HumanoidModel& model, const std::map<std::string, double>& encoders,
+                                       const std::vector<std::string>& links) const {
+  CorrectedKinematics kinematics(pipeline_.shared_robot(), links, {carrier_});
+  Corrections corrections(pipeline_.robot().joint_count());
+  for (const auto& [name, value] : model.mounts) {
+    const auto space = name.find(' ');
+    auto effect = make_effect("hand_mount", {name.substr(0, space), ""}, roles_);
+    effect->parameters()[name.substr(space + 1) == "roll" ? 1 : 0].value = value;
+    effect->apply({}, corrections);
+  }
+  std::vector<Pose> X(links.size());
+  kinematics.compute(joints(model, encoders), corrections, 0, X);  // in the carrier of the camera
+  for (auto& pose : X) pose = model.X_link_optical.inverse(Eigen::Isometry) * pose;
+  return X;
 }
 
 void HumanoidView::write_figure(const DrawnPicture& drawn, const std::map<std::string, double>& encoders,

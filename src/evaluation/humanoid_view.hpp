@@ -6,6 +6,7 @@
 
 #include "bodyschema/calibration/calibrate.hpp"
 #include "bodyschema/core/configuration.hpp"
+#include "bodyschema/effects/joint_roles.hpp"
 #include "bodyschema/geometry/binary_mask.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/simulator/rasterizer.hpp"
@@ -13,12 +14,13 @@
 
 namespace bodyschema {
 
-/// What a calibration says of a humanoid: offsets and the head camera.
+/// What a calibration says of a humanoid: offsets, the head camera, how hands are mounted.
 struct HumanoidModel {
   std::map<std::string, double> offset_rad;  ///< by joint; encoder = true + offset
   Pose X_link_optical = Pose::Identity();    ///< of the camera in the link that carries it
   PinholeIntrinsics intrinsics;
   double lag_s = 0.0;  ///< of pictures against encoders
+  std::map<std::string, double> mounts;  ///< parameters of hand_mount by name, "JOINT roll", SI
   void take(const Calibration& calibration);
 };
 
@@ -43,9 +45,13 @@ class HumanoidView {
 
  private:
   [[nodiscard]] Eigen::VectorXd joints(const HumanoidModel& model, const std::map<std::string, double>& encoders) const;
+  /// Of links in the camera.
+  [[nodiscard]] std::vector<Pose> places(const HumanoidModel& model, const std::map<std::string, double>& encoders,
+                                         const std::vector<std::string>& links) const;
 
   Pipeline pipeline_;
   HumanoidModel nominal_;
+  JointRoles roles_;
   std::string carrier_;
 };
 

@@ -18,6 +18,8 @@ auto& number(const Coordinate& coordinate, C& c) {
     case Kind::kTilt2: return c.adjustments[at].tilt_2_rad;
     case Kind::kShift1: return c.adjustments[at].shift_1_m;
     case Kind::kShift2: return c.adjustments[at].shift_2_m;
+    case Kind::kMountShift: return c.adjustments[at / 3].mount_shift_m.coeffRef(i % 3);
+    case Kind::kMountTurn: return c.adjustments[at / 3].mount_turn_rad.coeffRef(i % 3);
     case Kind::kBase: return c.base_shift_m.coeffRef(i);
     case Kind::kRigShift: return c.camera.rig_shift_m.coeffRef(i);
     case Kind::kRigTurn: return c.camera.rig_turn_rad.coeffRef(i);
@@ -51,6 +53,11 @@ Coordinates::Coordinates(const JointRoles& roles) {
   }
   for (const auto joint : roles.arm) {
     for (const auto kind : {Kind::kAlong, Kind::kTilt1, Kind::kTilt2, Kind::kShift1, Kind::kShift2}) add(kind, joint);
+  }
+  for (const auto& mount : roles.mounts) {
+    for (const auto kind : {Kind::kMountShift, Kind::kMountTurn}) {
+      for (Eigen::Index axis = 0; axis < 3; ++axis) add(kind, 3 * mount.joint + axis);
+    }
   }
   for (const auto kind : {Kind::kBase, Kind::kRigShift, Kind::kRigTurn, Kind::kCameraShift, Kind::kCameraTurn}) {
     for (Eigen::Index axis = 0; axis < 3; ++axis) add(kind, axis);

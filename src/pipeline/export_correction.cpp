@@ -281,9 +281,9 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
   for (const auto& placement : correction.placements) {
     place_joint(document, joint_named(placement.joint), placement);
   }
-  for (const auto& [link, moved] : correction.camera_motions) {
+  for (const auto& [link, moved] : correction.frame_motions) {
     XMLElement* joint = find_joint_of_child(robot, link);
-    if (joint == nullptr) throw FileError(urdf.string() + ": no joint carries camera link '" + link + "'");
+    if (joint == nullptr) throw FileError(urdf.string() + ": no joint carries link '" + link + "'");
     move_joint(document, joint, moved);
   }
   for (const auto* list : {&correction.offsets_rad, &correction.known_offsets_rad}) {

@@ -38,6 +38,23 @@ JointPlacement placed(const std::shared_ptr<const RobotModel>& robot, const Robo
   return {info.name, axis_W.dot(step_W), R_PW * shift_W, R_PW * tilt_W};
 }
 
+/// Where what the joint's link carries is then, in its frame of the URDF.
+std::pair<std::string, Pose> mounted(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
+                                     const StereoRig& rig, const JointRoles& roles, Eigen::Index joint,
+                                     const JointAdjustment& adjustment) {
+  const auto mount =
+      std::find_if(roles.mounts.begin(), roles.mounts.end(), [&](const Mount& m) { return m.joint == joint; });
+  CorrectedKinematics kinematics(robot, {mount->link}, {rig.cameras.front().link});
+  const auto q = setup.default_joints(*robot);
+  Corrections corrections(robot->joint_count());
+  std::vector<Pose> before(1), after(1);
+  kinematics.compute(q, corrections, 0, before);
+  corrections.adjustments[static_cast<std::size_t>(joint)].mount_shift_m = adjustment.mount_shift_m;
+  corrections.adjustments[static_cast<std::size_t>(joint)].mount_turn_rad = adjustment.mount_turn_rad;
+  kinematics.compute(q, corrections, 0, after);
+  return {mount->link, before.front().inverse(Eigen::Isometry) * after.front()};
+}
+
 /// The whole arm moved along the root's axes: its first joint, in the frame of the link that carries it.
 JointPlacement shifted_base(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
                             const Eigen::Vector3d& shift_W) {
@@ -134,6 +151,9 @@ std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::share
         const auto& name = robot->joints()[static_cast<std::size_t>(j)].name;
         if (change.dq[j] != 0.0) correction.known_offsets_rad.emplace_back(name, -change.dq[j]);
         const auto& adjustment = change.adjustments[static_cast<std::size_t>(j)];
+        if (adjustment.mounts()) {
+          correction.frame_motions.push_back(mounted(robot, setup, rig, model.roles(), j, adjustment));
+        }
         if (!adjustment.is_zero()) correction.placements.push_back(placed(robot, setup, rig, j, adjustment));
       }
     } else {
@@ -145,7 +165,7 @@ std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::share
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     if (!is_link_of_urdf(rig.cameras[c])) continue;
     if (auto moved = camera_motion(robot, setup, rig, c, cameras[c])) {
-      correction.camera_motions.emplace_back(rig.cameras[c].link, *moved);
+      correction.frame_motions.emplace_back(rig.cameras[c].link, *moved);
     }
   }
   return list;

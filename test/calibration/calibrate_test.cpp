@@ -102,6 +102,9 @@ TEST_F(Calibrated, OffsetsAreFoundWithinWhatIsClaimedAndTheFilesSayTheSame) {
   }
   EXPECT_GE(told, 5);
   EXPECT_LT(result.outline_px.after, 0.2 * result.outline_px.before);
+  ASSERT_TRUE(result.outline_px.heldout_worst);
+  EXPECT_LE(*result.outline_px.heldout, *result.outline_px.heldout_worst);
+  EXPECT_LT(*result.outline_px.heldout, 0.2 * result.outline_px.before);
   std::ifstream in(folder_ / "out" / "calibration.json");
   const auto json = nlohmann::json::parse(in);
   EXPECT_EQ(json["state"], "good");

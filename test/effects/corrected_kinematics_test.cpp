@@ -102,6 +102,21 @@ TEST_F(CorrectedKinematicsTest, ShiftMovesTheAxisAcrossItselfAndTurnsWithTheLink
   EXPECT_NEAR(shift.norm(), std::hypot(0.01, 0.02), 1e-12);
 }
 
+/// A hand that is screwed on otherwise turns by itself: the link that carries it, and its joint, stay.
+TEST_F(CorrectedKinematicsTest, AMountMovesWhatALinkCarriesAndNotTheLink) {
+  CorrectedKinematics both(model, {"two", "tip"}, {"eye"});
+  both.compute(q, corrections, 0, X);
+  const auto before = X;
+  corrections.adjustments[1].mount_turn_rad = Eigen::Vector3d(0.45, 0.0, 0.0);
+  corrections.adjustments[1].mount_shift_m = Eigen::Vector3d(0.003, 0.0, 0.0);
+  both.compute(q, corrections, 0, X);
+  EXPECT_LT((X[0].matrix() - before[0].matrix()).norm(), 1e-12);
+  Pose expected = before[0];
+  expected = expected * Eigen::AngleAxisd(0.45, Eigen::Vector3d::UnitX());
+  expected.translation() = before[0] * Eigen::Vector3d(0.203, 0.0, 0.0);
+  EXPECT_LT((X[1].matrix() - expected.matrix()).norm(), 1e-12);
+}
+
 TEST_F(CorrectedKinematicsTest, AdjustmentsOfTwoJointsCompose) {
   // Lengthening joint a's link along z and b's along its own axis: both are seen at the tip.
   const auto plain = tip(corrections);

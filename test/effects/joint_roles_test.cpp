@@ -156,6 +156,19 @@ TEST(JointRoles, OfARobotWithTwoArms) {
   auto joints = joints_of(r.roles, r.roles.links);
   std::sort(joints.begin(), joints.end());
   EXPECT_EQ(std::adjacent_find(joints.begin(), joints.end()), joints.end());
+  ASSERT_EQ(r.roles.mounts.size(), 2u);
+  EXPECT_EQ(r.roles.mounts[1].link, "R_hand_base_link");
+  EXPECT_EQ(name_of(r, r.roles.mounts[1].joint), "right_wrist_yaw_joint");
+  EXPECT_LT((r.roles.mounts[1].axis - Eigen::Vector3d::UnitX()).norm(), 1e-9);
+}
+
+/// Fingers and their tips are no mounts; nor is a last link that carries nothing.
+TEST(JointRoles, AMountIsWhatIsFixedToTheLastLinkOfAnArm) {
+  const auto own = robot("icub_right/robot.yaml");
+  ASSERT_EQ(own.roles.mounts.size(), 1u);
+  EXPECT_EQ(own.roles.mounts.front().link, "r_hand");
+  EXPECT_EQ(name_of(own, own.roles.mounts.front().joint), "r_wrist_yaw");
+  EXPECT_LT((own.roles.mounts.front().axis - Eigen::Vector3d(0.0625, 0.0, 0.016).normalized()).norm(), 1e-9);
 }
 
 }  // namespace

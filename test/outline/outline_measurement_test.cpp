@@ -13,8 +13,8 @@ namespace {
 using Kind = Coordinate::Kind;
 
 bool is_angle(Kind kind) {
-  return kind == Kind::kJoint || kind == Kind::kTilt1 || kind == Kind::kTilt2 || kind == Kind::kRigTurn ||
-         kind == Kind::kCameraTurn;
+  return kind == Kind::kJoint || kind == Kind::kTilt1 || kind == Kind::kTilt2 || kind == Kind::kMountTurn ||
+         kind == Kind::kRigTurn || kind == Kind::kCameraTurn;
 }
 
 bool moves_no_link(Kind kind) {

@@ -117,7 +117,7 @@ TEST_F(RosFiles, FoundPosesOfCamerasThatAreNoLinksMoveTheirMounts) {
   }
   Correction correction;
   const auto applied = add_effects(model, robot_, setup_, rig_, correction);
-  EXPECT_TRUE(correction.camera_motions.empty());
+  EXPECT_TRUE(correction.frame_motions.empty());
   for (const auto& effect : applied) EXPECT_EQ(effect.applied, "cameras.yaml") << effect.effect;
   EXPECT_NO_THROW(write(correction, ros_cameras_of(rig_)));
 

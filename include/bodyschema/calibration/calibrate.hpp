@@ -39,7 +39,9 @@ const char* to_string(CalibrationState state);
 struct OutlineDistances {
   double before = 0.0;  ///< encoders and model as they are
   double after = 0.0;
-  std::optional<double> heldout;  ///< of postures that the fit had not seen
+  /// Of postures that the fit had not seen, in up to five parts of the log, each left out in turn: median of the parts,
+  /// and the worst of them.
+  std::optional<double> heldout, heldout_worst;
 };
 
 /// A camera as the calibration found it.

@@ -41,12 +41,15 @@ class CorrectedKinematics {
 
  private:
   [[nodiscard]] bool moves(Eigen::Index joint, std::size_t link) const;
+  /// Moves what the joint's link carries.
+  void mount(Eigen::Index joint, std::size_t camera, const JointAdjustment& adjustment, std::span<Pose> X_WB);
 
   struct Frames {
     bool moves_something = false;  ///< a listed link or a camera
     std::size_t parent = 0;        ///< position of the parent link in the FK's list
     std::array<Eigen::Vector3d, 2> tilt_P{};
     double outwards = 1.0;  ///< sign of the axis that leads on to the next joint
+    std::size_t child = 0;  ///< position of the link that it turns in the FK's list
   };
   std::shared_ptr<const RobotModel> model_;
   std::size_t link_count_;
@@ -55,8 +58,10 @@ class CorrectedKinematics {
   std::unique_ptr<ForwardKinematics> fk_;
   Eigen::VectorXd q_;
   std::vector<Pose> X_W_;
-  std::vector<bool> moves_;  ///< [joint][link], links then cameras then parents
+  std::vector<bool> moves_;  ///< [joint][link], links then cameras then parents and children
+  std::vector<bool> carries_;  ///< the same of what a joint moves but for its own link
   Pose X_WC_ = Pose::Identity();
+  Pose mount_C_ = Pose::Identity();  ///< scratch: what the last mount does, root frame
 };
 
 }  // namespace bodyschema

@@ -54,6 +54,8 @@ struct EffectKind {
   std::string splitting_motion{};
   EffectTiming timing = EffectTiming::kAlways;
   EffectHome home = EffectHome::kNowhere;
+  /// No diagnosis looks for it of its own accord: it is estimated where a configuration believes it to be uncertain.
+  bool where_believed = false;
   std::string remark{};  ///< what to do about it where no file can hold it
 };
 

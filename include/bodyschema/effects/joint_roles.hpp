@@ -29,6 +29,14 @@ struct ArmLink {
   bool takes_cover = false;   ///< `joint` turns the link
 };
 
+/// What is fixed to the last link of an arm: a hand, a tool.
+struct Mount {
+  std::string link;         ///< the first rendered link, or the hand's frame, that is fixed to the arm's last one
+  Eigen::Index joint = -1;  ///< that turns the arm's last link, RobotModel order
+  /// Unit, frame of the arm's last link: from its origin to `link`'s, or the joint's axis where these are one.
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
+};
+
 /// Which joints and parts play which role on this robot, by position in RobotModel order; in that order too, so from
 /// the root outwards, however a configuration lists them.
 struct JointRoles {
@@ -44,6 +52,7 @@ struct JointRoles {
   std::vector<Eigen::Index> fingers;  ///< joints that curl a finger when they grow
   std::vector<BodySegment> segments;  ///< every rendered part is in one
   std::vector<ArmLink> links;         ///< from the root outwards
+  std::vector<Mount> mounts;          ///< of each arm whose hand is fixed to its last link
   /// The roles that a configuration gives: arm and head as named there, neck and pans by what they move.
   /// Fingers are the joints that turn a rendered link but not the hand's frame, about an axis within 45
   /// deg of their finger's last one: joints that spread the fingers, oppose the thumb or slide are none.

@@ -28,6 +28,12 @@ struct JointAdjustment {
   double tilt_2_rad = 0.0;  ///< ... about `tilt_axis(1)` of CorrectedKinematics
   double shift_1_m = 0.0;   ///< the joint (and all beyond) moved along `tilt_axis(0)`, metres
   double shift_2_m = 0.0;   ///< ... along `tilt_axis(1)`
+  /// What is fixed to the link that the joint turns, and all beyond, is mounted otherwise: moved along and turned about
+  /// (rotation vector) that link's axes at its origin; the link itself stays.
+  Eigen::Vector3d mount_shift_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mount_turn_rad = Eigen::Vector3d::Zero();
+  [[nodiscard]] bool mounts() const { return !mount_shift_m.isZero(0.0) || !mount_turn_rad.isZero(0.0); }
+  /// Of the joint itself.
   [[nodiscard]] bool is_zero() const {
     return along_m == 0 && tilt_1_rad == 0 && tilt_2_rad == 0 && shift_1_m == 0 && shift_2_m == 0;
   }

@@ -19,6 +19,8 @@ struct Coordinate {
     kTilt2,        ///< ..., rad
     kShift1,       ///< ..., m
     kShift2,       ///< ..., m
+    kMountShift,   ///< axis `index` modulo 3 of what joint `index` / 3 carries, m
+    kMountTurn,    ///< ..., rad
     kBase,         ///< axis `index` of the base's shift, m
     kRigShift,     ///< axis `index` of the rig's shift, m
     kRigTurn,      ///< ... of its turn, rad

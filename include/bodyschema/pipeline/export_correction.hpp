@@ -34,8 +34,8 @@ struct Correction {
   // What effects, estimated or of an extended model, add that a URDF can hold.
   std::vector<std::pair<std::string, double>> known_offsets_rad;  ///< encoder - true, by joint
   std::vector<JointPlacement> placements;
-  /// Of cameras that are links of the URDF, by link: the corrected frame in the one of the URDF.
-  std::vector<std::pair<std::string, Pose>> camera_motions;
+  /// Of links that are fixed to their parents, cameras and hands, by link: the corrected frame in the URDF's.
+  std::vector<std::pair<std::string, Pose>> frame_motions;
 };
 
 /// One effect, estimated or of an extended model, and what the exported files make of it.
