@@ -688,9 +688,10 @@ class Calibrator {
     if (!helps_) {
       return say(
           CalibrationState::kNotConverged,
-          fmt::format("Not converged: on postures left out of the fit outlines lie {:.1f} px off on average, no nearer than "
-                      "with robot and cameras as they are configured; nothing of it is to be applied.",
-                      heldout_mean_px_));
+          fmt::format(
+              "Not converged: on postures left out of the fit outlines lie {:.1f} px off on average, no nearer than "
+              "with robot and cameras as they are configured; nothing of it is to be applied.",
+              heldout_mean_px_));
     }
     const double after_px = result_.outline_px.after / picture_unit(rig_.cameras.front().intrinsics);
     if (pipeline_.masks_need_estimates() && after_px > kOwnMasks_px) {
@@ -777,7 +778,7 @@ class Calibrator {
   double believed_px_ = kAnywhere_px;
   std::vector<bool> loose_;  ///< parts that are drawn and have no say
   double heldout_mean_px_ = 0.0;
-  bool helps_ = true;        ///< outlines of postures that were left out come nearer
+  bool helps_ = true;  ///< outlines of postures that were left out come nearer
   double ambiguity_ = 0.0;
   double only_ = kAlone;  ///< misfit of the second best place over that of the best
   Calibration result_;

@@ -239,7 +239,8 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
   page.heading("How well it fits");
   rows = {{"before", fmt::format("{:.2f}", c.outline_px.before)}, {"after", fmt::format("{:.2f}", c.outline_px.after)}};
   if (c.outline_px.heldout)
-    rows.push_back({"postures left out of the fit", fmt::format("{:.2f}, worst fifth {:.2f}", *c.outline_px.heldout, *c.outline_px.heldout_worst)});
+    rows.push_back({"postures left out of the fit",
+                    fmt::format("{:.2f}, worst fifth {:.2f}", *c.outline_px.heldout, *c.outline_px.heldout_worst)});
   page.table({"outline to outline, median", "px"}, rows);
   page.paragraph(
       fmt::format("{} pictures of {} distinct postures. One point of an outline errs by {:.2f} px, {:.0f} neighbours "
@@ -325,11 +326,11 @@ std::string to_table(const Calibration& c) {
         fmt::format("\n{:<36} {:>9.3f} {:<3} sd {:.3f} (believed {:.3f})", p.name, p.value, p.unit, p.sd, p.prior_sd);
   }
   for (const auto& effect : c.effects) text += "\nalso: " + effect.sentence;
-  text += fmt::format(
-      "\n\noutlines, median distance: {:.2f} px before, {:.2f} px after{}\n", c.outline_px.before, c.outline_px.after,
-      c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out (worst fifth {:.2f})", *c.outline_px.heldout,
-                                         *c.outline_px.heldout_worst)
-                           : "");
+  text += fmt::format("\n\noutlines, median distance: {:.2f} px before, {:.2f} px after{}\n", c.outline_px.before,
+                      c.outline_px.after,
+                      c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out (worst fifth {:.2f})",
+                                                         *c.outline_px.heldout, *c.outline_px.heldout_worst)
+                                           : "");
   if (!c.next_posture_rad.empty()) {
     text += "to tell " + c.next_posture_for + " better, record this posture as well (deg; check it for collisions):";
     for (const auto& [joint, angle] : c.next_posture_rad) text += fmt::format(" {} {:.0f}", joint, degrees(angle));

@@ -44,7 +44,8 @@ CorrectedKinematics::CorrectedKinematics(std::shared_ptr<const RobotModel> model
     }
     if (!joints_[j].moves_something) continue;
     const auto position = [&](const std::string& link) {
-      const auto at = std::find(all.begin() + static_cast<std::ptrdiff_t>(link_count_ + camera_count_), all.end(), link);
+      const auto at =
+          std::find(all.begin() + static_cast<std::ptrdiff_t>(link_count_ + camera_count_), all.end(), link);
       const auto index = static_cast<std::size_t>(at - all.begin());
       if (at == all.end()) all.push_back(link);
       return index;
@@ -130,8 +131,7 @@ void CorrectedKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q, co
 void CorrectedKinematics::mount(Eigen::Index joint, std::size_t camera, const JointAdjustment& adjustment,
                                 std::span<Pose> X_WB) {
   const Pose& X_WL = X_W_[joints_[static_cast<std::size_t>(joint)].child];
-  mount_C_ =
-      X_WL * small_motion(adjustment.mount_shift_m, adjustment.mount_turn_rad) * X_WL.inverse(Eigen::Isometry);
+  mount_C_ = X_WL * small_motion(adjustment.mount_shift_m, adjustment.mount_turn_rad) * X_WL.inverse(Eigen::Isometry);
   const auto first = static_cast<std::size_t>(joint) * X_W_.size();
   for (std::size_t l = 0; l < link_count_; ++l) {
     if (carries_[first + l]) X_WB[l] = mount_C_ * X_WB[l];

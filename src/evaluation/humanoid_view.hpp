@@ -19,7 +19,7 @@ struct HumanoidModel {
   std::map<std::string, double> offset_rad;  ///< by joint; encoder = true + offset
   Pose X_link_optical = Pose::Identity();    ///< of the camera in the link that carries it
   PinholeIntrinsics intrinsics;
-  double lag_s = 0.0;  ///< of pictures against encoders
+  double lag_s = 0.0;                    ///< of pictures against encoders
   std::map<std::string, double> mounts;  ///< parameters of hand_mount by name, "JOINT roll", SI
   void take(const Calibration& calibration);
 };

@@ -16,8 +16,8 @@ constexpr double kMisfitScale_px = 6.0;
 bool moves_links(Kind kind) {
   return kind == Kind::kJoint || kind == Kind::kAlong || kind == Kind::kTilt1 || kind == Kind::kTilt2 ||
          kind == Kind::kShift1 || kind == Kind::kShift2 || kind == Kind::kMountShift || kind == Kind::kMountTurn ||
-         kind == Kind::kBase || kind == Kind::kRigShift ||
-         kind == Kind::kRigTurn || kind == Kind::kCameraShift || kind == Kind::kCameraTurn;
+         kind == Kind::kBase || kind == Kind::kRigShift || kind == Kind::kRigTurn || kind == Kind::kCameraShift ||
+         kind == Kind::kCameraTurn;
 }
 
 /// When a row is exposed, from the middle one's time on, as a share of the read-out.

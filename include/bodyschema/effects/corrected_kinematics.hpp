@@ -58,7 +58,7 @@ class CorrectedKinematics {
   std::unique_ptr<ForwardKinematics> fk_;
   Eigen::VectorXd q_;
   std::vector<Pose> X_W_;
-  std::vector<bool> moves_;  ///< [joint][link], links then cameras then parents and children
+  std::vector<bool> moves_;    ///< [joint][link], links then cameras then parents and children
   std::vector<bool> carries_;  ///< the same of what a joint moves but for its own link
   Pose X_WC_ = Pose::Identity();
   Pose mount_C_ = Pose::Identity();  ///< scratch: what the last mount does, root frame
