@@ -7,10 +7,8 @@
 namespace bodyschema::diagnosis::limits {
 
 // Physical.
-constexpr double kFrom_px = 32.0;   ///< px of a 320x240 picture: outlines may lie so far off at first
-constexpr double kSearch_px = 8.0;  ///< ... and once near
-constexpr double kArrived_px =
-    0.5;  ///< ... and arrived: a step that moves them by less leaves nothing to look again for
+constexpr double kFrom_px = 32.0;       ///< px of a 320x240 picture: outlines may lie so far off at first
+constexpr double kSearch_px = 8.0;      ///< ... and once near
 constexpr double kOneFrame_rad = 0.05;  ///< a joint's angle in one picture: 60 ms late at 50 deg/s
 constexpr double kJump_rad = 0.14;      ///< between two pictures: the arm was moved from posture to posture
 constexpr double kFloor_px = 0.1;       ///< no picture places a flank nearer (OutlineNoise::Prior::floor_px)

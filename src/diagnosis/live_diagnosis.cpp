@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <future>
 #include <utility>
 #include <vector>
@@ -180,31 +179,26 @@ class Window {
 
   /// Predictions of pictures as each of them has the arm's joints: outlines far off count little, and what pushes them
   /// there, a latency or a gain, would hardly be seen. What they say is kept about the state all the same.
-  void bring_near(LinearLog& measured, std::vector<std::size_t> far) {
+  void bring_near(LinearLog& measured, const std::vector<std::size_t>& fresh) {
     constexpr double kSparse = 2.0;  // of the way there half the points tell
     for (const double search_px : {diagnosis::limits::kFrom_px, diagnosis::limits::kSearch_px}) {
-      if (far.empty()) return;  // for `measure` no pictures are all of them
       fit_.measure(
           measured,
-          {.search_px = search_px, .spacing_px = kSparse * diagnosis_.spacing_px, .robust_px = 0.5 * search_px}, far);
-      std::erase_if(far, [&](std::size_t p) { return step_nearer(measured, p) < diagnosis::limits::kArrived_px; });
+          {.search_px = search_px, .spacing_px = kSparse * diagnosis_.spacing_px, .robust_px = 0.5 * search_px}, fresh);
+      for (const auto p : fresh) {
+        const auto& evidence = measured.evidence[p];
+        if (evidence.weight <= 0.0) continue;
+        const auto camera = log_.pictures()[p].camera;
+        const double variance =
+            noise_[camera].variance_px2() * std::pow(picture_unit(log_.rig().cameras[camera].intrinsics), 2);
+        Eigen::MatrixXd precision = evidence.A / variance;
+        precision.diagonal().array() += std::pow(diagnosis::limits::kOneFrame_rad, -2);
+        const Eigen::VectorXd step = precision.ldlt().solve(evidence.b / variance);
+        for (std::size_t i = 0; i < joints_.size(); ++i) {
+          fit_.coordinates()[joints_[i]].in(measured.corrections[p]) += step[static_cast<Eigen::Index>(i)];
+        }
+      }
     }
-  }
-
-  /// @return how far the step moves the outline, px of a 320x240 picture, rms
-  double step_nearer(LinearLog& measured, std::size_t p) {
-    const auto& evidence = measured.evidence[p];
-    if (evidence.weight <= 0.0) return 2.0 * diagnosis::limits::kArrived_px;  // nothing was found: not there yet
-    const auto camera = log_.pictures()[p].camera;
-    const double unit2 = std::pow(picture_unit(log_.rig().cameras[camera].intrinsics), 2);
-    const double variance = noise_[camera].variance_px2() * unit2;
-    Eigen::MatrixXd precision = evidence.A / variance;
-    precision.diagonal().array() += std::pow(diagnosis::limits::kOneFrame_rad, -2);
-    const Eigen::VectorXd step = precision.ldlt().solve(evidence.b / variance);
-    for (std::size_t i = 0; i < joints_.size(); ++i) {
-      fit_.coordinates()[joints_[i]].in(measured.corrections[p]) += step[static_cast<Eigen::Index>(i)];
-    }
-    return std::sqrt(step.dot(evidence.A * step) / (evidence.weight * unit2));
   }
 
   /// What earlier looks measured of pictures that are still in the window.
