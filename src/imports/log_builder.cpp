@@ -107,10 +107,7 @@ LogBuilder::Column LogBuilder::column_of(const std::string& name) {
     return target_.mapping.in_degrees && !target_.slides(joint) ? radians(1.0) : 1.0;
   };
   if (const auto rule = target_.mapping.joints.find(name); rule != target_.mapping.joints.end()) {
-    if (rule->second.joint.empty()) {
-      left_out_.insert(name);
-      return {};
-    }
+    if (rule->second.joint.empty()) return {};
     return {target_.robot->joint_index(rule->second.joint), rule->second.scale.value_or(in_source(rule->second.joint)),
             rule->second.offset};
   }
@@ -316,10 +313,11 @@ ImportSummary LogBuilder::finish() {
                     (first_picture_lost == summary_.left_out.end() ? "" : "; " + first_picture_lost->second.first));
   }
   if (summary_.joint_messages == 0 && ignored_.empty()) {
+    // All names that came are known, and none is a joint.
     throw FileError(log_.string() + ": not written: no joint readings" +
-                    (left_out_.empty() ? ""
-                                       : fmt::format("; import.joints leaves out {}: say there which joint each is",
-                                                     fmt::join(left_out_, ", "))));
+                    (columns_.empty() ? ""
+                                      : fmt::format("; import.joints leaves out {}: say there which joint each is",
+                                                    fmt::join(columns_.front().names, ", "))));
   }
   check_joints();
   doubt_unit();

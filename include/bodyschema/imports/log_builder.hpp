@@ -124,7 +124,6 @@ class LogBuilder {
   std::vector<double> largest_;          ///< of each joint, absolute, in the source's own unit
   std::vector<int> channels_of_;         ///< of each camera's pictures, once known
   std::set<std::string> ignored_;
-  std::set<std::string> left_out_;  ///< names that import.joints maps to no joint
   Microseconds first_ = -1, last_ = -1;
   ImportSummary summary_;
 };
