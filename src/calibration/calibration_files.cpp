@@ -108,9 +108,11 @@ Correction correction_of(const Calibration& c, bool all) {
   return correction;
 }
 
-/// How hands are mounted, as far as that is told: the offsets hold together with it.
-void add_mounts(const BatchFit& batch, const PictureLog& log, const Pipeline& pipeline, bool all,
-                Correction& correction) {
+/// How hands are mounted, as far as a good result tells: the offsets hold together with it. Where a result is not good
+/// a mount takes up what is wrong elsewhere, and its standard deviation does not say so.
+void add_mounts(const Calibration& calibration, const BatchFit& batch, const PictureLog& log, const Pipeline& pipeline,
+                bool all, Correction& correction) {
+  if (calibration.state != CalibrationState::kGood && !all) return;
   constexpr double kTold = 1.0 / 3.0;  // of what was believed
   const auto& state = batch.state();
   ErrorModel mounts(log.roles());
@@ -299,7 +301,7 @@ void write_calibration(const Calibration& calibration, const BatchFit& batch, Pi
   replace_file(options.out / "cameras.yaml", cameras_yaml(calibration));
   if (!options.configuration.empty()) replace_file(options.out / "estimator.yaml", estimator_yaml(options));
   Correction correction = correction_of(calibration, options.all_parameters);
-  add_mounts(batch, log, pipeline, options.all_parameters, correction);
+  add_mounts(calibration, batch, log, pipeline, options.all_parameters, correction);
   write_corrected_urdf(pipeline.setup().model.urdf, correction, options.out / "corrected.urdf");
   write_ros_files(options.out / "ros", pipeline.setup().model.urdf, options.out / "corrected.urdf", correction,
                   ros_cameras_of(calibration, log.rig()));

@@ -125,6 +125,29 @@ TEST_F(Calibrated, OffsetsAreFoundWithinWhatIsClaimedAndTheFilesSayTheSame) {
   EXPECT_NE(after.cameras[1].mount.knowledge, PlaceKnowledge::kUnknown);
 }
 
+/// A mount trades with all that a result which is not good has wrong, whatever its standard deviation.
+TEST_F(Calibrated, HowAHandIsMountedIsWrittenOfAGoodResultOnly) {
+  const auto log = recorded();
+  const auto text_of = [](const fs::path& file) {
+    std::ifstream in(file);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  const std::string place = R"(xyz="0 0 0.11" rpy="0 0 -0.785398163397")",
+                    further = R"(xyz="0 0 0.14" rpy="0 0 -0.785398163397")";
+  EXPECT_EQ(calibration(log, {"estimator.state.hand_mount={sd_deg: 10, sd_mm: 5}"}).state, CalibrationState::kGood);
+  EXPECT_THAT(text_of(folder_ / "out" / "corrected.urdf"), testing::Not(testing::HasSubstr(place)));
+
+  // 30 mm further out than it is, which is more than anybody believes possible.
+  std::string urdf = text_of(fs::path(BODYSCHEMA_SOURCE_DIR) / "meshes/arm7/arm7.urdf");
+  ASSERT_NE(urdf.find(place), std::string::npos);
+  urdf.replace(urdf.find(place), place.size(), further);
+  std::ofstream(folder_ / "other.urdf") << urdf;
+  const auto result = calibration(
+      log, {"estimator.state.hand_mount={sd_deg: 10, sd_mm: 2}", "robot.urdf=" + (folder_ / "other.urdf").string()});
+  EXPECT_NE(result.state, CalibrationState::kGood);
+  EXPECT_THAT(text_of(folder_ / "out" / "corrected.urdf"), testing::HasSubstr(further)) << result.sentence;
+}
+
 /// Two cameras on one bar keep what their own calibration says: where both are hardly known to the robot, they are well
 /// known to each other.
 TEST_F(Calibrated, CamerasBesideEachOtherStaySoInTheFiles) {
