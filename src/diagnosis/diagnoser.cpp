@@ -16,6 +16,7 @@
 #include "candidates.hpp"
 #include "findings.hpp"
 #include "limits.hpp"
+#include "log_length.hpp"
 #include "log_motion.hpp"
 #include "look.hpp"
 #include "model_search.hpp"
@@ -31,8 +32,8 @@ class Diagnoser {
       : fit_(fit), options_(options), search_(std::move(search)), changes_(std::move(changes)) {}
 
   DiagnosisReport run() {
-    refuse_unusable();
     report_.not_testable = untestable(fit_.log().roles(), motion());
+    refuse_unusable();
     progress(0.02);
     search_.start();
     search_.look_for_lost_part();
@@ -67,45 +68,23 @@ class Diagnoser {
     if (options_.progress) options_.progress(share);
   }
 
-  [[nodiscard]] LogMotion motion() const {
+  [[nodiscard]] std::vector<JointSample> exposures() const {
     std::vector<JointSample> joints;
+    for (const auto& picture : fit_.log().pictures()) joints.push_back(picture.joints);
+    return joints;
+  }
+
+  [[nodiscard]] LogMotion motion() const {
     std::vector<bool> seen(fit_.log().rig().cameras.size(), false);
-    for (const auto& picture : fit_.log().pictures()) {
-      joints.push_back(picture.joints);
-      seen[picture.camera] = true;
-    }
+    for (const auto& picture : fit_.log().pictures()) seen[picture.camera] = true;
     const auto& log = fit_.log();
-    return log_motion(joints, static_cast<std::size_t>(std::count(seen.begin(), seen.end(), true)), log.encoders(),
+    return log_motion(exposures(), static_cast<std::size_t>(std::count(seen.begin(), seen.end(), true)), log.encoders(),
                       log.robot(), log.setup(), log.roles());
   }
 
   void refuse_unusable() const {
-    const auto pictures = fit_.log().pictures();
-    const double length =
-        pictures.empty() ? 0.0 : seconds(pictures.back().joints.utime - pictures.front().joints.utime);
-    // Postures of stills: from one picture to the next the arm was moved.
-    std::size_t postures = 1;
-    Eigen::VectorXd first, last;
-    double moved = 0.0;
-    for (const auto& picture : pictures) {
-      Eigen::VectorXd q(static_cast<Eigen::Index>(fit_.log().roles().arm.size()));
-      Eigen::Index i = 0;
-      for (const auto joint : fit_.log().roles().arm) q[i++] = picture.joints.q[joint];
-      if (first.size() == 0) first = last = q;
-      postures += (q - last).cwiseAbs().maxCoeff() > limits::kJump_rad;
-      moved = std::max(moved, (q - first).cwiseAbs().maxCoeff());
-      last = q;
-    }
-    if (moved < options_.same_posture_rad) {
-      throw DataError("the arm stands still in every picture; move it through its range while recording");
-    }
-    if (length < options_.shortest_log_s && postures < options_.fewest_postures) {
-      throw DataError(
-          fmt::format("{:.1f} s of pictures are too few; record at least {:.0f} s of motion, better 60 s, or {} "
-                      "postures held still{}",
-                      length, options_.shortest_log_s, options_.fewest_postures,
-                      postures > 1 ? fmt::format(" (it has {})", postures) : ""));
-    }
+    const auto length = log_length(exposures(), fit_.log().roles(), options_);
+    if (const auto why = why_too_short(length, report_.not_testable, options_); !why.empty()) throw DataError(why);
   }
 
   /// All candidates about the present model, scored, in blocks long enough that neighbours do not err alike.

@@ -11,6 +11,8 @@
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/diagnosis/diagnosis_page.hpp"
 #include "bodyschema/pipeline/watched_log.hpp"
+#include "log_exposures.hpp"
+#include "log_length.hpp"
 #include "log_motion.hpp"
 #include "log_pictures.hpp"
 #include "telling_motion.hpp"
@@ -85,8 +87,31 @@ class LogDiagnosis {
                                "': diagnose starts from the URDF as it is; leave it out "
                                "(--set robot.extended_model='')");
     }
+    refuse_short();
     return watch_log(pipeline_,
                      {.log = options_.log, .picture_rate_hz = options_.picture_rate_hz, .quiet = options_.quiet}, true);
+  }
+
+  /// Refuses a log that is too short before any picture is looked at. Of others no more is read than shows that they
+  /// are long enough.
+  void refuse_short() const {
+    const DiagnosisOptions needed;
+    auto stream = pipeline_.make_stream();
+    std::size_t looked_at = 0;
+    const auto roles = JointRoles::of(pipeline_.shared_robot(), pipeline_.setup(), pipeline_.rig());
+    const auto log = diagnosis::LogExposures::read(
+        options_.log, stream, JointStream(pipeline_.robot(), pipeline_.setup(), pipeline_.bus()),
+        options_.picture_rate_hz, [&](const auto& pictures, std::uint64_t) {
+          if (pictures.size() < 2 * looked_at || pictures.empty()) return true;
+          looked_at = pictures.size();
+          return !diagnosis::why_too_short(diagnosis::log_length(pictures, roles, needed), {}, needed).empty();
+        });
+    if (log.pictures.empty()) return;  // refuse_unusable() says why
+    const auto motion = diagnosis::log_motion(log.pictures, log.cameras, log.encoders, pipeline_.shared_robot(),
+                                              pipeline_.setup(), roles);
+    const auto why = diagnosis::why_too_short(diagnosis::log_length(log.pictures, roles, needed),
+                                              diagnosis::untestable(roles, motion), needed);
+    if (!why.empty()) throw DataError(options_.log.string() + ": " + why);
   }
 
   /// Where the estimator was when it had converged.

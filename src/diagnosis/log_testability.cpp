@@ -9,45 +9,14 @@
 #include "bodyschema/bus/observation_stream.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
-#include "bodyschema/diagnosis/diagnoser.hpp"
-#include "bodyschema/observation/joint_motion.hpp"
+#include "bodyschema/diagnosis/log_diagnosis.hpp"
 #include "bodyschema/pipeline/joint_stream.hpp"
+#include "log_exposures.hpp"
+#include "log_length.hpp"
 #include "log_motion.hpp"
 
 namespace bodyschema {
 namespace {
-
-constexpr Microseconds kPicturePeriod = 100'000;
-
-/// Joints at the exposures of a log, on the raster that a diagnosis takes.
-class Exposures {
- public:
-  void add(const Observation& observation) {
-    if (!samples_.empty() && observation.utime < due_) return;
-    due_ = samples_.empty() || observation.utime > due_ + kPicturePeriod ? observation.utime + kPicturePeriod
-                                                                         : due_ + kPicturePeriod;
-    for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
-      if (!observation.cameras[c]) continue;
-      samples_.push_back(observation.cameras[c]->joints);
-      seen_.insert(c);
-    }
-  }
-  /// Velocities from the encoder log, as a diagnosis has them.
-  std::span<const JointSample> finish(std::span<const JointSample> encoders) {
-    Eigen::VectorXd qddot;
-    for (auto& sample : samples_) {
-      joint_motion(encoders, sample.utime, sample.qdot, qddot);
-      sample.qdot.conservativeResize(sample.q.size());
-    }
-    return samples_;
-  }
-  [[nodiscard]] std::size_t cameras() const { return seen_.size(); }
-
- private:
-  std::vector<JointSample> samples_;
-  std::set<std::size_t> seen_;
-  Microseconds due_ = 0;
-};
 
 std::string joints_text(const std::set<std::string>& joints, const std::vector<std::string>& arm) {
   if (joints.empty()) return "";
@@ -65,37 +34,27 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
   for (const char* read : {"robot", "cameras", "bus"}) configuration.section(read).reject_unknown_keys();
   const auto model = load_robot(setup, rig);
   const auto roles = JointRoles::of(model, setup, rig);
-  Exposures exposures;
-  JointStream joints(*model, setup, bus);
   ObservationStream stream(model, setup, rig, bus);
-  LogReader reader(log);
-  ProgressBar bar("motion", reader.size());
-  const auto drain = [&] {
-    while (const auto arrived = stream.next()) exposures.add(arrived->observation);
-  };
-  LogEvent event;
-  while (reader.next(event)) {
-    if (event.channel == stream.channels().joint_state) joints.take(event.data);
-    if (stream.receive(event.channel, event.data, event.time_us)) drain();
-    bar.set(reader.position());
-  }
-  stream.finish();
-  drain();
-  const auto encoders = joints.finish();
-  const auto pictures = exposures.finish(encoders);
+  ProgressBar bar("motion", LogReader(log).size());
+  const auto [pictures, cameras, encoders] =
+      diagnosis::LogExposures::read(log, stream, JointStream(*model, setup, bus), LogDiagnosisOptions{}.picture_rate_hz,
+                                    [&](const auto&, auto position) {
+                                      bar.set(position);
+                                      return true;
+                                    });
   if (pictures.empty()) {
     throw DataError(fmt::format("{}: no pictures with encoders on {} and {}", log.string(), stream.channels().cameras,
                                 stream.channels().joint_state));
   }
   LogTestability result;
   result.duration_s = seconds(pictures.back().utime - pictures.front().utime);
-  result.shortest_s = DiagnosisOptions{}.shortest_log_s;
   result.pictures = pictures.size();
   for (const auto joint : roles.arm) {
     result.arm_joints.push_back(roles.names[static_cast<std::size_t>(joint)]);
   }
   result.not_testable =
-      diagnosis::untestable(roles, diagnosis::log_motion(pictures, exposures.cameras(), encoders, model, setup, roles));
+      diagnosis::untestable(roles, diagnosis::log_motion(pictures, cameras, encoders, model, setup, roles));
+  result.refusal = diagnosis::why_too_short(diagnosis::log_length(pictures, roles, {}), result.not_testable, {});
   for (const auto& name : effect_names()) {
     if (name == "joint_offset") continue;  // always fitted, never a finding
     for (const auto& target : effect_targets(name, roles)) {
@@ -109,10 +68,7 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
 }
 
 std::string LogTestability::text() const {
-  if (duration_s < shortest_s) {
-    return fmt::format("a diagnosis needs at least {:.0f} s of pictures with encoders; this log has {:.1f} s\n",
-                       shortest_s, duration_s);
-  }
+  if (!refusal.empty()) return refusal + '\n';
   std::string out =
       fmt::format("a diagnosis would use {:.1f} s and {} pictures of this log and could test\n", duration_s, pictures);
   std::map<std::string, std::set<std::string>> by_cause;

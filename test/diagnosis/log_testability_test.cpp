@@ -7,6 +7,7 @@
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/bus/messages.hpp"
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/diagnosis/log_diagnosis.hpp"
 #include "temporary_folder.hpp"
 
 namespace bodyschema {
@@ -92,8 +93,24 @@ TEST(LogTestability, AMistypedKeyIsRefusedByName) {
   }
 }
 
-TEST(LogTestability, ShortAndEmptyLogs) {
-  EXPECT_THAT(testability_of(robot(), log_of("short", 4.0, true)).text(), HasSubstr("needs at least 10 s"));
+// Before: 18 s of work on masks came first, and then other words than `log info` has.
+TEST(LogTestability, ADiagnosisRefusesAShortLogAtOnceAndInTheSameWords) {
+  const auto file = log_of("short", 4.0, true);
+  const auto short_log = testability_of(robot(), file);
+  EXPECT_THAT(short_log.refusal,
+              HasSubstr("too short for a diagnosis: 3.8 s of pictures; record 10 s in motion, better 60 s, or 5 "
+                        "distinct postures held still, of which it has 0; this motion leaves untested besides: "));
+  EXPECT_THAT(short_log.refusal, HasSubstr("slip"));
+  EXPECT_EQ(short_log.text(), short_log.refusal + '\n');
+  LogDiagnosisOptions options;
+  options.log = file;
+  options.quiet = true;
+  // Every picture is black: had one been looked at, that would be the complaint.
+  EXPECT_THAT([&] { (void)diagnose_log(robot({"silhouette.engine=contour"}), options); },
+              testing::ThrowsMessage<DataError>(file.string() + ": " + short_log.refusal));
+}
+
+TEST(LogTestability, EmptyLogs) {
   const auto file = folder().path() / "nothing.lcmlog";
   LogWriter(file).publish("OTHERS", 1, std::vector<std::uint8_t>(8, 0));
   EXPECT_THROW(testability_of(robot(), file), DataError);

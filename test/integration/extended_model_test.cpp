@@ -103,7 +103,7 @@ TEST_F(ExtendedModel, DiagnoseRefusesInOneSentenceWhatItCannotUse) {
     EXPECT_THAT(err, HasSubstr(words));
     EXPECT_THAT(err, HasSubstr("record"));
   };
-  refused({"--frames", "40"}, {}, "are too few; record at least 10 s");
+  refused({"--frames", "40"}, {}, "too short for a diagnosis: ");
   refused({"--frames", "40"}, {"--set", "bus.channel_prefix=LAB"}, "no encoder readings on channel LAB_JOINT_STATE");
   // Pictures of the empty room alone.
   refused({"--frames", "2", "--background-frames", "60"}, {}, "pictures; record it with the hand in view");

@@ -12,8 +12,8 @@ namespace bodyschema {
 /// What the motion in a log lets a diagnosis test, before anything is estimated.
 struct LogTestability {
   double duration_s = 0.0;   ///< between the first and the last usable pair
-  double shortest_s = 0.0;   ///< a diagnosis refuses shorter logs
   std::size_t pictures = 0;  ///< with encoders at their exposure, at most ten a second and camera
+  std::string refusal;       ///< why a diagnosis refuses this log as a whole, in its words; empty: it does not
   std::vector<std::string> arm_joints;
   std::vector<CauseName> testable;
   std::vector<NotTestable> not_testable;
