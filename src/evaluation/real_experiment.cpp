@@ -102,7 +102,8 @@ PoseDifference difference(const Pose& found, const Pose& published, const std::s
 
 struct SetFigures {
   double square = 0.0, repeat_square = 0.0, z_square = 0.0;
-  double worst_z = 0.0, camera_mm = 0.0, camera_deg = 0.0, before_px = 0.0, after_px = 0.0, heldout_px = 0.0;
+  double worst_z = 0.0, camera_mm = 0.0, camera_deg = 0.0, before_px = 0.0, after_px = 0.0;
+  std::optional<double> heldout_px;  ///< of the trials that have enough postures to leave some out
   double first_joint_sd_deg = 0.0;
   int n = 0, repeats = 0, good = 0, trials = 0, dishonest = 0;
   std::size_t fewest_told = 1000;
@@ -123,7 +124,7 @@ SetFigures figures_of(const std::vector<RealTrial>& trials, const CameraPoses& p
     ++f.trials;
     f.before_px = std::max(f.before_px, c.outline_px.before);
     f.after_px = std::max(f.after_px, c.outline_px.after);
-    f.heldout_px = std::max(f.heldout_px, c.outline_px.heldout.value_or(0.0));
+    if (const auto& heldout = c.outline_px.heldout) f.heldout_px = std::max(f.heldout_px.value_or(*heldout), *heldout);
     std::size_t told = 0;
     for (std::size_t j = 0; j < c.joints.size(); ++j) {
       const auto& joint = c.joints[j];
@@ -157,20 +158,21 @@ SetFigures figures_of(const std::vector<RealTrial>& trials, const CameraPoses& p
 }
 
 Json figures_json(const SetFigures& f) {
-  return {{"trials", f.trials},
-          {"rms_deg", f.rms_deg()},
-          {"repeat_deg", f.repeat_deg()},
-          {"worst_z", f.worst_z},
-          {"rms_z", f.rms_z()},
-          {"told", f.fewest_told},
-          {"first_joint_sd_deg", f.first_joint_sd_deg},
-          {"camera_mm", f.camera_mm},
-          {"camera_deg", f.camera_deg},
-          {"before_px", f.before_px},
-          {"after_px", f.after_px},
-          {"heldout_px", f.heldout_px},
-          {"good", f.good},
-          {"dishonest", f.dishonest}};
+  Json json = {{"trials", f.trials},
+               {"rms_deg", f.rms_deg()},
+               {"repeat_deg", f.repeat_deg()},
+               {"worst_z", f.worst_z},
+               {"rms_z", f.rms_z()},
+               {"told", f.fewest_told},
+               {"first_joint_sd_deg", f.first_joint_sd_deg},
+               {"camera_mm", f.camera_mm},
+               {"camera_deg", f.camera_deg},
+               {"before_px", f.before_px},
+               {"after_px", f.after_px},
+               {"good", f.good},
+               {"dishonest", f.dishonest}};
+  if (f.heldout_px) json["heldout_px"] = *f.heldout_px;
+  return json;
 }
 
 class RealExperiment {
@@ -353,16 +355,16 @@ class RealExperiment {
     for (const auto& joint : c.joints) found_deg[joint.name] = degrees(joint.offset_rad);
     figure(demand, pipeline, found_deg);
     const auto& camera = c.cameras.front().X_link_optical;
+    const auto& heldout = c.outline_px.heldout;
     const auto before = depth_mm(demand, pipeline, camera, trial.hidden.offsets_deg, {});
     const auto after = depth_mm(demand, pipeline, camera, trial.hidden.offsets_deg, found_deg);
-    context_.table +=
-        fmt::format("{:<34} {:>10} {:>10.2f} {:>10}\n", fmt::format("{}, this calibration", demand.name),
-                    fmt::format("{:.2f} {:.2f}", c.outline_px.before, c.outline_px.after),
-                    c.outline_px.heldout.value_or(0.0), after ? fmt::format("{:.1f} {:.1f}", *before, *after) : "");
+    context_.table += fmt::format("{:<34} {:>10} {:>10} {:>10}\n", fmt::format("{}, this calibration", demand.name),
+                                  fmt::format("{:.2f} {:.2f}", c.outline_px.before, c.outline_px.after),
+                                  heldout ? fmt::format("{:.2f}", *heldout) : "-",
+                                  after ? fmt::format("{:.1f} {:.1f}", *before, *after) : "");
     auto& entry = context_.summary["real"]["others"][demand.set]["this calibration"];
-    entry = {{"outline_before_px", c.outline_px.before},
-             {"outline_px", c.outline_px.after},
-             {"outline_heldout_px", c.outline_px.heldout.value_or(0.0)}};
+    entry = {{"outline_before_px", c.outline_px.before}, {"outline_px", c.outline_px.after}};
+    if (heldout) entry["outline_heldout_px"] = *heldout;
     if (after) entry["depth_before_mm"] = *before, entry["depth_mm"] = *after;
   }
 
