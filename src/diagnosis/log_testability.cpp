@@ -11,6 +11,7 @@
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/diagnosis/log_diagnosis.hpp"
 #include "bodyschema/pipeline/joint_stream.hpp"
+#include "bodyschema/pipeline/watched_log.hpp"
 #include "log_exposures.hpp"
 #include "log_length.hpp"
 #include "log_motion.hpp"
@@ -43,6 +44,8 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
                                       return true;
                                     });
   if (pictures.empty()) {
+    const auto why = why_no_picture(stream.statistics(), rig, stream.channels());
+    if (!why.empty()) throw DataError(log.string() + ": " + why);
     throw DataError(fmt::format("{}: no pictures with encoders on {} and {}", log.string(), stream.channels().cameras,
                                 stream.channels().joint_state));
   }

@@ -17,6 +17,7 @@
 #include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/pipeline/truth.hpp"
+#include "bodyschema/pipeline/watched_log.hpp"
 #include "bodyschema/vision/mask_picture.hpp"
 #include "estimate_json.hpp"
 
@@ -164,20 +165,8 @@ class Replay {
 
   /// Of a log without a single instant: which part is missing, or what is wrong with its pictures.
   [[nodiscard]] std::string why_nothing_was_seen() const {
-    const std::string lost = statistics_.lost_pictures(0.0);
-    if (lost.empty()) return "no synchronised pictures and encoders in this log; " + complaint_;
-    std::string text = "no picture can be used: " + lost;
-    if (statistics_.faults[static_cast<std::size_t>(MessageFault::kWrongSize)] > 0) {
-      for (const auto& camera : pipeline_.rig().cameras) {
-        text += fmt::format("; camera '{}' is configured as {}x{} (cameras.{}.width, .height)", camera.name,
-                            camera.intrinsics.width, camera.intrinsics.height, camera.name);
-      }
-    }
-    if (statistics_.synchroniser.dropped(DropReason::kNoMask) > 0) {
-      text += fmt::format("; vision.method: given needs masks on {}, each with its picture's stamp: {} came",
-                          pipeline_.bus().channels().masks, statistics_.synchroniser.masks);
-    }
-    return text;
+    const std::string lost = why_no_picture(statistics_, pipeline_.rig(), pipeline_.bus().channels());
+    return lost.empty() ? "no synchronised pictures and encoders in this log; " + complaint_ : lost;
   }
 
   std::size_t count_frames() {

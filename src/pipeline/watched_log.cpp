@@ -162,6 +162,24 @@ WatchedLog watch_log(Pipeline& pipeline, const WatchOptions& options, bool estim
   return Watcher(pipeline, options).run(estimate_first);
 }
 
+std::string why_no_picture(const BusStatistics& bus, const StereoRig& rig, const Channels& channels) {
+  const std::string lost = bus.lost_pictures(0.0);
+  if (lost.empty()) return "";
+  std::string text = "no picture can be used: " + lost;
+  if (bus.faults[static_cast<std::size_t>(MessageFault::kWrongSize)] > 0) {
+    for (const auto& camera : rig.cameras) {
+      const auto& k = camera.intrinsics;
+      text += "; camera '" + camera.name + "' is configured as " + std::to_string(k.width) + "x" +
+              std::to_string(k.height) + " (cameras." + camera.name + ".width, .height)";
+    }
+  }
+  if (bus.synchroniser.dropped(DropReason::kNoMask) > 0) {
+    text += "; vision.method: given needs masks on " + channels.masks +
+            ", each with its picture's stamp: " + std::to_string(bus.synchroniser.masks) + " came";
+  }
+  return text;
+}
+
 void refuse_unusable(const WatchedLog& log, const std::filesystem::path& file, const Channels& channels,
                      const std::string& advice) {
   const std::string name = file.string();
@@ -171,11 +189,8 @@ void refuse_unusable(const WatchedLog& log, const std::filesystem::path& file, c
                     channels.cameras + advice);
   }
   if (sync.images == 0) {
-    const auto wrong_size = log.bus.faults[static_cast<std::size_t>(MessageFault::kWrongSize)];
-    if (wrong_size > 0) {
-      throw DataError(name + ": all " + std::to_string(wrong_size) + " pictures on " + channels.cameras +
-                      " have another size than the configuration says (cameras.left.width, .height)");
-    }
+    const auto why = why_no_picture(log.bus, log.pictures.rig(), channels);
+    if (!why.empty()) throw DataError(name + ": " + why);
     throw DataError(name + ": no pictures on channel " + channels.cameras + "; record it together with " +
                     channels.joint_state + advice);
   }
@@ -184,8 +199,7 @@ void refuse_unusable(const WatchedLog& log, const std::filesystem::path& file, c
                     "'; publish and record it, or give it a value under robot.fixed_joints_deg");
   }
   if (log.pictures_seen == 0 && sync.dropped(DropReason::kNoMask) > 0) {
-    throw DataError(name + ": " + log.bus.lost_pictures(0.0) + "; vision.method: given needs masks on channel " +
-                    channels.masks + ", each with its picture's stamp");
+    throw DataError(name + ": " + why_no_picture(log.bus, log.pictures.rig(), channels));
   }
   if (log.pictures_seen == 0) {
     throw DataError(name + ": none of " + std::to_string(sync.images) +

@@ -110,6 +110,20 @@ TEST(LogTestability, ADiagnosisRefusesAShortLogAtOnceAndInTheSameWords) {
               testing::ThrowsMessage<DataError>(file.string() + ": " + short_log.refusal));
 }
 
+// Before: "no pictures with encoders" here, and a camera 'left' there whatever the camera's name.
+TEST(LogTestability, PicturesOfAnotherSizeAreSaidByTheCamerasNamesHereAsInADiagnosis) {
+  const std::vector<std::string> wrong = {"silhouette.engine=contour", "cameras.left.width=640",
+                                          "cameras.right.width=640"};
+  LogDiagnosisOptions options;
+  options.log = log_of("size", 2.0, true);
+  options.quiet = true;
+  const auto said = testing::ThrowsMessage<DataError>(
+      testing::AllOf(HasSubstr("no picture can be used: 20 of 20 pictures are not used: 20 of another size"),
+                     HasSubstr("camera 'right' is configured as 640x240 (cameras.right.width, .height)")));
+  EXPECT_THAT([&] { (void)testability_of(robot(wrong), options.log); }, said);
+  EXPECT_THAT([&] { (void)diagnose_log(robot(wrong), options); }, said);
+}
+
 TEST(LogTestability, EmptyLogs) {
   const auto file = folder().path() / "nothing.lcmlog";
   LogWriter(file).publish("OTHERS", 1, std::vector<std::uint8_t>(8, 0));

@@ -39,6 +39,9 @@ struct WatchedLog {
 /// Throws Error.
 WatchedLog watch_log(Pipeline& pipeline, const WatchOptions& options, bool estimate_first);
 
+/// Of a log of which no picture was used: the reasons with their numbers, and what to look at; empty where none came.
+std::string why_no_picture(const BusStatistics& bus, const StereoRig& rig, const Channels& channels);
+
 /// Refuses a log in which there is nothing to work with, in one sentence that says what it lacks and what to record.
 /// @param advice  what to record, for the end of the sentence
 /// Throws DataError.
