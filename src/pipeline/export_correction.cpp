@@ -219,7 +219,13 @@ Correction read_correction(const std::filesystem::path& summary, bool anyway) {
   Correction correction;
   std::string state;
   try {
-    const auto estimate = nlohmann::ordered_json::parse(stream).at("estimate");
+    const auto json = nlohmann::ordered_json::parse(stream);
+    if (!json.contains("estimate") && json.contains("outline_px")) {
+      throw FileError(summary.string() +
+                      ": that of a calibration, which writes these files itself (bodyschema calibrate --out FOLDER: "
+                      "corrected.urdf, offsets.yaml, cameras.yaml, ros/); expected a replay's summary.json");
+    }
+    const auto& estimate = json.at("estimate");
     state = estimate.at("state").get<std::string>();
     const auto read_joints = [&](const char* key, std::vector<std::pair<std::string, double>>& list) {
       for (const auto& [joint, value] : estimate.at(key).items()) {

@@ -230,6 +230,17 @@ TEST_F(ExportCorrection, AHeadJointHasDegreesADeviationAndTheWarningOfAnyJoint) 
   EXPECT_EQ(bias.text("unit"), "px");
 }
 
+// Before: "[json.exception.out_of_range.403] key 'estimate' not found".
+TEST_F(ExportCorrection, TheResultOfACalibrationIsAnErrorThatSaysWhereItsFilesAre) {
+  std::ofstream(folder_ / "calibration.json") << R"({"state": "good", "outline_px": {"before": 2.0, "after": 0.8}})";
+  EXPECT_THAT([&] { export_correction(folder_ / "calibration.json", setup_, rig_, folder_ / "out"); },
+              ::testing::ThrowsMessage<FileError>(
+                  ::testing::AllOf(::testing::HasSubstr("calibration.json: that of a calibration"),
+                                   ::testing::HasSubstr("bodyschema calibrate --out"))));
+  std::ofstream(folder_ / "list.json") << "[1]";
+  EXPECT_THROW(export_correction(folder_ / "list.json", setup_, rig_, folder_ / "out"), FileError);
+}
+
 TEST_F(ExportCorrection, ASummaryOfAnOlderVersionIsRefused) {
   for (const char* older : {R"("nuisance": {"neck_pitch": 0.05, "mesh_scale": 0.01})",
                             R"("told": [], "nuisance": {"mesh_scale": 0.01})", R"("effective_sample_size": 3)"}) {
