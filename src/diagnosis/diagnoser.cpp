@@ -84,7 +84,8 @@ class Diagnoser {
 
   void refuse_unusable() const {
     const auto length = log_length(exposures(), fit_.log().roles(), options_);
-    if (const auto why = why_too_short(length, report_.not_testable, options_); !why.empty()) throw DataError(why);
+    if (const auto why = why_too_short(length, report_.not_testable, fit_.log().roles(), options_); !why.empty())
+      throw DataError(why);
   }
 
   /// All candidates about the present model, scored, in blocks long enough that neighbours do not err alike.

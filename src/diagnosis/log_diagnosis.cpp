@@ -104,13 +104,13 @@ class LogDiagnosis {
         options_.picture_rate_hz, [&](const auto& pictures, std::uint64_t) {
           if (pictures.size() < 2 * looked_at || pictures.empty()) return true;
           looked_at = pictures.size();
-          return !diagnosis::why_too_short(diagnosis::log_length(pictures, roles, needed), {}, needed).empty();
+          return !diagnosis::why_too_short(diagnosis::log_length(pictures, roles, needed), {}, roles, needed).empty();
         });
     if (log.pictures.empty()) return;  // refuse_unusable() says why
     const auto motion = diagnosis::log_motion(log.pictures, log.cameras, log.encoders, pipeline_.shared_robot(),
                                               pipeline_.setup(), roles);
     const auto why = diagnosis::why_too_short(diagnosis::log_length(log.pictures, roles, needed),
-                                              diagnosis::untestable(roles, motion), needed);
+                                              diagnosis::untestable(roles, motion), roles, needed);
     if (!why.empty()) throw DataError(options_.log.string() + ": " + why);
   }
 

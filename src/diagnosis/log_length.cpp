@@ -3,7 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <set>
+#include <map>
 
 #include "limits.hpp"
 
@@ -52,13 +52,17 @@ LogLength log_length(std::span<const JointSample> pictures, const JointRoles& ro
 }
 
 std::string why_too_short(const LogLength& length, const std::vector<NotTestable>& not_testable,
-                          const DiagnosisOptions& options) {
+                          const JointRoles& roles, const DiagnosisOptions& options) {
   if (length.moved_rad < options.same_posture_rad) {
     return "the arm stands still in every picture; move it through its range while recording";
   }
   if (length.seconds >= options.shortest_log_s || length.postures >= options.fewest_postures) return "";
-  std::set<std::string> untested;
-  for (const auto& item : not_testable) untested.insert(item.cause.name);
+  std::map<std::string, std::size_t> refused;
+  for (const auto& item : not_testable) ++refused[item.cause.name];
+  std::vector<std::string> untested;
+  for (const auto& [name, targets] : refused) {
+    if (targets == effect_targets(name, roles).size()) untested.push_back(name);
+  }
   const std::string besides =
       untested.empty() ? "" : fmt::format("; this motion leaves untested besides: {}", fmt::join(untested, ", "));
   return fmt::format(

@@ -25,8 +25,9 @@ struct LogLength {
 LogLength log_length(std::span<const JointSample> pictures, const JointRoles& roles, const DiagnosisOptions& options);
 
 /// The one sentence for a log that no diagnosis can use: what it has, what is needed, and which causes its motion would
-/// leave untested besides. Empty: it is long enough.
+/// leave untested besides, on whatever joint. Empty: it is long enough.
+/// @param not_testable  for the motion of the log
 std::string why_too_short(const LogLength& length, const std::vector<NotTestable>& not_testable,
-                          const DiagnosisOptions& options);
+                          const JointRoles& roles, const DiagnosisOptions& options);
 
 }  // namespace bodyschema::diagnosis

@@ -57,7 +57,7 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
   }
   result.not_testable =
       diagnosis::untestable(roles, diagnosis::log_motion(pictures, cameras, encoders, model, setup, roles));
-  result.refusal = diagnosis::why_too_short(diagnosis::log_length(pictures, roles, {}), result.not_testable, {});
+  result.refusal = diagnosis::why_too_short(diagnosis::log_length(pictures, roles, {}), result.not_testable, roles, {});
   for (const auto& name : effect_names()) {
     if (name == "joint_offset") continue;  // always fitted, never a finding
     for (const auto& target : effect_targets(name, roles)) {

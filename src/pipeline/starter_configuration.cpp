@@ -30,6 +30,9 @@ constexpr double kPairSd_deg = 0.1, kPairSd_mm = 1.0;  // of a stereo pair that 
 constexpr double kLag_sd_ms = 60.0;
 /// Of a camera's principal point, share of the width: by which calibrations of one camera differ.
 constexpr double kCentre_share = 0.005;
+/// Of a lens of which nobody says anything: fields of view from 40 to 90 deg, sensors that are 2 % off the axis.
+constexpr double kGuessedFocal_sd_percent = 25.0;
+constexpr double kGuessedCentre_share = 0.02;
 
 bool among(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -250,8 +253,8 @@ class Starter {
       camera.k.cy = 0.5 * (camera.k.height - 1);
       if (o_.focal_px <= 0.0) {
         notes_.push_back(
-            fmt::format("camera {}: focal length: a guess, {:.0f} px; fill in your cameras' in robot.yaml, "
-                        "or give --camera-info",
+            fmt::format("camera {}: focal length: a guess, {:.0f} px, and to be found (estimator.yaml); better "
+                        "give --camera-info, or fill in your cameras' in robot.yaml",
                         camera.name, camera.k.fx));
       }
       notes_.push_back(fmt::format("camera {}: principal point: a guess, the picture's middle", camera.name));
@@ -274,6 +277,12 @@ class Starter {
                       file.string(), camera.k.width, camera.k.height, camera.name, picture->width, picture->height));
     }
     return info;
+  }
+
+  /// Whether nobody said anything of a camera's lens.
+  [[nodiscard]] bool focal_guessed() const {
+    return o_.focal_px <= 0.0 &&
+           std::any_of(cameras_.begin(), cameras_.end(), [](const auto& camera) { return camera.source.empty(); });
   }
 
   [[nodiscard]] std::optional<PictureSize> picture_size_of(const std::string& camera) const {
@@ -495,12 +504,20 @@ class Starter {
     if (moving_) {
       text += fmt::format("    latency: {{sd_ms: {}}}             # pictures against encoders\n", kLag_sd_ms);
     }
-    if (stills_ && !moving_) {
+    if (focal_guessed()) {
+      text +=
+          fmt::format("    focal_length: {{sd_percent: {}}}       # a guess; take this out with your cameras' own\n",
+                      kGuessedFocal_sd_percent);
+    }
+    if (focal_guessed() || (stills_ && !moving_)) {
       double width = 0.0;
       for (const auto& camera : cameras_) width = std::max(width, static_cast<double>(camera.k.width));
-      text +=
-          fmt::format("    principal_point common: {{sd_px: {:.1f}}} # of calibrations of one camera after the other\n",
-                      kCentre_share * width);
+      const double sd_px = (focal_guessed() ? kGuessedCentre_share : kCentre_share) * width;
+      text += fmt::format("    principal_point common: {{sd_px: {:.1f}}} # {}\n", sd_px,
+                          focal_guessed() ? "a guess as well" : "of calibrations of one camera after the other");
+      if (focal_guessed() && cameras_.size() == 2) {
+        text += fmt::format("    principal_point difference: {{sd_px: {:.1f}}}\n", std::sqrt(2.0) * sd_px);
+      }
     }
     return text.empty() ? text : "estimator:\n  state:\n" + text;
   }

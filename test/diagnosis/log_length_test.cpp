@@ -39,7 +39,7 @@ std::vector<JointSample> film(double length_s, double deg_s, double rate_hz) {
 }
 
 std::string refusal(const std::vector<JointSample>& pictures, const std::vector<NotTestable>& not_testable = {}) {
-  return why_too_short(log_length(pictures, two_joints(), kOptions), not_testable, kOptions);
+  return why_too_short(log_length(pictures, two_joints(), kOptions), not_testable, two_joints(), kOptions);
 }
 
 // Stills lie ten seconds apart where nobody said when they were taken: that is no ten seconds of motion.
@@ -71,11 +71,12 @@ TEST(LogLength, AnArmThatStandsStillIsRefusedHoweverLong) {
   EXPECT_THAT(refusal(stills(std::vector<double>(100, 20.0))), HasSubstr("stands still in every picture"));
 }
 
-TEST(LogLength, SaysOnceEachWhatTheMotionLeavesUntestedBesides) {
-  const auto text =
-      refusal(film(4.0, 20.0, 4.0),
-              {{{"slip", "elbow", ""}, "a"}, {{"backlash", "elbow", ""}, "b"}, {{"slip", "shoulder", ""}, "a"}});
-  EXPECT_THAT(text, testing::EndsWith("; this motion leaves untested besides: backlash, slip"));
+TEST(LogLength, SaysWhatTheMotionLeavesUntestedOnEveryJoint) {
+  const auto text = refusal(film(4.0, 20.0, 4.0), {{{"slip", "elbow", ""}, "a"},
+                                                   {{"backlash", "elbow", ""}, "b"},
+                                                   {{"slip", "shoulder", ""}, "a"},
+                                                   {{"latency", "", ""}, "c"}});
+  EXPECT_THAT(text, testing::EndsWith("; this motion leaves untested besides: latency, slip"));
   EXPECT_THAT(refusal(film(4.0, 20.0, 4.0)), testing::EndsWith("of which it has 0"));
 }
 
