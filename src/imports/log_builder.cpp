@@ -149,7 +149,7 @@ void LogBuilder::note_stamp(Microseconds utime) {
 }
 
 void LogBuilder::add_joints(Microseconds arrival, Microseconds utime, std::span<const std::string> names,
-                            std::span<const double> values, std::span<const double> velocities) {
+                            std::span<const double> values, std::span<const double> velocities, Nan nan) {
   const bool fits = names.size() == values.size() && (velocities.empty() || velocities.size() == names.size());
   if (!fits || names.size() > kMostNames) {
     return leave_out("joint messages", fmt::format("{} names, {} positions and {} velocities", names.size(),
@@ -164,7 +164,7 @@ void LogBuilder::add_joints(Microseconds arrival, Microseconds utime, std::span<
   message.joint_velocity.clear();
   for (std::size_t i = 0; i < names.size(); ++i) {
     const Column& column = columns.columns[i];
-    if (column.joint < 0 || std::isnan(values[i])) continue;
+    if (column.joint < 0 || (std::isnan(values[i]) && nan == Nan::kNoReading)) continue;
     const auto j = static_cast<std::size_t>(column.joint);
     const double q = column.scale * values[i] + column.offset;
     const double qdot = velocities.empty() || !std::isfinite(velocities[i]) ? 0.0 : column.scale * velocities[i];

@@ -98,7 +98,8 @@ class StillsImport {
                                                    table_.where(*posture.row), *posture.number));
       }
       if (moving_) {
-        builder_.add_joints(posture.utime, posture.utime, joint_names_, joints_of(posture), velocities(i));
+        builder_.add_joints(posture.utime, posture.utime, joint_names_, joints_of(posture), velocities(i),
+                            LogBuilder::Nan::kNoReading);
         if (any) add_pictures(posture);
       } else if (any) {
         hold(posture);
@@ -223,7 +224,7 @@ class StillsImport {
     constexpr Microseconds kStep = 25'000;
     const auto values = joints_of(posture);
     for (Microseconds t = posture.utime - kStillHold; t <= posture.utime + kStillHold; t += kStep) {
-      builder_.add_joints(t, t, joint_names_, values);
+      builder_.add_joints(t, t, joint_names_, values, {}, LogBuilder::Nan::kNoReading);
       if (t == posture.utime) add_pictures(posture);
     }
   }

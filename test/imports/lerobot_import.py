@@ -134,7 +134,7 @@ def check_bad(here, robot, mapping):
     said = imported(cut, "--episodes", "0", status=2)
     assert "error: episode 0: " in said, said
     said = imported(here.set("nan", "version=2.1", "nan=1"), "--episodes", "0")
-    assert "20 joint messages of 7 joints" in said, said
+    assert "20 joint messages of 7 joints" in said and "left out, readings: 1; 'axis" in said, said
     wide = here.set("wide", "version=2.1", "width=80")
     said = imported(wide, "--episodes", "0", status=2)
     assert "no picture of any camera" in said and "80x48" in said, said

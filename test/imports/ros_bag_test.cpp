@@ -210,6 +210,8 @@ TEST_F(RosBag, MessagesBecomeALogAndWhatIsBadIsCounted) {
   EXPECT_EQ(summary.cameras[1].pictures, 1u);
   EXPECT_EQ(summary.left_out.at("pictures of camera left").count, 3u);
   EXPECT_EQ(summary.left_out.at("joint messages").count, 1u);
+  EXPECT_EQ(summary.left_out.at("readings").count, 1u);
+  EXPECT_THAT(summary.left_out.at("readings").first, HasSubstr("is nan, not a finite number"));
   EXPECT_EQ(summary.left_out.at("messages").count, 1u);
   EXPECT_THAT(summary.notes, Contains(HasSubstr("1 messages have no stamp")));
 }

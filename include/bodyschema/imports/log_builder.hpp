@@ -71,11 +71,14 @@ class LogBuilder {
   /// Throws as LogWriter.
   LogBuilder(const ImportTarget& target, const std::filesystem::path& log);
 
+  /// What a value is that is no number.
+  enum class Nan { kLeftOut, kNoReading };
   /// @param arrival  where the message stands in the log; messages are to come in that order
-  /// @param values   in the source's units, one for each name; NaN: no reading of that joint
+  /// @param values   in the source's units, one for each name
   /// @param velocities  the same, or empty: none are known
+  /// @param nan  left out and counted; or that joint was not read this time, as an empty field of a table says
   void add_joints(Microseconds arrival, Microseconds utime, std::span<const std::string> names,
-                  std::span<const double> values, std::span<const double> velocities = {});
+                  std::span<const double> values, std::span<const double> velocities = {}, Nan nan = Nan::kLeftOut);
   /// @param camera  position in the rig
   /// @param where   for what is said of a picture that cannot be used
   void add_picture(Microseconds arrival, std::size_t camera, Microseconds utime, const Image& picture,
