@@ -360,6 +360,7 @@ class Calibrator {
     }
     auto more = beliefs;
     for (const auto& cause : report.causes) {
+      if (cause.implausible && implausible_.empty()) implausible_ = cause.sentence;
       CalibratedEffect effect{cause.cause.name, cause.cause.joint, cause.cause.source, cause.sentence, {}};
       for (const auto& p : cause.parameters) {
         effect.parameters.push_back({p.parameter, p.unit, p.estimate, 0.25 * (p.ci95[1] - p.ci95[0]), 0.0});
@@ -721,6 +722,12 @@ class Calibrator {
                              result_.postures, kFewestPostures));
     }
     if (const auto wrong = beyond_belief(batch); !wrong.empty()) return say(CalibrationState::kModelMisfit, wrong);
+    if (!implausible_.empty()) {
+      return say(CalibrationState::kModelMisfit,
+                 "Model misfit: no robot is so wrong as the pictures ask for (" + implausible_ +
+                     "); something else is wrong with robot or cameras, or less is known of them than is believed "
+                     "(estimator.state).");
+    }
     if (result_.dispersion > kDisagreement) {
       return say(CalibrationState::kModelMisfit,
                  fmt::format("Model misfit: postures disagree by {:.1f} times what is claimed; run bodyschema diagnose "
@@ -774,7 +781,8 @@ class Calibrator {
   StereoRig rig_;
   PictureLog* log_ = nullptr;
   std::vector<StereoRig> starts_;
-  std::string unsettled_;  ///< a joint whose offset depends on how masks were made
+  std::string implausible_;  ///< a cause that no robot has, as a diagnosis words it
+  std::string unsettled_;    ///< a joint whose offset depends on how masks were made
   double believed_px_ = kAnywhere_px;
   std::vector<bool> loose_;  ///< parts that are drawn and have no say
   double heldout_mean_px_ = 0.0;

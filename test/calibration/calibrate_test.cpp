@@ -213,6 +213,24 @@ TEST_F(Calibrated, MasksThatWereMadeAboutAWrongPredictionAreNotBelieved) {
   expect_honest(result, far_deg);
 }
 
+// Of a real arm such a result was "good", its outlines 7 px off and a told joint 4 standard deviations.
+TEST_F(Calibrated, AFocalLengthThatIsFarOffIsNotGoodUnlessItIsBelievedToBe) {
+  const std::vector<std::string> wrong = {"cameras.left.fx=651", "cameras.left.fy=651", "cameras.left.pose=unknown",
+                                          "cameras.right=null"};
+  const auto log = recorded();
+  const auto sure = calibration(log, wrong);
+  EXPECT_NE(sure.state, CalibrationState::kGood) << sure.sentence;
+  auto believed = wrong;
+  believed.push_back("estimator.state.focal_length={sd_percent: 25}");
+  const auto unsure = calibration(log, believed);
+  EXPECT_EQ(unsure.state, CalibrationState::kGood) << unsure.sentence;
+  for (const auto& joint : unsure.joints) {
+    if (!joint.told) continue;
+    EXPECT_NEAR(degrees(joint.offset_rad), kOffsets_deg.at(joint.name), 3.0 * degrees(joint.sd_rad) + 0.05)
+        << joint.name;
+  }
+}
+
 TEST_F(Calibrated, ACameraThatLooksElsewhereIsNotGood) {
   const auto log = recorded(simulator::Output::kPictures, kOffsets_deg);
   // Both turned by 20 deg, and said to be known.
