@@ -215,8 +215,8 @@ TEST_F(Calibrated, MasksThatWereMadeAboutAWrongPredictionAreNotBelieved) {
 
 // Of a real arm such a result was "good", its outlines 7 px off and a told joint 4 standard deviations.
 TEST_F(Calibrated, AFocalLengthThatIsFarOffIsNotGoodUnlessItIsBelievedToBe) {
-  const std::vector<std::string> wrong = {"cameras.left.fx=651", "cameras.left.fy=651", "cameras.left.pose=unknown",
-                                          "cameras.right=null"};
+  const std::vector<std::string> wrong = {"cameras.left.fx=651",  "cameras.left.fy=651",  "cameras.left.pose=unknown",
+                                          "cameras.right.fx=651", "cameras.right.fy=651", "cameras.right.pose=unknown"};
   const auto log = recorded();
   const auto sure = calibration(log, wrong);
   EXPECT_NE(sure.state, CalibrationState::kGood) << sure.sentence;
