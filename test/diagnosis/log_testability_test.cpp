@@ -111,6 +111,17 @@ TEST(LogTestability, ADiagnosisRefusesAShortLogAtOnceAndInTheSameWords) {
               testing::ThrowsMessage<DataError>(file.string() + ": " + short_log.refusal));
 }
 
+TEST(LogTestability, OfALogThatIsLongEnoughADiagnosisLooksAtThePictures) {
+  LogDiagnosisOptions options;
+  options.log = log_of("black", 12.0, true);
+  options.quiet = true;
+  EXPECT_EQ(testability_of(robot(), options.log).refusal, "");
+  EXPECT_THAT([&] { (void)diagnose_log(robot({"silhouette.engine=contour"}), options); },
+              testing::ThrowsMessage<DataError>(
+                  testing::AllOf(HasSubstr("the arm is seen in 0 of "),
+                                 HasSubstr("pictures; record it with the hand in view of all cameras"))));
+}
+
 // Before: "no pictures with encoders" here, and a camera 'left' there whatever the camera's name.
 TEST(LogTestability, PicturesOfAnotherSizeAreSaidByTheCamerasNamesHereAsInADiagnosis) {
   const std::vector<std::string> wrong = {"silhouette.engine=contour", "cameras.left.width=640",
