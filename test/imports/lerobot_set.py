@@ -60,7 +60,7 @@ def table_of(episodes, keys):
     rows = [(episode, row) for episode in episodes for row in range(ROWS)]
     values = [state(episode, row) for episode, row in rows]
     if keys.get("nan"):
-        values[3][0] = math.nan
+        values[3][0] = values[3][1] = math.nan  # of the gripper, which is left out, and of a joint
     columns = {
         "observation.state": pa.array(values, pa.list_(pa.float32(), len(NAMES))),
         "action": pa.array(values, pa.list_(pa.float32(), len(NAMES))),
