@@ -379,14 +379,32 @@ std::string FleetRobot::sentence() const {
     }
     parts.push_back(part);
   }
-  if (diagnosed > 0)
-    out += parts.empty() ? "; nothing wrong beside the offsets" : "; " + fmt::format("{}", fmt::join(parts, ", "));
-  const auto moved = [](const FleetTrend& t) { return std::abs(t.value.back() - t.value.front()); };
+  const auto is_unexplained = [](const FleetLog& log) { return log.verdict == "unexplained"; };
+  const auto unexplained = static_cast<std::size_t>(std::count_if(logs.begin(), logs.end(), is_unexplained));
+  if (!parts.empty()) {
+    out += "; " + fmt::format("{}", fmt::join(parts, ", "));
+  } else if (diagnosed > unexplained) {
+    out += "; nothing wrong beside the offsets";
+    if (unexplained > 0) out += fmt::format(" in {} of these", diagnosed - unexplained);
+  }
+  // Offsets of what is not explained stand in the page, but nothing is said to have moved by them.
+  const auto of_explained = [&](const FleetTrend& t) {
+    std::vector<double> values;
+    for (std::size_t i = 0; i < t.value.size(); ++i) {
+      if (!is_unexplained(logs[t.log[i]])) values.push_back(t.value[i]);
+    }
+    return values;
+  };
+  const auto moved = [&](const FleetTrend& t) {
+    const auto values = of_explained(t);
+    return values.empty() ? 0.0 : std::abs(values.back() - values.front());
+  };
   const auto most = std::max_element(offsets.begin(), offsets.end(),
                                      [&](const auto& a, const auto& b) { return moved(a) < moved(b); });
   if (most != offsets.end() && moved(*most) > kMoved_deg) {
-    out += fmt::format("; the offset of {} moved most, {:.2f} to {:.2f} deg", most->name, most->value.front(),
-                       most->value.back());
+    const auto values = of_explained(*most);
+    out +=
+        fmt::format("; the offset of {} moved most, {:.2f} to {:.2f} deg", most->name, values.front(), values.back());
   }
   if (!disagreements.empty()) {
     const auto& first = disagreements.front();
@@ -395,9 +413,10 @@ std::string FleetRobot::sentence() const {
     out += fmt::format("; {} logs disagree, most of all {} on {} ({:.2f} deg, others {:.2f})", disagreeing.size(),
                        first.log, first.joint, first.offset_deg, first.others_deg);
   }
-  const bool unexplained =
-      std::any_of(logs.begin(), logs.end(), [](const auto& log) { return log.verdict == "unexplained"; });
-  if (unexplained) out += "; some logs hold structure that no known cause explains";
+  if (unexplained > 0) {
+    out += fmt::format("; {} what no known cause explains",
+                       unexplained == 1 ? std::string("1 log holds") : fmt::format("{} logs hold", unexplained));
+  }
   return out;
 }
 

@@ -72,6 +72,22 @@ TEST_F(FleetReport, FollowsACauseOverWeeks) {
   EXPECT_EQ(robots[1].sentence(), "1 of 1 logs diagnosed; nothing wrong beside the offsets");
 }
 
+// Before: "nothing wrong beside the offsets" of logs that none of the causes explained, and whose offset moved most.
+TEST_F(FleetReport, OfLogsThatNothingExplainsItDoesNotSayThatNothingIsWrong) {
+  const auto report = [](const char* verdict, double elbow) {
+    return nlohmann::json{
+        {"verdict", verdict}, {"causes", nlohmann::json::array()}, {"offsets_deg", {{"after", {{"r_elbow", elbow}}}}}}
+        .dump();
+  };
+  add_log("alpha/a", kBegin, "diagnosed", report("unexplained", 1.0));
+  add_log("alpha/b", kBegin + kWeek, "diagnosed", report("unexplained", 4.0));
+  EXPECT_EQ(gather_fleet(results_).at(0).sentence(), "2 of 2 logs diagnosed; 2 logs hold what no known cause explains");
+  add_log("alpha/c", kBegin + 2 * kWeek, "diagnosed", report("none", 2.0));
+  EXPECT_EQ(gather_fleet(results_).at(0).sentence(),
+            "3 of 3 logs diagnosed; nothing wrong beside the offsets in 1 of these; 2 logs hold what no known cause "
+            "explains");
+}
+
 TEST_F(FleetReport, SaysWhyALogWasNotDiagnosed) {
   add_log("alpha/short", kBegin, "short.lcmlog: 4.0 s, at least 10 s are needed", "");
   add_log("alpha/broken", kBegin + 1, "diagnosed", "{\"verdict\": \"na");
