@@ -89,8 +89,10 @@ std::string why_not(const DiagnosisReport& report) {
   const double still_px = std::sqrt(std::max(0.0, after.rms_px * after.rms_px - after.moved_px * after.moved_px));
   if (after.rms_px > limits::kNoiseRatio * still_px) {
     return fmt::format(
-        "The model does not explain what is seen: outlines lie off by {:.2f} px, but by {:.2f} px if the robot "
-        "may stand elsewhere in every part of the log. Something moves it that no known cause describes.",
+        "The model does not explain what is seen: outlines lie off by {:.2f} px, and only {:.2f} px of that is noise "
+        "of "
+        "single pictures. In the rest they agree that the arm stood elsewhere from instant to instant: something moves "
+        "it that no known cause describes.",
         after.rms_px, still_px);
   }
   if (causes.empty() && report.noise_px > 0.0 && report.left_px > limits::kNoiseRatio * report.noise_px) {

@@ -90,8 +90,8 @@ TEST(Verdict, OfAModelThatLeavesMoreThanAnyOutlineIsRoughNothingIsNamed) {
   EXPECT_TRUE(report.exclusion_limits.empty());
 }
 
-/// A wobble that no angle, speed or load goes with: every second has its own offset.
-TEST(Verdict, OfARobotThatStandsElsewhereInEveryPartOfTheLogIsNeitherNoneNorNamed) {
+/// A wobble that no angle, speed or load goes with: every instant has its own offset.
+TEST(Verdict, OfARobotThatStandsElsewhereFromInstantToInstantIsNeitherNoneNorNamed) {
   for (auto causes : {std::vector<DiagnosedCause>{}, {gain_of_elbow()}}) {
     auto report = report_of(causes);
     report.after.rms_px = 0.8;
