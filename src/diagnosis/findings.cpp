@@ -7,6 +7,7 @@
 
 #include "agreed_motion.hpp"
 #include "bodyschema/evidence/distributions.hpp"
+#include "encoder_noise.hpp"
 #include "left_over.hpp"
 #include "limits.hpp"
 #include "surplus.hpp"
@@ -179,8 +180,9 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
   for (const auto joint : roles.arm) {
     moving.push_back(static_cast<std::uint32_t>(fit_.coordinates().find({Coordinate::Kind::kJoint, joint})));
   }
+  const Eigen::VectorXd encoders = encoder_variance();
   double square = 0.0, weight = 0.0, hand = 0.0, turn = 0.0, found = 0.0, sampled = 0.0, where_seen = 0.0,
-         sampled_seen = 0.0;
+         sampled_seen = 0.0, of_encoders = 0.0;
   std::vector<MotionEvidence> motions;
   auto& measurement = fit_.measurement();
   for (std::size_t p = 0; p < log.base.size(); ++p) {
@@ -197,6 +199,7 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
     const double own = out.rms_px * out.rms_px * evidence.weight;
     square += own;
     weight += evidence.weight;
+    of_encoders += evidence.A.diagonal().dot(encoders);
     const auto& picture = fit_.log().pictures()[p];
     motions.push_back(
         {picture.joints.utime, picture.camera, evidence.A(moving, moving), b(moving), own, log.precision[p]});
@@ -209,9 +212,24 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
   }
   if (weight <= 0.0) return {};
   const double pictures = static_cast<double>(motions.size()), rms_px = std::sqrt(square / weight);
-  return {
-      rms_px,          1e3 * std::sqrt(hand / pictures), degrees(std::sqrt(turn / pictures)),
-      found / sampled, where_seen / sampled_seen,        rms_px * std::sqrt(agreed_share(motions, motion_settings()))};
+  return {rms_px,
+          1e3 * std::sqrt(hand / pictures),
+          degrees(std::sqrt(turn / pictures)),
+          found / sampled,
+          where_seen / sampled_seen,
+          rms_px * std::sqrt(agreed_share(motions, motion_settings())),
+          std::sqrt(of_encoders / weight)};
+}
+
+Eigen::VectorXd Findings::encoder_variance() const {
+  const Eigen::VectorXd sd = encoder_noise(fit_.log().encoders());
+  const auto& coordinates = fit_.coordinates();
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(coordinates.size());
+  for (Eigen::Index joint = 0; joint < sd.size(); ++joint) {
+    if (const auto at = coordinates.find({Coordinate::Kind::kJoint, joint}); at >= 0)
+      variance[at] = sd[joint] * sd[joint];
+  }
+  return variance;
 }
 
 AgreedMotionSettings Findings::motion_settings() const {

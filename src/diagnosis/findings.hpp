@@ -42,6 +42,8 @@ class Findings {
   [[nodiscard]] Eigen::VectorXd left_of(const LogAbout& log, std::size_t picture, const Eigen::VectorXd& x,
                                         Remainder& out);
   [[nodiscard]] AgreedMotionSettings motion_settings() const;
+  /// Of a joint's reading, over all coordinates; nothing of the others.
+  [[nodiscard]] Eigen::VectorXd encoder_variance() const;
   void describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
   /// Whether a cause moves less than what matters, all else that was found of its joint together with it. Beside the
   /// final model: when it was taken in, others may have had a part of it that were dropped since.
