@@ -29,7 +29,8 @@ Json json_of(const HeldoutError& e) {
           {"hand_deg", number(e.hand_deg)},
           {"outline_found", number(e.outline_found)},
           {"outline_where_seen", number(e.outline_where_seen)},
-          {"moved_px", number(e.moved_px)}};
+          {"moved_px", number(e.moved_px)},
+          {"encoders_px", number(e.encoders_px)}};
 }
 
 Json json_of(const CauseName& c) {

@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
+#include "agreed_motion.hpp"
 #include "bodyschema/evidence/distributions.hpp"
+#include "encoder_noise.hpp"
 #include "left_over.hpp"
 #include "limits.hpp"
 #include "surplus.hpp"
@@ -49,47 +50,26 @@ Eigen::VectorXd values_of(const ModelSearch& search, const std::vector<Eigen::In
   return values;
 }
 
-/// The motion of what is seen as a whole that would explain what is left, with beliefs so wide that they only keep what
-/// no single picture tells from running off.
+/// How far all that is seen may be shifted and turned as a whole, and one joint be turned, where no picture tells: so
+/// wide that it only keeps what is not told from running off.
+constexpr double kShift_m = 0.02, kTurn_rad = 0.1;
+
+/// Shift and turn of the rig, three each.
+std::vector<std::uint32_t> rig_coordinates(const Coordinates& coordinates) {
+  std::vector<std::uint32_t> list;
+  for (const auto kind : {Coordinate::Kind::kRigShift, Coordinate::Kind::kRigTurn}) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      list.push_back(static_cast<std::uint32_t>(coordinates.find({kind, axis})));
+  }
+  return list;
+}
+
+/// The motion of what is seen as a whole that would explain what is left.
 Eigen::VectorXd motion_of_all(Eigen::MatrixXd A, const Eigen::VectorXd& b, double precision) {
-  constexpr double kShift_m = 0.02, kTurn_rad = 0.1;
   A.diagonal().head<3>().array() += 1.0 / (precision * kShift_m * kShift_m);
   A.diagonal().tail<3>().array() += 1.0 / (precision * kTurn_rad * kTurn_rad);
   return A.ldlt().solve(b);
 }
-
-/// What of the misfit goes if all that is seen may stand elsewhere, as a whole, in every short block of the log: noise
-/// of pixels or of encoders is not alike for its length. Not the longer ones of a log whose blocks err alike: that is
-/// just what is asked for.
-class MotionOfBlocks {
- public:
-  void add(long block, const Eigen::MatrixXd& A, const Eigen::VectorXd& b, double precision) {
-    auto& sum = blocks_[block];
-    if (sum.A.size() == 0) sum = {Eigen::MatrixXd::Zero(A.rows(), A.cols()), Eigen::VectorXd::Zero(b.size()), 0.0, 0.0};
-    sum.A += precision * A;
-    sum.b += precision * b;
-    sum.precision += precision;
-    sum.pictures += 1.0;
-  }
-  /// px^2 times weight, less what the noise alone takes up of so many numbers.
-  [[nodiscard]] double square() const {
-    double result = 0.0;
-    for (const auto& [number, block] : blocks_) {
-      const Eigen::VectorXd motion = motion_of_all(block.A, block.b, 1.0);
-      const double cost = 2.0 * motion.dot(block.b) - motion.dot(block.A * motion);
-      result += (cost - static_cast<double>(motion.size())) * block.pictures / block.precision;
-    }
-    return std::max(0.0, result);
-  }
-
- private:
-  struct Sum {
-    Eigen::MatrixXd A;
-    Eigen::VectorXd b;
-    double precision = 0.0, pictures = 0.0;
-  };
-  std::map<long, Sum> blocks_;
-};
 
 /// How much worse another explanation is, in standard deviations of the difference: on blocks that neither has seen,
 /// and in how far nuisances must depart from what is believed of them for it (log likelihoods that are d apart in the
@@ -168,18 +148,42 @@ void Findings::before(const LogAbout& log) {
   }
 }
 
-HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& base, Which which) {
-  const auto held = base.heldout();
+Eigen::VectorXd Findings::left_of(const LogAbout& log, std::size_t picture, const Eigen::VectorXd& x, Remainder& out) {
+  const auto& evidence = log.at.evidence[picture];
   const auto& coordinates = fit_.coordinates();
   const auto& roles = fit_.log().roles();
-  std::vector<std::uint32_t> rig;
-  for (const auto kind : {Coordinate::Kind::kRigShift, Coordinate::Kind::kRigTurn}) {
-    for (Eigen::Index axis = 0; axis < 3; ++axis)
-      rig.push_back(static_cast<std::uint32_t>(coordinates.find({kind, axis})));
+  Eigen::VectorXd c = Eigen::VectorXd::Zero(coordinates.size());
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    for (const auto& step : log.base[picture][static_cast<std::size_t>(i)]) c[step.coordinate] += x[i] * step.amount;
   }
-  double square = 0.0, weight = 0.0, hand = 0.0, turn = 0.0, pictures = 0.0, found = 0.0, sampled = 0.0,
-         where_seen = 0.0, sampled_seen = 0.0;
-  MotionOfBlocks motions;
+  Eigen::VectorXd b = evidence.b - evidence.A * c;
+  out.rms_px = std::sqrt(std::max(0.0, evidence.square - c.dot(evidence.b + b)) / evidence.weight);
+  double outwards = 0.0, outline = 0.0;
+  for (std::size_t s = 0; s < roles.segments.size(); ++s) {
+    const auto at = coordinates.find({Coordinate::Kind::kDilation, static_cast<Eigen::Index>(s)});
+    outwards += b[at];
+    outline += evidence.A(at, at);
+  }
+  out.mean_px = outline > 0.0 ? outwards / outline : 0.0;
+  for (std::size_t j = 0; j < roles.arm.size(); ++j) {
+    const auto at = coordinates.find({Coordinate::Kind::kJoint, roles.arm[j]});
+    if (evidence.A(at, at) > 0.0) out.apparent_deg[j] = degrees(b[at] / evidence.A(at, at));
+  }
+  return b;
+}
+
+HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& base, Which which) {
+  const auto held = base.heldout();
+  const auto& roles = fit_.log().roles();
+  const auto rig = rig_coordinates(fit_.coordinates());
+  auto moving = rig;
+  for (const auto joint : roles.arm) {
+    moving.push_back(static_cast<std::uint32_t>(fit_.coordinates().find({Coordinate::Kind::kJoint, joint})));
+  }
+  const Eigen::VectorXd encoders = encoder_variance();
+  double square = 0.0, weight = 0.0, hand = 0.0, turn = 0.0, found = 0.0, sampled = 0.0, where_seen = 0.0,
+         sampled_seen = 0.0, of_encoders = 0.0;
+  std::vector<MotionEvidence> motions;
   auto& measurement = fit_.measurement();
   for (std::size_t p = 0; p < log.base.size(); ++p) {
     const auto& evidence = log.at.evidence[p];
@@ -191,43 +195,51 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
     if (log.precision[p] <= 0.0) continue;
     where_seen += evidence.matched;
     sampled_seen += evidence.sampled;
-    const Eigen::VectorXd x = held.replicas.col(static_cast<Eigen::Index>(log.block_of[p]));
-    Eigen::VectorXd c = Eigen::VectorXd::Zero(coordinates.size());
-    for (Eigen::Index i = 0; i < x.size(); ++i) {
-      for (const auto& step : log.base[p][static_cast<std::size_t>(i)]) c[step.coordinate] += x[i] * step.amount;
-    }
-    const Eigen::VectorXd b = evidence.b - evidence.A * c;
-    const double own = std::max(0.0, evidence.square - c.dot(evidence.b + b));
-    out.rms_px = std::sqrt(own / evidence.weight);
+    const Eigen::VectorXd b = left_of(log, p, held.replicas.col(static_cast<Eigen::Index>(log.block_of[p])), out);
+    const double own = out.rms_px * out.rms_px * evidence.weight;
     square += own;
     weight += evidence.weight;
-    double outwards = 0.0, outline = 0.0;
-    for (std::size_t s = 0; s < roles.segments.size(); ++s) {
-      const auto at = coordinates.find({Coordinate::Kind::kDilation, static_cast<Eigen::Index>(s)});
-      outwards += b[at];
-      outline += evidence.A(at, at);
-    }
-    out.mean_px = outline > 0.0 ? outwards / outline : 0.0;
-    for (std::size_t j = 0; j < roles.arm.size(); ++j) {
-      const auto at = coordinates.find({Coordinate::Kind::kJoint, roles.arm[j]});
-      if (evidence.A(at, at) > 0.0) out.apparent_deg[j] = degrees(b[at] / evidence.A(at, at));
-    }
-    const Eigen::VectorXd motion = motion_of_all(evidence.A(rig, rig), b(rig), log.precision[p]);
-    motions.add(static_cast<long>(report_.samples[p].time_s / options_.block_s), evidence.A(rig, rig), b(rig),
-                log.precision[p]);
+    of_encoders += evidence.A.diagonal().dot(encoders);
     const auto& picture = fit_.log().pictures()[p];
+    motions.push_back(
+        {picture.joints.utime, picture.camera, evidence.A(moving, moving), b(moving), own, log.precision[p]});
     const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera, rig,
                                                     measurement.projection().hand_link());
-    const Eigen::VectorXd moved = jacobian * motion;
+    const Eigen::VectorXd moved = jacobian * motion_of_all(evidence.A(rig, rig), b(rig), log.precision[p]);
     out.hand_C_m = measurement.projection().hand().translation();
     hand += moved.head<3>().squaredNorm();
     turn += moved.tail<3>().squaredNorm();
-    pictures += 1.0;
   }
-  if (weight <= 0.0 || pictures <= 0.0) return {};
-  return {std::sqrt(square / weight),          1e3 * std::sqrt(hand / pictures),
-          degrees(std::sqrt(turn / pictures)), found / sampled,
-          where_seen / sampled_seen,           std::sqrt(motions.square() / weight)};
+  if (weight <= 0.0) return {};
+  const double pictures = static_cast<double>(motions.size()), rms_px = std::sqrt(square / weight);
+  return {rms_px,
+          1e3 * std::sqrt(hand / pictures),
+          degrees(std::sqrt(turn / pictures)),
+          found / sampled,
+          where_seen / sampled_seen,
+          rms_px * std::sqrt(agreed_share(motions, motion_settings())),
+          std::sqrt(of_encoders / weight)};
+}
+
+Eigen::VectorXd Findings::encoder_variance() const {
+  const Eigen::VectorXd sd = encoder_noise(fit_.log().encoders());
+  const auto& coordinates = fit_.coordinates();
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(coordinates.size());
+  for (Eigen::Index joint = 0; joint < sd.size(); ++joint) {
+    if (const auto at = coordinates.find({Coordinate::Kind::kJoint, joint}); at >= 0)
+      variance[at] = sd[joint] * sd[joint];
+  }
+  return variance;
+}
+
+AgreedMotionSettings Findings::motion_settings() const {
+  AgreedMotionSettings settings;
+  settings.sd.resize(6 + static_cast<Eigen::Index>(fit_.log().roles().arm.size()));
+  settings.sd.head<3>().setConstant(kShift_m);
+  settings.sd.tail(settings.sd.size() - 3).setConstant(kTurn_rad);
+  settings.longest_us = microseconds(options_.block_s);
+  settings.level = options_.level;
+  return settings;
 }
 
 void Findings::name_causes(const LogAbout& log, const std::vector<Candidate>& candidates) {

@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "agreed_motion.hpp"
 #include "bodyschema/diagnosis/diagnoser.hpp"
 #include "candidates.hpp"
 #include "model_search.hpp"
@@ -37,6 +38,12 @@ class Findings {
   void describe_log(const LogAbout& log);
   /// What is left of every picture, predicted from the other blocks.
   HeldoutError remainders(const LogAbout& log, const BlockRegression& base, Which which);
+  /// ... of one. @param x  the base's parameters (steps) @return the gradient over all coordinates
+  [[nodiscard]] Eigen::VectorXd left_of(const LogAbout& log, std::size_t picture, const Eigen::VectorXd& x,
+                                        Remainder& out);
+  [[nodiscard]] AgreedMotionSettings motion_settings() const;
+  /// Of a joint's reading, over all coordinates; nothing of the others.
+  [[nodiscard]] Eigen::VectorXd encoder_variance() const;
   void describe_causes(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
   /// Whether a cause moves less than what matters, all else that was found of its joint together with it. Beside the
   /// final model: when it was taken in, others may have had a part of it that were dropped since.

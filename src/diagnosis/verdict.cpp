@@ -57,6 +57,23 @@ std::string direction_of(const DiagnosedParameter& p, const CauseName& cause, co
   return "";
 }
 
+/// What stands out and would move the hand by what matters, but outlines by less than any picture places them: meshes
+/// that are larger by as much as the focal length is longer. Nothing says whether it is there, nor that it is not.
+std::string hardly_seen(const DiagnosisReport& report) {
+  double hand_mm = 0.0, outline_px = 0.0;
+  for (const auto& cause : report.small_causes) {
+    if (cause.hand_mm < report.matters_mm) continue;
+    hand_mm = std::max(hand_mm, cause.hand_mm);
+    outline_px = std::max(outline_px, cause.outline_px);
+  }
+  if (hand_mm <= 0.0) return "";
+  return fmt::format(
+      "This log does not tell whether the model is right: what it asks for moves outlines by {:.2g} px, which is less "
+      "than "
+      "any picture places them, but the hand by {:.2g} mm.",
+      outline_px, hand_mm);
+}
+
 /// Why no answer of this report is to be trusted; empty: it is.
 std::string why_not(const DiagnosisReport& report) {
   const auto& causes = report.causes;
@@ -86,11 +103,15 @@ std::string why_not(const DiagnosisReport& report) {
         report.left_px, report.rough_px);
   }
   const auto& after = report.after;
-  const double still_px = std::sqrt(std::max(0.0, after.rms_px * after.rms_px - after.moved_px * after.moved_px));
+  const double moved = std::max(0.0, after.moved_px * after.moved_px - after.encoders_px * after.encoders_px);
+  const double still_px = std::sqrt(std::max(0.0, after.rms_px * after.rms_px - moved));
   if (after.rms_px > limits::kNoiseRatio * still_px) {
     return fmt::format(
-        "The model does not explain what is seen: outlines lie off by {:.2f} px, but by {:.2f} px if the robot "
-        "may stand elsewhere in every part of the log. Something moves it that no known cause describes.",
+        "The model does not explain what is seen: outlines lie off by {:.2f} px, and only {:.2f} px of that is noise "
+        "of "
+        "single pictures and encoders. In the rest pictures agree that the arm stood elsewhere from instant to "
+        "instant: "
+        "something moves it that no known cause describes.",
         after.rms_px, still_px);
   }
   if (causes.empty() && report.noise_px > 0.0 && report.left_px > limits::kNoiseRatio * report.noise_px) {
@@ -99,6 +120,7 @@ std::string why_not(const DiagnosisReport& report) {
         "px, and but {:.2f} px of that differ from one part of the log to another.",
         report.left_px, report.noise_px);
   }
+  if (causes.empty()) return hardly_seen(report);
   return "";
 }
 
@@ -171,7 +193,8 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles, const std::v
   if (!why.empty()) {
     report.verdict = "unexplained";
     report.sentence = why;
-    if (!list.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + list + ".";
+    const auto& nearest = list.empty() ? small : list;
+    if (!nearest.empty()) report.sentence += " What comes nearest, and may only stand in for it: " + nearest + ".";
     return;
   }
   const auto taken_up =

@@ -57,6 +57,15 @@ TEST(HiddenFault, AWobbleThatFollowsNothingIsNeverNone) {
   EXPECT_LT(healthy.after.moved_px, 0.5 * report.before.moved_px);
 }
 
+/// Within a second it goes to and fro, so that no second has an offset of its own.
+TEST(HiddenFault, WhatSwaysFasterThanABlockIsNeverNone) {
+  for (const char* fault :
+       {"wobble:joint=r_wrist_pitch,period=0.83,value=2.5", "acceleration_lag:joint=r_wrist_pitch,value=2"}) {
+    const auto report = answer({fault});
+    EXPECT_EQ(report.verdict, "unexplained") << fault << ": " << report.sentence;
+  }
+}
+
 TEST(HiddenFault, AThickerCoverIsNamedByItsPart) {
   const auto report = answer({"cover_dilation:part=forearm,value=2"});
   EXPECT_TRUE(test::is_named(report)) << report.sentence;

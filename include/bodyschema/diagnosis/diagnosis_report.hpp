@@ -73,9 +73,10 @@ struct HeldoutError {
   /// part alone. 1 where the source knows which point belongs to which.
   double outline_found = 1.0;
   double outline_where_seen = 1.0;  ///< the same in those pictures where enough of it was found to count
-  /// The part of `rms_px` (in squares) that goes where all that is seen may stand elsewhere in every block of the log:
-  /// something moves the robot that the model lacks.
+  /// The part of `rms_px` (in squares) by which pictures agree two by two that the arm stood elsewhere: something moves
+  /// it that the model lacks, and no noise of pixels.
   double moved_px = 0.0;
+  double encoders_px = 0.0;  ///< what of that the encoders' own noise and steps make at most
 };
 
 /// One bar of the chart of all candidates: the largest |z| of it.

@@ -1,0 +1,54 @@
+#include "encoder_noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace bodyschema::diagnosis {
+namespace {
+
+/// Fourth differences of slower readings hold motion: one of 1 rad in 1 s leaves less than 0.02 deg at 20 Hz.
+constexpr double kSlowest_s = 0.05;
+constexpr std::size_t kFewest = 50;
+constexpr double kOfFourth = 8.3666;   ///< sqrt(70): fourth differences of white noise over its standard deviation
+constexpr double kMostShare = 0.9;     ///< of the differences: the rest may be lost or stalled readings
+constexpr double kMostNormal = 1.645;  ///< ... which lie within so many standard deviations
+constexpr double kStepShare = 0.05;    ///< of the changes: so many are of a single step, or smaller than any noise
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+double median_period(std::span<const JointSample> encoders) {
+  std::vector<double> periods;
+  for (std::size_t i = 1; i < encoders.size(); ++i)
+    periods.push_back(seconds(encoders[i].utime - encoders[i - 1].utime));
+  return quantile(std::move(periods), 0.5);
+}
+
+}  // namespace
+
+Eigen::VectorXd encoder_noise(std::span<const JointSample> encoders) {
+  if (encoders.empty()) return {};
+  Eigen::VectorXd noise = Eigen::VectorXd::Zero(encoders.front().q.size());
+  if (encoders.size() < kFewest || median_period(encoders) > kSlowest_s) return noise;
+  for (Eigen::Index j = 0; j < noise.size(); ++j) {
+    std::vector<double> fourth, changes;
+    for (std::size_t i = 1; i < encoders.size(); ++i) {
+      const double change = std::abs(encoders[i].q[j] - encoders[i - 1].q[j]);
+      if (change > 0.0) changes.push_back(change);
+      if (i < 4) continue;
+      fourth.push_back(std::abs(encoders[i].q[j] - 4.0 * encoders[i - 1].q[j] + 6.0 * encoders[i - 2].q[j] -
+                                4.0 * encoders[i - 3].q[j] + encoders[i - 4].q[j]));
+    }
+    // A reading is off by up to half a step, also while it does not change.
+    const double step = quantile(std::move(changes), kStepShare) / std::sqrt(12.0);
+    noise[j] = std::max(step, quantile(std::move(fourth), kMostShare) / kMostNormal / kOfFourth);
+  }
+  return noise;
+}
+
+}  // namespace bodyschema::diagnosis

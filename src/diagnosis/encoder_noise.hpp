@@ -1,0 +1,15 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+#include "bodyschema/observation/observation.hpp"
+
+namespace bodyschema::diagnosis {
+
+/// How far single readings of each joint's encoder err, rad (standard deviation): their noise and their steps, told
+/// from how readings that follow each other differ beyond any motion of a robot. 0 where readings come too seldom to
+/// tell.
+Eigen::VectorXd encoder_noise(std::span<const JointSample> encoders);
+
+}  // namespace bodyschema::diagnosis
