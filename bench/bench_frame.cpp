@@ -1,7 +1,7 @@
 // Cost of one whole frame: masks, particles, likelihoods, refinement. Our own robot (8k triangles), or both arms of a
 // G1 (200k; where BODYSCHEMA_DATA has it), in a simulated room. Names read `engine/mode/triangles/size/particles`;
-// `+ahead`: the next frame's masks are found meanwhile; `played`: a whole reach to and fro, with the frames in which the arm
-// is found. See README.md.
+// `+ahead`: the next frame's masks are found meanwhile; `played`: a whole reach to and fro, with the frames in which
+// the arm is found. See README.md.
 
 #include <benchmark/benchmark.h>
 
@@ -142,8 +142,8 @@ void whole_frame(benchmark::State& state, const Robot& robot, const std::string&
       benchmark::Counter(static_cast<double>(particles), benchmark::Counter::kIsIterationInvariantRate);
 }
 
-/// A reach played to and fro, background and all, as bench_latency does it, without an end: every frame comes later than
-/// the one before, with the encoder samples in between.
+/// A reach played to and fro, background and all, as bench_latency does it, without an end: every frame comes later
+/// than the one before, with the encoder samples in between.
 class ToAndFro {
  public:
   explicit ToAndFro(const Reach& reach) : samples_(reach.encoders) {
@@ -208,8 +208,8 @@ double quantile(const std::vector<double>& sorted, double share) {
   return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
-/// Every frame of a reach that is played, the first ones too; an iteration is all of it. The processor time of all threads
-/// until the estimate is out, which other programs on the machine change least.
+/// Every frame of a reach that is played, the first ones too; an iteration is all of it. The processor time of all
+/// threads until the estimate is out, which other programs on the machine change least.
 void played(benchmark::State& state, const Robot& robot, Size size, int particles) {
   constexpr int kLaps = 4;
   std::vector<double> until_out_ms, all_ms;
@@ -224,13 +224,6 @@ void played(benchmark::State& state, const Robot& robot, Size size, int particle
           observation, nullptr, [&](const Estimate&) { until_out_ms.push_back(processor_ms() - begin_ms); });
       all_ms.push_back(processor_ms() - begin_ms);
       converged += estimate.state == EstimatorState::kConverged;
-      if (std::getenv("BODYSCHEMA_BENCH_TRACE") != nullptr) {
-        const auto& t = estimate.times;
-        std::fprintf(stderr, "%zu %s %s cpu %.1f mask %.1f kin %.1f sc %.1f ref %.1f post %zu changed '%s'\n", i,
-                     to_string(estimate.state), to_string(estimate.verdict), until_out_ms.back(),
-                     pipeline.segmentation_ms(), t.kinematics_ms, t.scoring_ms, t.refinement_ms, estimate.postures,
-                     estimate.changed.c_str());
-      }
     }
   }
   std::sort(until_out_ms.begin(), until_out_ms.end());

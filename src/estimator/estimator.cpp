@@ -137,9 +137,9 @@ struct Estimator::Impl {
         scorer(model, silhouette_model(*robot, setup), particles_only() ? nullptr : &outlines, rig.intrinsics(),
                options.silhouette, options.filter.particles),
         filter(joints, options.filter), memory(memory_layout(model.state(), considered), options.memory),
-        fitter(model, scorer, options, rig.cameras.size(), search_renders(options, outlines, rig.intrinsics())),
-        occlusion(model, scorer, rig, setup.hand_link),
-        state(model.state().prior_mean()), in_frame(memory.estimate()), stalled(joints) {
+        fitter(model, scorer, options, rig.cameras.size(), search_renders(options, rig.intrinsics())),
+        occlusion(model, scorer, rig, setup.hand_link), state(model.state().prior_mean()), in_frame(memory.estimate()),
+        stalled(joints) {
     first_guesses = filter.states();
     cloud_covariance = filter.covariance();
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
@@ -960,12 +960,12 @@ struct Estimator::Impl {
   struct EyeSearch {
     StartSearch as_they_are, exchanged;
   };
-  std::optional<EyeSearch> eyes;      ///< goes on with the next frame
-  std::optional<bool> found_swapped;  ///< by the last search for whose pictures these are
-  std::optional<StartSearch> lost;    ///< for an arm of which nothing is known; goes on with the next frame
+  std::optional<EyeSearch> eyes;          ///< goes on with the next frame
+  std::optional<bool> found_swapped;      ///< by the last search for whose pictures these are
+  std::optional<StartSearch> lost;        ///< for an arm of which nothing is known; goes on with the next frame
   std::optional<ExplanationRound> round;  ///< goes on with the next frame
   double round_since_s = 0.0;
-  bool unexplained = false;               ///< the pictures before, by all that was tried
+  bool unexplained = false;  ///< the pictures before, by all that was tried
   StalledEncoders stalled;
   Eigen::VectorXd reading;           ///< encoders of the estimated joints
   Eigen::MatrixXd cloud_covariance;  ///< of the particles as they were last weighed

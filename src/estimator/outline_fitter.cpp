@@ -19,7 +19,7 @@ constexpr int kMostRendersOfStart = static_cast<int>(std::size(kWide_px)) + limi
 OutlineFitter::OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const EstimatorOptions& options,
                              std::size_t cameras, int search_renders)
     : model_(model), scorer_(scorer), options_(options), noise_(cameras, OutlineNoise(options.noise)),
-      search_renders_(std::max(search_renders, kMostRendersOfStart)) {}
+      search_renders_(std::max(search_renders, 2 * kMostRendersOfStart)) {}
 
 std::vector<OutlineSearch> OutlineFitter::searches(double search_px, bool last, bool without_odd) const {
   std::vector<OutlineSearch> list;

@@ -32,16 +32,17 @@ struct OutlineFit {
 /// next pictures show as well.
 struct StartSearch {
   std::vector<Eigen::VectorXd> starts;
-  std::size_t next = 0;    ///< of these to be followed
-  double least = 2.0;      ///< Hammoude distance of the best, in the picture in which it was found
-  Eigen::VectorXd best;    ///< empty: none yet
+  std::size_t next = 0;           ///< of these to be followed
+  double least = 2.0;             ///< Hammoude distance of the best, in the picture in which it was found
+  Eigen::VectorXd best;           ///< empty: none yet
   std::optional<OutlineFit> fit;  ///< of the best; nothing: it was found in an earlier picture
 };
 
 /// Moves states onto a frame's observed outline by Gauss-Newton, held by what a memory knows. One thread.
 class OutlineFitter {
  public:
-  /// @param search_renders  how often searches may look at one frame anew; at least one start is followed whatever it is
+  /// @param search_renders  how often searches may look at one frame anew; at least two starts can be followed whatever
+  ///   it is: one in a search, and one beside it
   OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const EstimatorOptions& options, std::size_t cameras,
                 int search_renders);
 

@@ -3,16 +3,13 @@
 #include <span>
 
 #include "bodyschema/estimator/estimator_options.hpp"
-#include "bodyschema/silhouette/silhouette_scorer.hpp"
+#include "bodyschema/geometry/pinhole.hpp"
 
 namespace bodyschema {
 
-/// How often the searches of one frame may draw outlines and look for them in the pictures of all cameras: as configured,
-/// or as often as costs what they cost with a light robot in small pictures, where all of a search is done at once. By
-/// what is drawn, not by the clock: the same on every machine.
-/// @param outlines  what is drawn
-/// @param cameras  of the full pictures
-int search_renders(const EstimatorOptions& options, const SilhouetteModel& outlines,
-                   std::span<const PinholeIntrinsics> cameras);
+/// How often the searches of one frame may draw outlines and look for them in its pictures: as configured, or by the
+/// pixels of all cameras. What a frame costs besides grows with these, and what it leaves of its time shrinks. Not by
+/// the clock: a replay finds what was found live, on every machine.
+int search_renders(const EstimatorOptions& options, std::span<const PinholeIntrinsics> cameras);
 
 }  // namespace bodyschema
