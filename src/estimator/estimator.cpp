@@ -491,7 +491,9 @@ struct Estimator::Impl {
       round_since_s = now_s;
       round->hypotheses = hypotheses(fit);
     }
-    const bool through = go_on(*round, memory, fit, now_s, frame, fitter);
+    // There is no hurry where the frame agrees and the memory is only young.
+    const int room = verdict == FrameVerdict::kAgrees && !eyes ? 1 : 0;
+    const bool through = go_on(*round, memory, fit, now_s, frame, fitter, room);
     if (through) {
       auto better = std::move(round->best);
       round.reset();

@@ -41,7 +41,7 @@ bool explains(const Hypothesis& hypothesis, bool anew, const OutlineFit& fit, co
 }  // namespace
 
 bool go_on(ExplanationRound& round, const PostureMemory& known, const OutlineFit& held, double time_s,
-           const Frame& frame, OutlineFitter& fitter) {
+           const Frame& frame, OutlineFitter& fitter, int room) {
   bool best_is_of_frame = false;
   for (; round.at < round.hypotheses.size(); ++round.at, round.search = {}) {
     const Hypothesis& hypothesis = round.hypotheses[round.at];
@@ -49,10 +49,10 @@ bool go_on(ExplanationRound& round, const PostureMemory& known, const OutlineFit
     OutlineFit fit;
     if (hypothesis.starts.size() > 1) {
       if (round.search.starts.empty()) round.search.starts = hypothesis.starts;
-      if (!fitter.go_on(frame, memory, round.search)) return false;
+      if (!fitter.go_on(frame, memory, round.search, room)) return false;
       fit = fitter.found(frame, memory, round.search);
     } else if (!hypothesis.starts.empty()) {
-      if (!fitter.may_follow()) return false;
+      if (!fitter.may_follow(room)) return false;
       fit = fitter.follow_from(frame, hypothesis.starts.front(), memory);
     } else {
       fit = fitter.follow(frame, memory);

@@ -44,8 +44,9 @@ struct ExplanationRound {
 /// to explain this frame too; there may be none. `scorer` must have the frame.
 /// @param known  what is remembered
 /// @param held  the fit of the frame that it held
+/// @param room  starts that a frame is to leave out
 /// @return whether it is through
 bool go_on(ExplanationRound& round, const PostureMemory& known, const OutlineFit& held, double time_s,
-           const Frame& frame, OutlineFitter& fitter);
+           const Frame& frame, OutlineFitter& fitter, int room);
 
 }  // namespace bodyschema
