@@ -1,11 +1,14 @@
 // Cost of one whole frame: masks, particles, likelihoods, refinement. Our own robot (8k triangles), or both arms of a
 // G1 (200k; where BODYSCHEMA_DATA has it), in a simulated room. Names read `engine/mode/triangles/size/particles`;
-// `+ahead`: the next frame's masks are found meanwhile. See README.md.
+// `+ahead`: the next frame's masks are found meanwhile; `played`: a whole reach to and fro, with the frames in which
+// the arm is found. See README.md.
 
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <map>
 #include <memory>
 #include <string>
@@ -61,6 +64,7 @@ Configuration configuration(const Robot& robot, const std::string& engine, const
 struct Reach {
   std::vector<Observation> background;
   std::vector<Observation> motion;
+  std::vector<JointSample> encoders;
 };
 
 const Reach& reach(const Robot& robot, Size size) {
@@ -80,7 +84,7 @@ const Reach& reach(const Robot& robot, Size size) {
     const StereoRig rig = StereoRig::from(c.section("cameras"));
     simulator::Simulator simulator(load_robot(setup, rig), setup, rig, settings, plan);
     Reach result;
-    std::vector<JointSample> history;
+    auto& history = result.encoders;
     while (auto frame = simulator.next()) {
       history.insert(history.end(), frame->encoders.begin(), frame->encoders.end());
       auto& list = frame->phase == simulator::Phase::kMotion ? result.motion : result.background;
@@ -138,6 +142,100 @@ void whole_frame(benchmark::State& state, const Robot& robot, const std::string&
       benchmark::Counter(static_cast<double>(particles), benchmark::Counter::kIsIterationInvariantRate);
 }
 
+/// A reach played to and fro, background and all, as bench_latency does it, without an end: every frame comes later
+/// than the one before, with the encoder samples in between.
+class ToAndFro {
+ public:
+  explicit ToAndFro(const Reach& reach) : samples_(reach.encoders) {
+    for (const auto* phase : {&reach.background, &reach.motion}) {
+      for (const auto& observation : *phase) frames_.push_back(&observation);
+    }
+    first_us_ = std::min(frames_.front()->utime, samples_.front().utime);
+    length_us_ = std::max(frames_.back()->utime, samples_.back().utime) - first_us_;
+  }
+  [[nodiscard]] std::size_t frames() const { return frames_.size(); }
+
+  Observation next() {
+    if (at_ == frames_.size()) {
+      at_ = 0;
+      sample_ = 0;
+      forwards_ = !forwards_;
+      begin_us_ += length_us_ + kBetweenLaps_us;
+    }
+    Observation observation = *frames_[forwards_ ? at_ : frames_.size() - 1 - at_];
+    ++at_;
+    observation.utime = moved(observation.utime);
+    observation.encoders.clear();
+    observation.encoders_begin_anew = false;
+    for (auto& camera : observation.cameras) {
+      if (!camera) continue;
+      camera->utime = moved(camera->utime);
+      turn(camera->joints);
+    }
+    for (; sample_ < samples_.size(); ++sample_) {
+      JointSample sample = samples_[forwards_ ? sample_ : samples_.size() - 1 - sample_];
+      turn(sample);
+      if (sample.utime > observation.utime + kBetweenLaps_us) break;
+      observation.encoders.push_back(std::move(sample));
+    }
+    return observation;
+  }
+
+ private:
+  static constexpr Microseconds kBetweenLaps_us = 10'000;
+  [[nodiscard]] Microseconds moved(Microseconds stamp) const {
+    return begin_us_ + (forwards_ ? stamp - first_us_ : length_us_ - (stamp - first_us_));
+  }
+  void turn(JointSample& sample) const {
+    sample.utime = moved(sample.utime);
+    if (!forwards_) sample.qdot = -sample.qdot;
+  }
+
+  std::vector<const Observation*> frames_;
+  const std::vector<JointSample>& samples_;
+  Microseconds first_us_ = 0, length_us_ = 0, begin_us_ = 1'000'000;
+  std::size_t at_ = 0, sample_ = 0;
+  bool forwards_ = true;
+};
+
+double processor_ms() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
+}
+
+double quantile(const std::vector<double>& sorted, double share) {
+  return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+}
+
+/// Every frame of a reach that is played, the first ones too; an iteration is all of it. The processor time of all
+/// threads until the estimate is out, which other programs on the machine change least.
+void played(benchmark::State& state, const Robot& robot, Size size, int particles) {
+  constexpr int kLaps = 4;
+  std::vector<double> until_out_ms, all_ms;
+  std::size_t converged = 0;
+  for (auto _ : state) {
+    Pipeline pipeline(configuration(robot, "contour", "best", size, particles));
+    ToAndFro frames(reach(robot, size));
+    for (std::size_t i = 0; i < kLaps * frames.frames(); ++i) {
+      Observation observation = frames.next();
+      const double begin_ms = processor_ms();
+      const Estimate estimate = pipeline.process(
+          observation, nullptr, [&](const Estimate&) { until_out_ms.push_back(processor_ms() - begin_ms); });
+      all_ms.push_back(processor_ms() - begin_ms);
+      converged += estimate.state == EstimatorState::kConverged;
+    }
+  }
+  std::sort(until_out_ms.begin(), until_out_ms.end());
+  std::sort(all_ms.begin(), all_ms.end());
+  state.counters["median_ms"] = quantile(until_out_ms, 0.5);
+  state.counters["p99_ms"] = quantile(until_out_ms, 0.99);
+  state.counters["max_ms"] = until_out_ms.back();
+  state.counters["all_median_ms"] = quantile(all_ms, 0.5);
+  state.counters["all_p99_ms"] = quantile(all_ms, 0.99);
+  state.counters["converged"] = static_cast<double>(converged) / static_cast<double>(all_ms.size());
+}
+
 /// Both pictures of a frame out of their messages.
 void jpeg(benchmark::State& state, Size size) {
   const auto& cameras = reach(kOurs, size).motion.front().cameras;
@@ -150,6 +248,15 @@ void jpeg(benchmark::State& state, Size size) {
       if (!unpack(view, out).ok()) return state.SkipWithError("a JPEG did not decode");
     }
   }
+}
+
+void add_played(const Robot& robot, Size size, int particles) {
+  benchmark::RegisterBenchmark(
+      ("played/contour/" + robot.triangles + "/" + size.text() + "/" + std::to_string(particles)).c_str(),
+      [=, &robot](benchmark::State& state) { played(state, robot, size, particles); })
+      ->Iterations(1)
+      ->MeasureProcessCPUTime()
+      ->Unit(benchmark::kMillisecond);
 }
 
 void register_all() {
@@ -182,9 +289,11 @@ void register_all() {
       }
     }
   }
+  for (const Size size : {Size{320, 240}, Size{1280, 720}}) add_played(kOurs, size, 200);
   const char* data = std::getenv("BODYSCHEMA_DATA");
   if (data == nullptr || !std::filesystem::exists(std::filesystem::path(data) / "real/robots/g1")) return;
   for (const Size size : {Size{320, 240}, Size{640, 480}, Size{1280, 720}}) add(kG1, "contour", "best", size, 200);
+  for (const Size size : {Size{320, 240}, Size{1280, 720}}) add_played(kG1, size, 200);
 }
 
 }  // namespace

@@ -23,6 +23,7 @@
 #include "limits.hpp"
 #include "occlusion.hpp"
 #include "outline_fitter.hpp"
+#include "search_renders.hpp"
 #include "stalled_encoders.hpp"
 
 namespace bodyschema {
@@ -44,13 +45,21 @@ ErrorModel without_offsets(const ErrorModel& known) {
   return model;
 }
 
-/// Both eyes, each with what the other one saw of the robot.
-Observation with_eyes_exchanged(Observation observation) {
-  CameraObservation &one = *observation.cameras[0], &other = *observation.cameras[1];
-  std::swap(one.mask, other.mask);
-  std::swap(one.valid, other.valid);
-  std::swap(one.coverage, other.coverage);
-  return observation;
+/// Both eyes, each with what the other one saw of the robot; without the pictures.
+Observation with_eyes_exchanged(const Observation& observation) {
+  Observation result;
+  result.utime = observation.utime;
+  result.cameras.resize(2);
+  for (std::size_t c = 0; c < 2; ++c) {
+    const CameraObservation &own = *observation.cameras[c], &other = *observation.cameras[1 - c];
+    auto& seen = result.cameras[c].emplace();
+    seen.utime = own.utime;
+    seen.joints = own.joints;
+    seen.mask = other.mask;
+    seen.valid = other.valid;
+    seen.coverage = other.coverage;
+  }
+  return result;
 }
 
 /// Smallest first.
@@ -128,8 +137,9 @@ struct Estimator::Impl {
         scorer(model, silhouette_model(*robot, setup), particles_only() ? nullptr : &outlines, rig.intrinsics(),
                options.silhouette, options.filter.particles),
         filter(joints, options.filter), memory(memory_layout(model.state(), considered), options.memory),
-        fitter(model, scorer, options, rig.cameras.size()), occlusion(model, scorer, rig, setup.hand_link),
-        state(model.state().prior_mean()), in_frame(memory.estimate()), stalled(joints) {
+        fitter(model, scorer, options, rig.cameras.size(), search_renders(options, rig.intrinsics())),
+        occlusion(model, scorer, rig, setup.hand_link), state(model.state().prior_mean()), in_frame(memory.estimate()),
+        stalled(joints) {
     first_guesses = filter.states();
     cloud_covariance = filter.covariance();
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
@@ -148,6 +158,7 @@ struct Estimator::Impl {
     times = {};
     now_s = seconds(observation.utime);
     frame = model.take(observation, state);
+    fitter.begin_frame();
     changed.clear();
     cameras_swapped = contradicted = near = hidden_only = false;
     hidden = {};
@@ -159,10 +170,14 @@ struct Estimator::Impl {
       in_frame = particles_only() ? cloud() : memory.in_posture();
       if (memory.empty()) in_frame.x = state;
       current = EstimatorState::kHandNotInView;
-    } else if (starts_swapped(observation)) {
+      put_off_searches();
+    } else if (const auto swapped = starts_swapped(observation); swapped.value_or(false)) {
       begin_again();
       doubt(state);
       cameras_swapped = true;
+    } else if (!swapped && memory.empty()) {
+      doubt(state);  // until it is known whose pictures these are
+      current = EstimatorState::kConverging;
     } else {
       score_particles();
       if (options.mode == EstimatorMode::kPaper) {
@@ -256,21 +271,44 @@ struct Estimator::Impl {
   }
 
   /// Without one: by how near the arm can be brought to them from the guesses that the search began with, which
-  /// no wrong minimum has led astray.
-  bool starts_swapped(const Observation& observation) {
+  /// no wrong minimum has led astray. Searched for on as many frames as that takes; meanwhile as it was last found, or
+  /// nothing.
+  std::optional<bool> starts_swapped(const Observation& observation) {
     if (particles_only() || eye_order.settled() || !scorer.can_be_exchanged()) return false;
-    const Eigen::VectorXd distances = score_first_guesses();
-    const auto n = static_cast<std::size_t>(distances.size());
     const Observation exchanged = with_eyes_exchanged(observation);
-    scorer.observe(exchanged, frame, options.min_mask_share);
-    const Eigen::VectorXd other_distances = scorer.score(n);
-
-    double as_they_are = distances.minCoeff(), other_distance = other_distances.minCoeff();
-    const bool worth_searches = EyeOrder::worth_searches(as_they_are, other_distance);
-    if (worth_searches) other_distance = nearest_distance(exchanged, other_distances);
+    if (!eyes) {
+      const Eigen::VectorXd distances = score_first_guesses();
+      scorer.observe(exchanged, frame, options.min_mask_share);
+      const Eigen::VectorXd other_distances = scorer.score(static_cast<std::size_t>(distances.size()));
+      if (!EyeOrder::worth_searches(distances.minCoeff(), other_distances.minCoeff())) {
+        scorer.observe(observation, frame, options.min_mask_share);
+        return found_swapped = eye_order.exchanged(distances.minCoeff(), other_distances.minCoeff());
+      }
+      constexpr std::size_t kStarts = 12;  // from three, one arm in 300 that began far off was not found
+      const Eigen::VectorXd rest = model.state().prior_mean();
+      eyes.emplace();
+      eyes->as_they_are.starts = starts_from(first_guesses, distances, rest, kStarts);
+      eyes->exchanged.starts = starts_from(first_guesses, other_distances, rest, kStarts);
+    }
+    // In turn where a frame has not room for both, so that both are searched for in the same pictures, nearly.
+    const bool exchanged_first = eyes->exchanged.next <= eyes->as_they_are.next;
+    bool through = exchanged_first ? search_as(exchanged, eyes->exchanged) : search_as(observation, eyes->as_they_are);
+    through &= exchanged_first ? search_as(observation, eyes->as_they_are) : search_as(exchanged, eyes->exchanged);
     scorer.observe(observation, frame, options.min_mask_share);
-    if (worth_searches) as_they_are = nearest_distance(observation, distances);
-    return eye_order.exchanged(as_they_are, other_distance);
+    if (!through) return found_swapped;
+    found_swapped = eye_order.exchanged(eyes->as_they_are.least, eyes->exchanged.least);
+    eyes.reset();
+    return found_swapped;
+  }
+
+  /// Goes on with one of both searches, in this frame with these pictures.
+  bool search_as(const Observation& shown, StartSearch& search) {
+    scorer.observe(shown, frame, options.min_mask_share);
+    Frame pictures = frame;
+    for (std::size_t c = 0; c < pictures.seen.size(); ++c) pictures.seen[c] = &*shown.cameras[c];
+    // What is known, however little, is looked after in every frame.
+    const int room = memory.empty() ? 0 : 1;
+    return fitter.go_on(pictures, memory.beliefs(), search, room);
   }
 
   /// Distances of the arms that the search began with, in the frame that the scorer has.
@@ -283,16 +321,6 @@ struct Estimator::Impl {
       scorer.place(x, i);
     }
     return scorer.score(n);
-  }
-
-  /// Of the arm that is found from the first guesses, with these distances, in a frame that the scorer has.
-  double nearest_distance(const Observation& observation, const Eigen::VectorXd& distances) {
-    constexpr std::size_t kStarts = 12;  // from three, one arm in 300 that began far off was not found
-    Frame shown = frame;
-    for (std::size_t c = 0; c < shown.seen.size(); ++c) shown.seen[c] = &*observation.cameras[c];
-    const auto fit = fitter.search(shown, starts_from(first_guesses, distances, model.state().prior_mean(), kStarts),
-                                   memory.beliefs());
-    return scorer.distance(fit.x);
   }
 
   // --- mode best: what the frame says, and what may have happened ------------------------------
@@ -324,6 +352,9 @@ struct Estimator::Impl {
       OutlineFit fit = fitter.follow(frame, memory);
       judge(fit);
       if (verdict == FrameVerdict::kAgrees && !young()) {
+        // A change that only some pictures show is searched for on these.
+        if (round && now_s - round_since_s > limits::kPatience_s) round.reset();
+        unexplained = false;
         learn(fit);
       } else {
         explain_frame(observation, std::move(fit));
@@ -449,22 +480,36 @@ struct Estimator::Impl {
   /// The frame contradicts the memory, or the memory is so young that it may be wrong.
   void explain_frame(const Observation& observation, OutlineFit fit) {
     if (verdict != FrameVerdict::kAgrees && turned_swapped(observation)) {
+      put_off_searches();
       doubt(memory.estimate().x);
       cameras_swapped = true;
       return;
     }
-    if (verdict != FrameVerdict::kAgrees && !young()) suspect_slips();
-    auto better = explain(hypotheses(fit), memory, fit, now_s, frame, fitter);
-    if (better) {
-      take(std::move(*better));
-      return;
+    if (!round) {
+      if (verdict != FrameVerdict::kAgrees && !young()) suspect_slips();
+      round.emplace();
+      round_since_s = now_s;
+      round->hypotheses = hypotheses(fit);
+    }
+    // There is no hurry where the frame agrees and the memory is only young.
+    const int room = verdict == FrameVerdict::kAgrees && !eyes ? 1 : 0;
+    const bool through = go_on(*round, memory, fit, now_s, frame, fitter, room);
+    if (through) {
+      auto better = std::move(round->best);
+      round.reset();
+      if (better) {
+        take(std::move(*better));
+        return;
+      }
+      unexplained = true;
     }
     if (verdict == FrameVerdict::kAgrees) {
       learn(fit);
       return;
     }
-    if (take_for_hidden(fit)) return;
-    // Nothing explains it better: the memory stays, the frame is not learned from.
+    // Before all has been tried nothing is taken for hidden, but what was tried in vain on the pictures before.
+    if (unexplained && take_for_hidden(fit)) return;
+    // Nothing explains it better so far: the memory stays, the frame is not learned from.
     if (doubted_since_s < 0.0) doubted_since_s = now_s;
     contradicted = true;
     settle_on(fit);
@@ -529,8 +574,16 @@ struct Estimator::Impl {
     return list;
   }
 
+  /// Pictures that came between say nothing of what was searched for, or all there is to say: it would begin anew.
+  void put_off_searches() {
+    round.reset();
+    lost.reset();
+    unexplained = false;
+  }
+
   /// What happened instead becomes what is known.
   void take(Explanation better) {
+    put_off_searches();
     const auto& released = better.hypothesis.released;
     if (released.size() == 1 && released[0] < joints) {
       const double step = better.fit.x[released[0]] - state[released[0]];
@@ -559,6 +612,7 @@ struct Estimator::Impl {
 
   /// What a few pictures taught is contradicted by all that follow: it was theirs, the next frame is searched.
   void begin_anew() {
+    put_off_searches();
     memory.forget_all();
     fitter.forget_shape();
     keyframes.clear();
@@ -568,7 +622,17 @@ struct Estimator::Impl {
 
   /// Nothing is known: the best of what the particles found becomes the memory if it fits.
   void find_anew() {
-    OutlineFit fit = fitter.search(frame, starts_from(filter.states(), distance, state, 3), memory);
+    if (!lost) {
+      lost.emplace();
+      lost->starts = starts_from(filter.states(), distance, state, 3);
+    }
+    if (!fitter.go_on(frame, memory, *lost)) {
+      doubt(state);
+      current = EstimatorState::kConverging;
+      return;
+    }
+    OutlineFit fit = fitter.found(frame, memory, *lost);
+    lost.reset();
     if (fitter.fits(fit.evidence)) {
       learn(fit);
       return;
@@ -831,12 +895,15 @@ struct Estimator::Impl {
     cloud_covariance = filter.covariance();
     contradicted = false;
     eye_order = {};
+    eyes.reset();
+    found_swapped.reset();
     fitter.forget();
     model.forget();
   }
 
   /// Nothing that was learned holds.
   void begin_again() {
+    put_off_searches();
     filter.reset(Eigen::VectorXd::Zero(joints));
     memory.forget_all();
     fitter.forget_shape();
@@ -892,6 +959,15 @@ struct Estimator::Impl {
   std::string changed;
   Eigen::MatrixXd first_guesses;  ///< of the joint offsets: the first particles
   EyeOrder eye_order;
+  struct EyeSearch {
+    StartSearch as_they_are, exchanged;
+  };
+  std::optional<EyeSearch> eyes;          ///< goes on with the next frame
+  std::optional<bool> found_swapped;      ///< by the last search for whose pictures these are
+  std::optional<StartSearch> lost;        ///< for an arm of which nothing is known; goes on with the next frame
+  std::optional<ExplanationRound> round;  ///< goes on with the next frame
+  double round_since_s = 0.0;
+  bool unexplained = false;  ///< the pictures before, by all that was tried
   StalledEncoders stalled;
   Eigen::VectorXd reading;           ///< encoders of the estimated joints
   Eigen::MatrixXd cloud_covariance;  ///< of the particles as they were last weighed

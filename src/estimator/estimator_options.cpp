@@ -40,6 +40,12 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
   o.refine_outline = best.boolean_or("refine_outline", o.refine_outline);
   o.remember = best.boolean_or("remember", o.remember);
   o.live_diagnosis = best.boolean_or("live_diagnosis", o.live_diagnosis);
+  if (!best.has("search_renders") || best.text("search_renders") == "auto") {
+    o.search_renders = 0;
+    static_cast<void>(best.text_or("search_renders", "auto"));
+  } else {
+    o.search_renders = static_cast<int>(best.integer_or("search_renders", 1, 1, 1'000'000));
+  }
   o.outline_spacing_px = best.number_or("outline_spacing_px", o.outline_spacing_px, 0.5, 100.0);
   o.noise.sd_px = best.number_or("outline_sd_px", o.noise.sd_px, 1e-3, 100.0);
   o.noise.floor_px = best.number_or("outline_floor_px", o.noise.floor_px, 0.0, 100.0);

@@ -11,12 +11,15 @@ namespace {
 
 constexpr double kNear_px[] = {8.0, 5.0};
 constexpr double kWide_px[] = {30.0, 20.0, 14.0, 10.0, 7.0, 5.0};
+/// Each step looks once, the last look may be two.
+constexpr int kMostRendersOfStart = static_cast<int>(std::size(kWide_px)) + limits::kMostSteps + 2;
 
 }  // namespace
 
 OutlineFitter::OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const EstimatorOptions& options,
-                             std::size_t cameras)
-    : model_(model), scorer_(scorer), options_(options), noise_(cameras, OutlineNoise(options.noise)) {}
+                             std::size_t cameras, int search_renders)
+    : model_(model), scorer_(scorer), options_(options), noise_(cameras, OutlineNoise(options.noise)),
+      search_renders_(std::max(search_renders, 2 * kMostRendersOfStart)) {}
 
 std::vector<OutlineSearch> OutlineFitter::searches(double search_px, bool last, bool without_odd) const {
   std::vector<OutlineSearch> list;
@@ -30,6 +33,7 @@ std::vector<OutlineSearch> OutlineFitter::searches(double search_px, bool last, 
 
 void OutlineFitter::look(const Frame& frame, double search_px, bool last, OutlineFit& fit) {
   fit.points.assign(noise_.size(), {});
+  ++renders_;
   model_.linearise(frame, fit.x, searches(search_px, last), last, fit.evidence,
                    [&](std::size_t c, std::span<const OutlinePoint> points) {
                      if (last) fit.points[c].assign(points.begin(), points.end());
@@ -53,6 +57,7 @@ Quadratic OutlineFitter::quadratic_of(const FrameEvidence& evidence, const Eigen
 }
 
 void OutlineFitter::look_twice(const Frame& frame, double search_px, OutlineFit& fit) {
+  ++renders_;
   model_.linearise(frame, fit.x, searches(search_px, true, true), true, fit.seen.evidence,
                    [&](std::size_t c, std::span<const OutlinePoint> points) {
                      if (fit.points.size() != noise_.size()) fit.points.assign(noise_.size(), {});
@@ -107,23 +112,34 @@ OutlineFit OutlineFitter::follow(const Frame& frame, const PostureMemory& memory
 OutlineFit OutlineFitter::follow_from(const Frame& frame, const Eigen::VectorXd& start, const PostureMemory& memory) {
   OutlineFit fit;
   fit.x = start;
+  const int before = renders_;
   // What still moves would claim a place that it has not reached.
   refine(frame, memory, kWide_px, limits::kMostSteps, fit);
+  searched_renders_ += renders_ - before;
   return fit;
 }
 
-OutlineFit OutlineFitter::search(const Frame& frame, std::span<const Eigen::VectorXd> starts,
-                                 const PostureMemory& memory) {
-  OutlineFit best;
-  double least = 2.0;
-  for (const auto& start : starts) {
-    OutlineFit fit = follow_from(frame, start, memory);
+bool OutlineFitter::may_follow(int more) const {
+  return searched_renders_ + (1 + more) * kMostRendersOfStart <= search_renders_;
+}
+
+bool OutlineFitter::go_on(const Frame& frame, const PostureMemory& memory, StartSearch& search, int room) {
+  search.fit.reset();
+  for (; search.next < search.starts.size(); ++search.next) {
+    if (!may_follow(room)) return false;
+    OutlineFit fit = follow_from(frame, search.starts[search.next], memory);
     const double distance = scorer_.distance(fit.x);
-    if (distance >= least) continue;
-    least = distance;
-    best = std::move(fit);
+    if (distance >= search.least) continue;
+    search.least = distance;
+    search.best = fit.x;
+    search.fit = std::move(fit);
   }
-  return best;
+  return true;
+}
+
+OutlineFit OutlineFitter::found(const Frame& frame, const PostureMemory& memory, StartSearch& search) {
+  if (search.fit) return std::move(*search.fit);
+  return follow_from(frame, search.best, memory);
 }
 
 std::optional<Quadratic> OutlineFitter::about(const Frame& frame, const Eigen::VectorXd& x) {

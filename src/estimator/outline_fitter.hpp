@@ -28,17 +28,40 @@ struct OutlineFit {
   double misfit = 0.0;  ///< chi-square: of the outline, and of x against what held it
 };
 
+/// A search from several starts that is carried on from picture to picture. What has been found is a state, which the
+/// next pictures show as well.
+struct StartSearch {
+  std::vector<Eigen::VectorXd> starts;
+  std::size_t next = 0;           ///< of these to be followed
+  double least = 2.0;             ///< Hammoude distance of the best, in the picture in which it was found
+  Eigen::VectorXd best;           ///< empty: none yet
+  std::optional<OutlineFit> fit;  ///< of the best; nothing: it was found in an earlier picture
+};
+
 /// Moves states onto a frame's observed outline by Gauss-Newton, held by what a memory knows. One thread.
 class OutlineFitter {
  public:
-  OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const EstimatorOptions& options, std::size_t cameras);
+  /// @param search_renders  how often searches may look at one frame anew; at least two starts can be followed whatever
+  ///   it is: one in a search, and one beside it
+  OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const EstimatorOptions& options, std::size_t cameras,
+                int search_renders);
 
   /// From where the memory puts the arm to where this frame and the memory together see it.
   OutlineFit follow(const Frame& frame, const PostureMemory& memory);
   /// The same from elsewhere, looking far at first.
   OutlineFit follow_from(const Frame& frame, const Eigen::VectorXd& start, const PostureMemory& memory);
-  /// The best of several starts, by how their silhouettes fit; `scorer` must have the same frame.
-  OutlineFit search(const Frame& frame, std::span<const Eigen::VectorXd> starts, const PostureMemory& memory);
+  /// From here on searches may look at pictures anew as often as one frame allows: counted, not timed, so that a replay
+  /// finds what was found live.
+  void begin_frame() { searched_renders_ = 0; }
+  /// Whether one more start may be followed in this frame, and leaves room for `more` of them.
+  [[nodiscard]] bool may_follow(int more = 0) const;
+  /// Follows starts as far as the frame allows and judges them by how their silhouettes fit; `scorer` must have the
+  /// same frame.
+  /// @param room  as in may_follow
+  /// @return whether all of them have been followed
+  bool go_on(const Frame& frame, const PostureMemory& memory, StartSearch& search, int room = 0);
+  /// What a search that is through has found, in this frame.
+  OutlineFit found(const Frame& frame, const PostureMemory& memory, StartSearch& search);
   /// What a frame says about a state as it is; nothing where its outline does not lie near.
   std::optional<Quadratic> about(const Frame& frame, const Eigen::VectorXd& x);
 
@@ -89,6 +112,9 @@ class OutlineFitter {
   const EstimatorOptions& options_;
   std::vector<OutlineNoise> noise_;  ///< per camera
   std::vector<double> part_weight_;  ///< as OutlineSearch
+  int search_renders_;               ///< at most, in one frame
+  int searched_renders_ = 0;         ///< in this one
+  int renders_ = 0;                  ///< of all that was looked at
   ShapeError shape_;
 };
 

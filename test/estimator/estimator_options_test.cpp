@@ -64,9 +64,10 @@ TEST(EstimatorOptions, WhatAConfigurationLeavesOutIsAsShipped) {
 }
 
 TEST(EstimatorOptions, WhatCannotBeIsAnErrorThatNamesTheKey) {
-  for (const std::string wrong : {"filter.particles=0", "filter.spread_decay=1.5", "estimator.mode=worst",
-                                  "silhouette.threads=-1", "estimator.best.outline_sd_px=0",
-                                  "estimator.best.most_postures=1", "estimator.best.converged_hand_sd_mm=soon"}) {
+  for (const std::string wrong :
+       {"filter.particles=0", "filter.spread_decay=1.5", "estimator.mode=worst", "silhouette.threads=-1",
+        "estimator.best.outline_sd_px=0", "estimator.best.most_postures=1", "estimator.best.converged_hand_sd_mm=soon",
+        "estimator.best.search_renders=0"}) {
     try {
       EstimatorOptions::from(Configuration::load(kShipped, {wrong}));
       ADD_FAILURE() << wrong << " was taken";

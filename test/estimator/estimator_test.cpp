@@ -462,6 +462,59 @@ TEST_F(EstimatorOnOwnRobot, PicturesThatAreExchangedFromTheBeginningAreNoticed) 
   }
 }
 
+// Of large pictures a frame has time for two starts of a search, which goes on with the next pictures: the arm is
+// found, and found again after a slip, some frames later. Nothing false is called converged meanwhile.
+TEST_F(EstimatorOnOwnRobot, SearchesGoOnWithTheNextPictures) {
+  constexpr double kFrames = 60.0;
+  constexpr int kFound = 16, kSlips = 40, kFoundAgain = 8;
+  EXPECT_GE(follow(*std::make_unique<Estimator>(make_estimator()), *reach_, 0, 1, kFrames).postures, 1u);
+  options_.search_renders = 32;
+  for (int joint = 0; joint < 7; ++joint) {
+    SCOPED_TRACE(setup_.estimated_joints[static_cast<std::size_t>(joint)]);
+    Estimator estimator = make_estimator();
+    Eigen::VectorXd slipped = offset_rad_;
+    slipped(joint) += radians(joint % 2 == 0 ? 5.0 : -8.0);
+    SyntheticReach after(robot_, setup_, rig_, slipped);
+    for (int frame = 0; frame < kSlips + 20; ++frame) {
+      SyntheticReach& now = frame < kSlips ? *reach_ : after;
+      const Estimate estimate = estimator.step(seen(now, frame, kFrames));
+      const double error_m = position_error_m(estimate, now.true_hand(pose(frame / kFrames), 0));
+      if (frame == 0) {
+        EXPECT_EQ(estimate.postures, 0u);
+      }
+      if (estimate.state == EstimatorState::kConverged) {
+        EXPECT_LT(error_m, 2e-3) << frame;
+      }
+      if (frame >= kSlips + kFoundAgain || (frame >= kFound && frame < kSlips)) {
+        EXPECT_LT(error_m, 1e-3) << frame;
+      }
+    }
+  }
+}
+
+// The same of pictures that are exchanged from the beginning: said as soon as both orders have been searched for, and
+// from then on without a break.
+TEST_F(EstimatorOnOwnRobot, AnExchangeFromTheBeginningIsNoticedByASearchOverManyFrames) {
+  constexpr double kFrames = 60.0;
+  constexpr int kSearched = 14, kRight = 40;
+  options_.search_renders = 32;
+  Estimator estimator = make_estimator();
+  for (int frame = 0; frame < kRight; ++frame) {
+    const Estimate estimate = estimator.step(exchanged(seen(*reach_, frame, kFrames)));
+    EXPECT_NE(estimate.state, EstimatorState::kConverged) << frame;
+    EXPECT_EQ(estimate.postures, 0u) << frame;
+    if (frame >= kSearched) {
+      EXPECT_TRUE(estimate.cameras_swapped) << frame;
+    }
+  }
+  for (int frame = kRight; frame < 2 * kRight; ++frame) {
+    const Estimate estimate = estimator.step(seen(*reach_, frame, kFrames));
+    if (frame >= kRight + 2 * kSearched) {
+      EXPECT_FALSE(estimate.cameras_swapped) << frame;
+    }
+  }
+}
+
 // Masks that show the room: the head has turned since the background was learned. No arm starts further off than the
 // first guesses allow, and one that is looked for there is soon so near the eye that a frame takes a second.
 TEST_F(EstimatorOnOwnRobot, MasksFullOfBackgroundDoNotLeadAstray) {

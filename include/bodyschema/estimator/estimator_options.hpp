@@ -28,6 +28,7 @@ struct EstimatorOptions {
   double temperature = 0.02;   ///< best: weight = exp(-(d - d_min) / temperature)
   bool refine_outline = true;  ///< best: without it the estimate is one of the particles
   bool remember = true;        ///< best: postures are fused; false: every frame for itself
+  int search_renders = 0;      ///< best: how often searches may look at one frame anew; 0: by the pictures' pixels
   double outline_spacing_px = 3.0;
   OutlineNoise::Prior noise;  ///< best: believed of outlines before any was seen
   MemoryOptions memory;
