@@ -203,7 +203,7 @@ void CoverageEstimator::smooth() {
 }
 
 void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& background, const BinaryMask& sure,
-                                    bool rough) {
+                                    bool rough, bool sharp_colours) {
   const auto channels = static_cast<std::size_t>(image.channels);
   const auto s = static_cast<std::ptrdiff_t>(stride_);
   const auto width = static_cast<float>(image.width - 1);
@@ -264,12 +264,13 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
         static_cast<std::size_t>(pixel.v) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(pixel.u);
     static const float kGain =
         (std::sqrt(kNearDepth) - std::sqrt(kEdgeDepth)) / (std::sqrt(kFarDepth) - std::sqrt(kNearDepth));
+    // Where compression has let colours bleed, what they change by with depth is that, not the robot's shading.
     float change = 0.0f;
     float contrast = 0.0f;
     std::array<float, 3> step{};
     for (std::size_t c = 0; c < channels; ++c) {
       near[c] /= static_cast<float>(near_count);
-      step[c] = far_count == 0 ? 0.0f : kGain * (near[c] - far[c] / static_cast<float>(far_count));
+      step[c] = far_count == 0 || !sharp_colours ? 0.0f : kGain * (near[c] - far[c] / static_cast<float>(far_count));
       const float f = near[c] - background.mean[i * channels + c];
       change += step[c] * step[c];
       contrast += f * f;
@@ -295,7 +296,7 @@ void CoverageEstimator::estimate(const Image& image, const BackgroundModel& back
   if (box_.empty()) return;
   for (int round = 0; round < 2; ++round) {
     smooth();
-    look_inside(image, background, sure, round == 0);
+    look_inside(image, background, sure, round == 0, sharp_colours);
     project(image, background, least_contrast_sigma, sharp_colours);
   }
 

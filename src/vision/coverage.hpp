@@ -47,7 +47,8 @@ class CoverageEstimator {
   void collect_band(const Image& image, const BinaryMask& detected, const BinaryMask& sure);
   void smooth();
   /// Finds F for pixels near the outline. `rough`: the outline may lie too far out.
-  void look_inside(const Image& image, const BackgroundModel& background, const BinaryMask& sure, bool rough);
+  void look_inside(const Image& image, const BackgroundModel& background, const BinaryMask& sure, bool rough,
+                   bool sharp_colours);
   void average_nearby(const Image& image, const BinaryMask& sure, BandPixel& pixel) const;
   void project(const Image& image, const BackgroundModel& background, float least_contrast_sigma, bool sharp_colours);
 
