@@ -12,6 +12,8 @@ namespace {
 
 /// So little of a column's own information left, and rounding says the rest.
 constexpr double kRounding = 1e-9;
+/// A column that lives in one block alone is not known without it: this share of the whole keeps it at zero.
+constexpr double kAlone = 1e-7;
 
 Eigen::MatrixXd symmetric_inverse(const Eigen::MatrixXd& S) {
   return S.ldlt().solve(Eigen::MatrixXd::Identity(S.rows(), S.cols()));
@@ -75,6 +77,42 @@ BlockRegression::BlockRegression(std::vector<BaseBlock> blocks, Eigen::VectorXd 
 }
 
 Scores BlockRegression::score(const AddedColumns& added) const {
+  return std::move(score(std::span(&added, 1)).front());
+}
+
+std::vector<Scores> BlockRegression::score(std::span<const AddedColumns> list) const {
+  std::vector<const AddedColumns*> pointers;
+  for (const auto& added : list) pointers.push_back(&added);
+  return score(std::span<const AddedColumns* const>(pointers));
+}
+
+std::vector<Scores> BlockRegression::score(std::span<const AddedColumns* const> list) const {
+  Eigen::Index columns = 0;
+  for (const auto* added : list) columns += added->size();
+  Eigen::MatrixXd B = Eigen::MatrixXd::Zero(size(), columns);
+  Eigen::Index first = 0;
+  for (const auto* added : list) {
+    for (const auto& own : added->B) B.middleCols(first, added->size()) += own;
+    first += added->size();
+  }
+  // Products of all columns at once: they are most of the work.
+  const Eigen::MatrixXd Y = total_.solve(B);
+  Eigen::MatrixXd quadratic(columns, static_cast<Eigen::Index>(blocks_.size())), HY;
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    HY.noalias() = blocks_[b].H * Y;
+    quadratic.col(static_cast<Eigen::Index>(b)) = Y.cwiseProduct(HY).colwise().sum().transpose();
+  }
+  std::vector<Scores> result;
+  first = 0;
+  for (const auto* added : list) {
+    result.push_back(score(*added, Y.middleCols(first, added->size()), quadratic.middleRows(first, added->size())));
+    first += added->size();
+  }
+  return result;
+}
+
+Scores BlockRegression::score(const AddedColumns& added, const Eigen::MatrixXd& Y,
+                              const Eigen::MatrixXd& quadratic) const {
   const auto k = added.size();
   const auto n = static_cast<Eigen::Index>(blocks_.size());
   Eigen::MatrixXd B = Eigen::MatrixXd::Zero(size(), k), C = Eigen::MatrixXd::Zero(k, k);
@@ -83,7 +121,7 @@ Scores BlockRegression::score(const AddedColumns& added) const {
     C += added.C[b];
   }
   Scores s;
-  s.Y = total_.solve(B);
+  s.Y = Y;
   s.S = C - B.transpose() * s.Y;
   s.u.resize(k, n);
   Eigen::MatrixXd share(k, n);  // of the information
@@ -91,8 +129,7 @@ Scores BlockRegression::score(const AddedColumns& added) const {
     const auto at = static_cast<std::size_t>(b);
     s.u.col(b) = added.d[at] - added.B[at].transpose() * step_ - s.Y.transpose() * left_[at];
     for (Eigen::Index i = 0; i < k; ++i) {
-      const auto y = s.Y.col(i);
-      share(i, b) = added.C[at](i, i) - 2.0 * y.dot(added.B[at].col(i)) + y.dot(blocks_[at].H * y);
+      share(i, b) = added.C[at](i, i) - 2.0 * s.Y.col(i).dot(added.B[at].col(i)) + quadratic(i, b);
     }
   }
   s.beliefs = -s.Y.transpose() * precision_.cwiseSqrt().asDiagonal();
@@ -112,41 +149,67 @@ Scores BlockRegression::score(const AddedColumns& added) const {
   return s;
 }
 
+const std::vector<BlockRegression::Rest>& BlockRegression::rests() const {
+  if (!rests_.empty()) return rests_;
+  Eigen::MatrixXd total = H_;
+  total.diagonal() += precision_;
+  Eigen::VectorXd g = pull_;
+  for (const auto& block : blocks_) g += block.g;
+  for (const auto& block : blocks_) {
+    Eigen::MatrixXd H = total - block.H;
+    H.diagonal() += kAlone * total.diagonal();
+    auto& rest = rests_.emplace_back();
+    rest.H.compute(stiffened(std::move(H)));
+    rest.x = rest.H.solve(g - block.g);
+  }
+  return rests_;
+}
+
 Heldout BlockRegression::heldout(const AddedColumns& added) const {
   const auto n = size(), k = added.size();
   const auto count = static_cast<Eigen::Index>(blocks_.size());
-  const auto part = [&](std::size_t b, Eigen::MatrixXd& H, Eigen::VectorXd& g) {
-    H.resize(n + k, n + k);
-    g.resize(n + k);
-    H.topLeftCorner(n, n) = blocks_[b].H;
-    g.head(n) = blocks_[b].g;
-    if (k == 0) return;
-    H.topRightCorner(n, k) = added.B[b];
-    H.bottomLeftCorner(k, n) = added.B[b].transpose();
-    H.bottomRightCorner(k, k) = added.C[b];
-    g.tail(k) = added.d[b];
-  };
-  Eigen::MatrixXd H, total = Eigen::MatrixXd::Zero(n + k, n + k);
-  Eigen::VectorXd g, vector = Eigen::VectorXd::Zero(n + k);
-  for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    part(b, H, g);
-    total += H;
-    vector += g;
+  Eigen::MatrixXd B = Eigen::MatrixXd::Zero(n, k), C = Eigen::MatrixXd::Zero(k, k);
+  Eigen::VectorXd d = Eigen::VectorXd::Zero(k);
+  for (std::size_t b = 0; k > 0 && b < blocks_.size(); ++b) {
+    B += added.B[b];
+    C += added.C[b];
+    d += added.d[b];
   }
-  total.diagonal().head(n) += precision_;
-  vector.head(n) += pull_;
+  const Eigen::VectorXd alone = kAlone * C.diagonal();
+  // Both together, the base eliminated.
+  Eigen::VectorXd x(n + k);
+  const auto solve = [&](const Eigen::LDLT<Eigen::MatrixXd>& base, const Eigen::VectorXd& base_x,
+                         const Eigen::MatrixXd& cross, Eigen::MatrixXd own, const Eigen::VectorXd& gradient) {
+    x.head(n) = base_x;
+    if (k == 0) return;
+    const Eigen::MatrixXd Y = base.solve(cross);
+    own = stiffened(std::move(own));
+    own.noalias() -= cross.transpose() * Y;
+    x.tail(k) = own.ldlt().solve(gradient - cross.transpose() * base_x);
+    x.head(n) -= Y * x.tail(k);
+  };
   Heldout result;
-  result.estimate = stiffened(total).ldlt().solve(vector);
+  solve(total_, step_, B, C, d);
+  result.estimate = x;
   result.loss.resize(count);
   result.replicas.resize(n + k, count);
   for (Eigen::Index b = 0; b < count; ++b) {
-    part(static_cast<std::size_t>(b), H, g);
-    Eigen::MatrixXd rest = total - H;
-    // A column that lives in this block alone is not known without it: it stays at zero.
-    rest.diagonal() += 1e-7 * total.diagonal();
-    const Eigen::VectorXd x = stiffened(std::move(rest)).ldlt().solve(vector - g);
+    const auto at = static_cast<std::size_t>(b);
+    const auto& block = blocks_[at];
+    const auto& rest = rests()[at];
+    if (k == 0) {
+      solve(rest.H, rest.x, B, C, d);
+    } else {
+      Eigen::MatrixXd own = C - added.C[at];
+      own.diagonal() += alone;
+      solve(rest.H, rest.x, B - added.B[at], std::move(own), d - added.d[at]);
+    }
     result.replicas.col(b) = x;
-    result.loss[b] = blocks_[static_cast<std::size_t>(b)].square - 2.0 * x.dot(g) + x.dot(H * x);
+    const auto of_base = x.head(n), of_added = x.tail(k);
+    result.loss[b] = block.square - 2.0 * of_base.dot(block.g) + of_base.dot(block.H * of_base);
+    if (k == 0) continue;
+    result.loss[b] +=
+        of_added.dot(added.C[at] * of_added) + 2.0 * of_added.dot(added.B[at].transpose() * of_base - added.d[at]);
   }
   for (Eigen::Index i = 0; i < n; ++i) {
     if (precision_[i] <= 0.0) continue;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 namespace bodyschema::diagnosis {
@@ -69,6 +70,9 @@ class BlockRegression {
   /// From the linearisation to the optimum.
   [[nodiscard]] const Eigen::VectorXd& step() const { return step_; }
   [[nodiscard]] Scores score(const AddedColumns& added) const;
+  /// Of several, each beside the base alone.
+  [[nodiscard]] std::vector<Scores> score(std::span<const AddedColumns> list) const;
+  [[nodiscard]] std::vector<Scores> score(std::span<const AddedColumns* const> list) const;
   [[nodiscard]] Heldout heldout(const AddedColumns& added = {}) const;
   /// Covariance of the base's parameters from how blocks differ, never below that of white noise.
   [[nodiscard]] Eigen::MatrixXd covariance() const;
@@ -76,12 +80,23 @@ class BlockRegression {
   [[nodiscard]] Eigen::MatrixXd covariance(const Scores& scores) const;
 
  private:
+  /// The base without one block.
+  struct Rest {
+    Eigen::LDLT<Eigen::MatrixXd> H;
+    Eigen::VectorXd x;  ///< its estimate
+  };
+  /// Found when first asked for, and kept: added columns are eliminated against them.
+  [[nodiscard]] const std::vector<Rest>& rests() const;
+  [[nodiscard]] Scores score(const AddedColumns& added, const Eigen::MatrixXd& Y,
+                             const Eigen::MatrixXd& quadratic) const;
+
   std::vector<BaseBlock> blocks_;
   Eigen::VectorXd precision_, away_, pull_;
   Eigen::MatrixXd H_;
   Eigen::LDLT<Eigen::MatrixXd> total_;
   Eigen::VectorXd step_;
   std::vector<Eigen::VectorXd> left_;  ///< per block: what its gradient is at the optimum
+  mutable std::vector<Rest> rests_;    ///< per block
 };
 
 /// The |z| that the largest of all candidates exceeds by chance in a share `level` of logs: every block's say times a

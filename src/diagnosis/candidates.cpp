@@ -137,54 +137,70 @@ double product(const OutlineEvidence& evidence, const Direction& a, const Direct
   return sum;
 }
 
+const Eigen::MatrixXd& AgainstBase::of(std::size_t picture) {
+  const auto& A = log_.at.evidence[picture].A;
+  const auto& base = log_.base[picture];
+  columns_.setZero(A.rows(), static_cast<Eigen::Index>(base.size()));
+  for (std::size_t i = 0; i < base.size(); ++i) {
+    for (const auto& step : base[i]) {
+      columns_.col(static_cast<Eigen::Index>(i)) += log_.precision[picture] * step.amount * A.col(step.coordinate);
+    }
+  }
+  // Sums over the base run along its columns.
+  rows_ = columns_.transpose();
+  return rows_;
+}
+
 std::vector<BaseBlock> base_blocks(const LogAbout& log) {
   const auto n = static_cast<Eigen::Index>(log.base.empty() ? 0 : log.base.front().size());
   std::vector<BaseBlock> blocks(log.blocks, {Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)});
+  AgainstBase against(log);
   for (std::size_t p = 0; p < log.base.size(); ++p) {
     if (log.precision[p] <= 0.0) continue;
     auto& block = blocks[log.block_of[p]];
     const auto& evidence = log.at.evidence[p];
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const auto& a = log.base[p][static_cast<std::size_t>(i)];
-      block.g[i] += log.precision[p] * gradient(evidence, a);
-      for (Eigen::Index j = 0; j <= i; ++j) {
-        const double own = log.precision[p] * product(evidence, a, log.base[p][static_cast<std::size_t>(j)]);
-        block.H(i, j) += own;
-        if (j != i) block.H(j, i) += own;
-      }
+    const auto& rows = against.of(p);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const auto& own = log.base[p][static_cast<std::size_t>(j)];
+      block.g[j] += log.precision[p] * gradient(evidence, own);
+      for (const auto& step : own) block.H.col(j) += step.amount * rows.col(step.coordinate);
     }
     block.square += log.precision[p] * evidence.square;
     block.weight += log.precision[p] * evidence.weight;
   }
+  for (auto& block : blocks) block.H.triangularView<Eigen::StrictlyUpper>() = block.H.transpose();
   return blocks;
 }
 
-AddedColumns added_columns(const LogAbout& log, const std::vector<std::vector<Direction>>& directions) {
+std::vector<AddedColumns> added_columns(const LogAbout& log, const std::vector<std::vector<Direction>>& directions,
+                                        const std::vector<std::size_t>& widths) {
+  std::vector<AddedColumns> list;
   const auto n = static_cast<Eigen::Index>(log.base.front().size());
-  const auto k = static_cast<Eigen::Index>(directions.front().size());
-  AddedColumns added(log.blocks, n, k);
-  Eigen::VectorXd along;
+  for (const auto width : widths) list.emplace_back(log.blocks, n, static_cast<Eigen::Index>(width));
+  AgainstBase against(log);
   for (std::size_t p = 0; p < directions.size(); ++p) {
     if (log.precision[p] <= 0.0) continue;
     const auto b = log.block_of[p];
     const auto& evidence = log.at.evidence[p];
-    for (Eigen::Index j = 0; j < k; ++j) {
-      const auto& direction = directions[p][static_cast<std::size_t>(j)];
-      if (direction.empty()) continue;
-      along.setZero(evidence.A.rows());
-      for (const auto& step : direction) along += log.precision[p] * step.amount * evidence.A.col(step.coordinate);
-      added.d[b][j] += log.precision[p] * gradient(evidence, direction);
-      for (Eigen::Index i = 0; i < n; ++i) {
-        for (const auto& step : log.base[p][static_cast<std::size_t>(i)])
-          added.B[b](i, j) += step.amount * along[step.coordinate];
+    const auto& rows = against.of(p);
+    auto own = directions[p].begin();
+    for (auto& added : list) {
+      for (Eigen::Index j = 0; j < added.size(); ++j) {
+        for (const auto& step : own[j]) added.B[b].col(j) += step.amount * rows.col(step.coordinate);
+        added.d[b][j] += log.precision[p] * gradient(evidence, own[j]);
+        for (Eigen::Index i = 0; i <= j; ++i) added.C[b](i, j) += log.precision[p] * product(evidence, own[i], own[j]);
       }
-      for (Eigen::Index i = 0; i < k; ++i) {
-        for (const auto& step : directions[p][static_cast<std::size_t>(i)])
-          added.C[b](i, j) += step.amount * along[step.coordinate];
-      }
+      own += added.size();
     }
   }
-  return added;
+  for (auto& added : list) {
+    for (auto& C : added.C) C.triangularView<Eigen::StrictlyLower>() = C.transpose();
+  }
+  return list;
+}
+
+AddedColumns added_columns(const LogAbout& log, const std::vector<std::vector<Direction>>& directions) {
+  return std::move(added_columns(log, directions, {directions.front().size()}).front());
 }
 
 std::vector<std::vector<Direction>> along_joint(const LogFit& fit, Eigen::Index joint,
@@ -249,42 +265,83 @@ std::vector<Candidate> catalogue_candidates(LogFit& fit, const LogAbout& log,
       list.push_back(std::move(candidate));
     }
   }
-  const auto all = fit.directions(log.at, catalogue, fitted_parameters(catalogue));
-  std::size_t first = 0;
-  for (auto& candidate : list) {
-    std::vector<std::vector<Direction>> own(all.size());
-    for (std::size_t p = 0; p < all.size(); ++p) {
-      own[p].assign(all[p].begin() + static_cast<std::ptrdiff_t>(first),
-                    all[p].begin() + static_cast<std::ptrdiff_t>(first + candidate.parameters.size()));
-    }
-    first += candidate.parameters.size();
-    candidate.columns = added_columns(log, own);
-  }
+  std::vector<std::size_t> widths;
+  for (const auto& candidate : list) widths.push_back(candidate.parameters.size());
+  auto columns = added_columns(log, fit.directions(log.at, catalogue, fitted_parameters(catalogue)), widths);
+  for (std::size_t c = 0; c < list.size(); ++c) list[c].columns = std::move(columns[c]);
   return list;
 }
 
 std::vector<Candidate> free_curves(LogFit& fit, const LogAbout& log) {
   const auto& roles = log.state.model().roles();
+  const auto n = static_cast<Eigen::Index>(log.base.front().size());
   std::vector<Candidate> list;
+  std::vector<Eigen::Index> coordinate;  // that each of them moves
   for (const auto joint : roles.arm) {
     for (auto& curve : curves_of(history(log, joint))) {
       Candidate candidate{.cause = {"unexplained", roles.names[static_cast<std::size_t>(joint)], ""},
                           .variable = curve.variable,
                           .parameters = std::vector<std::size_t>(curve.columns.size())};
       std::iota(candidate.parameters.begin(), candidate.parameters.end(), std::size_t{0});
-      candidate.columns = added_columns(log, along_joint(fit, joint, curve.columns));
+      candidate.columns = AddedColumns(log.blocks, n, static_cast<Eigen::Index>(curve.columns.size()));
       candidate.amounts = std::move(curve.columns);
       list.push_back(std::move(candidate));
+      coordinate.push_back(fit.coordinates().find({Coordinate::Kind::kJoint, joint}));
+    }
+  }
+  AgainstBase against(log);
+  for (std::size_t p = 0; p < log.base.size(); ++p) {
+    if (log.precision[p] <= 0.0) continue;
+    const auto b = log.block_of[p];
+    const auto& rows = against.of(p);
+    for (std::size_t c = 0; c < list.size(); ++c) {
+      const auto at = coordinate[c];
+      const auto& amounts = list[c].amounts;
+      Eigen::VectorXd own(static_cast<Eigen::Index>(amounts.size()));
+      for (std::size_t k = 0; k < amounts.size(); ++k) own[static_cast<Eigen::Index>(k)] = amounts[k][p];
+      auto& columns = list[c].columns;
+      columns.B[b].noalias() += rows.col(at) * own.transpose();
+      columns.C[b] += (log.precision[p] * log.at.evidence[p].A(at, at)) * own * own.transpose();
+      columns.d[b] += (log.precision[p] * log.at.evidence[p].b[at]) * own;
     }
   }
   return list;
 }
+
+namespace {
+
+/// What one picture says of the offset of every arm joint.
+struct OffsetSums {
+  Eigen::MatrixXd B;     ///< base x joints
+  Eigen::VectorXd C, d;  ///< by joint
+};
+
+std::vector<OffsetSums> offset_sums(const LogAbout& log) {
+  std::vector<OffsetSums> sums(log.base.size());
+  const auto n = static_cast<Eigen::Index>(log.base.front().size()), joints = log.state.joints();
+  AgainstBase against(log);
+  for (std::size_t p = 0; p < sums.size(); ++p) {
+    if (log.precision[p] <= 0.0) continue;
+    const auto& rows = against.of(p);
+    sums[p] = {Eigen::MatrixXd::Zero(n, joints), Eigen::VectorXd(joints), Eigen::VectorXd(joints)};
+    for (Eigen::Index j = 0; j < joints; ++j) {
+      const auto& own = log.base[p][static_cast<std::size_t>(j)];
+      for (const auto& step : own) sums[p].B.col(j) += step.amount * rows.col(step.coordinate);
+      sums[p].C[j] = log.precision[p] * product(log.at.evidence[p], own, own);
+      sums[p].d[j] = log.precision[p] * gradient(log.at.evidence[p], own);
+    }
+  }
+  return sums;
+}
+
+}  // namespace
 
 Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<NotTestable>& untestable,
             bool at_every_picture) {
   const auto n = base.size();
   const auto& parameters = log.state.parameters();
   const auto pictures = log.base.size();
+  const auto sums = offset_sums(log);
   Slips result;
   for (Eigen::Index j = 0; j < log.state.joints(); ++j) {
     const CauseName cause{"slip", parameters[static_cast<std::size_t>(j)].name, ""};
@@ -292,33 +349,36 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
       continue;
     // A slip is an offset, with the opposite sign, of the pictures from a time on: from the last one back to the first.
     AddedColumns tail(log.blocks, n, 1);
-    std::optional<Candidate> best;
-    double most = -1.0;
+    std::vector<AddedColumns> tails;
+    std::vector<Microseconds> times;
     for (std::size_t p = pictures; p-- > 1;) {
       if (log.precision[p] > 0.0) {
         const auto b = log.block_of[p];
-        const auto& own = log.base[p][static_cast<std::size_t>(j)];
-        for (Eigen::Index i = 0; i < n; ++i) {
-          tail.B[b](i, 0) -=
-              log.precision[p] * product(log.at.evidence[p], log.base[p][static_cast<std::size_t>(i)], own);
-        }
-        tail.C[b](0, 0) += log.precision[p] * product(log.at.evidence[p], own, own);
-        tail.d[b][0] -= log.precision[p] * gradient(log.at.evidence[p], own);
+        tail.B[b] -= sums[p].B.col(j);
+        tail.C[b](0, 0) += sums[p].C[j];
+        tail.d[b][0] -= sums[p].d[j];
       }
       if (log.at.instants[p].utime == log.at.instants[p - 1].utime || log.precision[p] <= 0.0) continue;
       if (!at_every_picture && log.block_of[p] == log.block_of[p - 1]) continue;
-      result.all.push_back(base.score(tail));
-      const auto& scores = result.all.back();
-      // When it was is where it explains most (maximum likelihood): how far it stands out hardly says.
-      const double explained = scores.total[0] * scores.total[0] / std::max(1e-300, scores.S(0, 0));
-      if (scores.independent[0] > limits::kRounding && explained > most) {
-        most = explained;
-        best = Candidate{.cause = cause, .variable = {}, .parameters = {0}, .from = log.at.instants[p].utime};
-        best->columns = tail;
-        best->scores = scores;
-      }
+      tails.push_back(tail);
+      times.push_back(log.at.instants[p].utime);
     }
-    if (best) result.best.push_back(std::move(*best));
+    auto scores = base.score(tails);
+    // When it was is where it explains most (maximum likelihood): how far it stands out hardly says.
+    std::optional<std::size_t> best;
+    double most = -1.0;
+    for (std::size_t t = 0; t < tails.size(); ++t) {
+      const double explained = scores[t].total[0] * scores[t].total[0] / std::max(1e-300, scores[t].S(0, 0));
+      if (scores[t].independent[0] <= limits::kRounding || explained <= most) continue;
+      most = explained;
+      best = t;
+    }
+    if (best) {
+      result.best.push_back(Candidate{.cause = cause, .variable = {}, .parameters = {0}, .from = times[*best]});
+      result.best.back().columns = std::move(tails[*best]);
+      result.best.back().scores = scores[*best];
+    }
+    std::move(scores.begin(), scores.end(), std::back_inserter(result.all));
   }
   return result;
 }

@@ -51,9 +51,26 @@ struct LogAbout {
 double gradient(const OutlineEvidence& evidence, const Direction& direction);
 double product(const OutlineEvidence& evidence, const Direction& a, const Direction& b);
 
+/// What a picture says of every coordinate together with each column of the base, times its precision: all sums about
+/// the log are made of these.
+class AgainstBase {
+ public:
+  explicit AgainstBase(const LogAbout& log) : log_(log) {}
+  /// Base x coordinates; until the next call.
+  const Eigen::MatrixXd& of(std::size_t picture);
+
+ private:
+  const LogAbout& log_;
+  Eigen::MatrixXd columns_, rows_;
+};
+
 /// Sums over blocks of the base's own directions.
 std::vector<BaseBlock> base_blocks(const LogAbout& log);
 /// Of others. @param directions  [picture][column]
+/// @param widths  how many of the columns are each candidate's, one after the other
+std::vector<AddedColumns> added_columns(const LogAbout& log, const std::vector<std::vector<Direction>>& directions,
+                                        const std::vector<std::size_t>& widths);
+/// Of one.
 AddedColumns added_columns(const LogAbout& log, const std::vector<std::vector<Direction>>& directions);
 
 /// Every candidate that this log can test beside the state, with its columns.

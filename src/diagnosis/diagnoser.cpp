@@ -203,7 +203,7 @@ class Diagnoser {
   /// Candidates that may be there, those first that predict best what their fit has not seen. What would be larger than
   /// on any robot comes last: it stands in for something else, if anything plausible does as well.
   std::vector<Trial> trials_of(const Field& field, bool first) {
-    const Heldout without = field.base.heldout();
+    std::optional<double> without;  // most logs have nothing to try
     std::vector<Trial> trials;
     for (const auto& candidate : field.candidates) {
       const double z = candidate.z();
@@ -213,8 +213,9 @@ class Diagnoser {
       if (z < (may_grow ? limits::kWorthATrial_z : threshold_of(candidate.stated))) continue;
       if (candidate.scores.independent.maxCoeff() < limits::kRounding) continue;
       if (std::find(refused_.begin(), refused_.end(), candidate.cause) != refused_.end()) continue;
+      if (!without) without = field.base.heldout().total();
       Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0, true};
-      trial.gain = without.total() - trial.heldout.total();
+      trial.gain = *without - trial.heldout.total();
       trial.plausible = is_plausible(candidate, trial.heldout.estimate.tail(candidate.columns.size()));
       if (trial.gain > 0.0 && !says_hardly_more(candidate, trial.gain)) trials.push_back(std::move(trial));
     }
@@ -298,8 +299,11 @@ class Diagnoser {
   /// Takes out the cause that the log needs least, where it does not need it any more.
   bool drop_one() {
     if (search_.causes().empty()) return false;
-    const LogAbout log = search_.about(block_s_);
-    const BlockRegression all = search_.regression(log);
+    // A fit that was tried and taken back may have left the state a little elsewhere.
+    const bool known = asked_ && !search_.refits();
+    std::optional<BlockRegression> anew;
+    if (!known) anew = search_.regression(search_.about(block_s_));
+    const BlockRegression& all = known ? asked_->base : *anew;
     const double with = all.heldout().total();
     std::size_t worst = 0;
     double least = 1e300;

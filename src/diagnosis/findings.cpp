@@ -338,6 +338,8 @@ void Findings::add_estimated(const LogAbout& log, const BlockRegression& all, co
     out.push_back(i);
   }
   const auto reduced = without(search_, all, out);
+  // Columns are scored each by itself: where none stands out no target does, and no fit needs to be held out.
+  if (reduced.base.score(reduced.own).z() < report_.z_threshold) return;
   const double loss = reduced.base.heldout().total();
   double most = 0.0;
   std::size_t best = targets.size();
@@ -407,6 +409,8 @@ bool Findings::is_small(const LogAbout& log, const BlockRegression& all, std::si
 void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
                                const std::vector<Candidate>& candidates) {
   const auto& state = search_.state();
+  report_.matters_mm = 1e3 * options_.matters_m;
+  if (search_.causes().empty()) return;
   const double loss = all.heldout().loss.sum();
   for (std::size_t c = 0; c < search_.causes().size(); ++c) {
     const auto& found = search_.causes()[c];
@@ -443,7 +447,6 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
     }
     (is_small(log, all, c) ? report_.small_causes : report_.causes).push_back(std::move(cause));
   }
-  report_.matters_mm = 1e3 * options_.matters_m;
   std::stable_sort(report_.causes.begin(), report_.causes.end(),
                    [](const auto& a, const auto& b) { return a.heldout_gain > b.heldout_gain; });
 }
@@ -455,7 +458,7 @@ void Findings::find_class(const Reduced& reduced, const std::vector<Eigen::Index
   static_cast<void>(all_out);
   const Eigen::VectorXd value = values_of(search_, out);
   const auto with = base.heldout(own);
-  const double gain = base.heldout().total() - with.total();
+  const double alone = base.heldout().total(), gain = alone - with.total();
   const double dof = static_cast<double>(base.blocks()) - 1.0;
   const auto own_columns = static_cast<Eigen::Index>(columns.size());
   for (const auto& candidate : candidates) {
@@ -464,7 +467,7 @@ void Findings::find_class(const Reduced& reduced, const std::vector<Eigen::Index
     const auto scores = base.score(rival);
     if (scores.independent.maxCoeff() < limits::kRounding) continue;
     const auto other = base.heldout(rival);
-    if (base.heldout().total() - other.total() < limits::kRivalShare * gain) continue;
+    if (alone - other.total() < limits::kRivalShare * gain) continue;
     if (worse_by(other, with) > student_quantile(limits::kRivalTail, dof)) continue;
     // One that can say the same and more besides is no other explanation: what is left of the cause beside it?
     if (rival.size() > own_columns) {
