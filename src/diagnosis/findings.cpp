@@ -218,16 +218,17 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
           found / sampled,
           where_seen / sampled_seen,
           rms_px * std::sqrt(agreed_share(motions, motion_settings())),
-          std::sqrt(of_encoders / weight)};
+          std::hypot(std::sqrt(of_encoders / weight), floor_px())};
 }
 
 Eigen::VectorXd Findings::encoder_variance() const {
+  constexpr double kInterpolated = 2.0 / 3.0;  // between two readings, in the mean over where a picture falls
   const Eigen::VectorXd sd = encoder_noise(fit_.log().encoders());
   const auto& coordinates = fit_.coordinates();
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(coordinates.size());
   for (Eigen::Index joint = 0; joint < sd.size(); ++joint) {
     if (const auto at = coordinates.find({Coordinate::Kind::kJoint, joint}); at >= 0)
-      variance[at] = sd[joint] * sd[joint];
+      variance[at] = kInterpolated * sd[joint] * sd[joint];
   }
   return variance;
 }
@@ -385,10 +386,12 @@ DiagnosedParameter Findings::parameter_of(const LogAbout& log, const EffectParam
   return {parameter.name, parameter.unit, value / unit, {(value - half) / unit, (value + half) / unit}, sd / unit};
 }
 
+double Findings::floor_px() const {
+  return options_.noise.floor_px * picture_unit(fit_.log().rig().cameras.front().intrinsics);
+}
+
 bool Findings::matters(const Size& size) const {
-  // Nearer than this no picture places an outline: what moves them less has nothing in the pictures to stand on.
-  const double floor_px = options_.noise.floor_px * picture_unit(fit_.log().rig().cameras.front().intrinsics);
-  return size.metres() >= options_.matters_m && size.outline_px >= floor_px;
+  return size.metres() >= options_.matters_m && size.outline_px >= floor_px();
 }
 
 bool Findings::is_small(const LogAbout& log, const BlockRegression& all, std::size_t cause) {

@@ -48,6 +48,8 @@ class Findings {
   /// Whether a cause moves less than what matters, all else that was found of its joint together with it. Beside the
   /// final model: when it was taken in, others may have had a part of it that were dropped since.
   [[nodiscard]] bool is_small(const LogAbout& log, const BlockRegression& all, std::size_t cause);
+  /// Nearer than this no picture places an outline: what moves them less has nothing in the pictures to stand on.
+  [[nodiscard]] double floor_px() const;
   /// Whether a cause of this size is worth a name: it moves hand or outline by what matters, and outlines by more than
   /// any picture gets wrong.
   [[nodiscard]] bool matters(const Size& size) const;

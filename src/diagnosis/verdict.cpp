@@ -103,15 +103,14 @@ std::string why_not(const DiagnosisReport& report) {
         report.left_px, report.rough_px);
   }
   const auto& after = report.after;
-  const double moved = std::max(0.0, after.moved_px * after.moved_px - after.encoders_px * after.encoders_px);
-  const double still_px = std::sqrt(std::max(0.0, after.rms_px * after.rms_px - moved));
-  if (after.rms_px > limits::kNoiseRatio * still_px) {
+  const double still_px = std::sqrt(std::max(0.0, after.rms_px * after.rms_px - after.moved_px * after.moved_px));
+  if (after.moved_px > after.encoders_px && after.rms_px > limits::kNoiseRatio * still_px) {
     return fmt::format(
         "The model does not explain what is seen: outlines lie off by {:.2f} px, and only {:.2f} px of that is noise "
         "of "
-        "single pictures and encoders. In the rest pictures agree that the arm stood elsewhere from instant to "
-        "instant: "
-        "something moves it that no known cause describes.",
+        "single pictures. In the rest pictures agree that the arm stood elsewhere from instant to instant, by more "
+        "than "
+        "encoders err: something moves it that no known cause describes.",
         after.rms_px, still_px);
   }
   if (causes.empty() && report.noise_px > 0.0 && report.left_px > limits::kNoiseRatio * report.noise_px) {

@@ -76,7 +76,7 @@ struct HeldoutError {
   /// The part of `rms_px` (in squares) by which pictures agree two by two that the arm stood elsewhere: something moves
   /// it that the model lacks, and no noise of pixels.
   double moved_px = 0.0;
-  double encoders_px = 0.0;  ///< what of that the encoders' own noise and steps make at most
+  double encoders_px = 0.0;  ///< as much come from encoders' noise and steps, and from how near pictures place outlines
 };
 
 /// One bar of the chart of all candidates: the largest |z| of it.
