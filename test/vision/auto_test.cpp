@@ -295,7 +295,7 @@ TEST(AutomaticMasks, ColoursThatCompressionLetsBleedAreNoRobot) {
   }
   edge = edges_of(scene, out);
   std::printf("    seed 17: IoU %.3f\n", iou(out.mask, scene.true_mask()));
-  EXPECT_LT(std::abs(edge.bias), 0.6);
+  EXPECT_LT(std::abs(edge.bias), 0.15);  // colours read beside the outline put it 0.2 px out
   EXPECT_GT(edge.found, 0.75);
 }
 
