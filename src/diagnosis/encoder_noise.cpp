@@ -13,7 +13,9 @@ constexpr std::size_t kFewest = 50;
 constexpr double kOfFourth = 8.3666;   ///< sqrt(70): fourth differences of white noise over its standard deviation
 constexpr double kMostShare = 0.9;     ///< of the differences: the rest may be lost or stalled readings
 constexpr double kMostNormal = 1.645;  ///< ... which lie within so many standard deviations
-constexpr double kStepShare = 0.05;    ///< of the changes: so many are of a single step, or smaller than any noise
+/// Of the changes. Readings in steps never change by less than one, and often by just that: the smallest changes are
+/// alike. Without steps they are as small as one cares to look.
+constexpr double kSmallest = 0.01, kSmall = 0.05, kAlike = 1.5;
 
 double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
@@ -45,8 +47,9 @@ Eigen::VectorXd encoder_noise(std::span<const JointSample> encoders) {
                                 4.0 * encoders[i - 3].q[j] + encoders[i - 4].q[j]));
     }
     // A reading is off by up to half a step, also while it does not change.
-    const double step = quantile(std::move(changes), kStepShare) / std::sqrt(12.0);
-    noise[j] = std::max(step, quantile(std::move(fourth), kMostShare) / kMostNormal / kOfFourth);
+    const double smallest = quantile(changes, kSmallest), small = quantile(std::move(changes), kSmall);
+    const double step = small < kAlike * smallest ? small : 0.0;
+    noise[j] = std::max(step / std::sqrt(12.0), quantile(std::move(fourth), kMostShare) / kMostNormal / kOfFourth);
   }
   return noise;
 }

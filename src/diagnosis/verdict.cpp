@@ -74,6 +74,20 @@ std::string hardly_seen(const DiagnosisReport& report) {
       outline_px, hand_mm);
 }
 
+/// What stands out though no cause describes it, however little a curve over it moves: the curve is a stand-in, and
+/// its size none of what is really there.
+std::string of_no_known_size(const DiagnosisReport& report) {
+  for (const auto& cause : report.small_causes) {
+    if (cause.cause.name != "unexplained") continue;
+    return fmt::format(
+        "Something follows the {} of {} that no known cause describes: it stands out of the log's noise, but how much "
+        "of "
+        "what is seen it is, nothing tells.",
+        cause.variable, cause.cause.joint);
+  }
+  return "";
+}
+
 /// Why no answer of this report is to be trusted; empty: it is.
 std::string why_not(const DiagnosisReport& report) {
   const auto& causes = report.causes;
@@ -119,8 +133,9 @@ std::string why_not(const DiagnosisReport& report) {
         "px, and but {:.2f} px of that differ from one part of the log to another.",
         report.left_px, report.noise_px);
   }
-  if (causes.empty()) return hardly_seen(report);
-  return "";
+  if (!causes.empty()) return "";
+  const std::string unknown = of_no_known_size(report);
+  return unknown.empty() ? hardly_seen(report) : unknown;
 }
 
 /// " among the 61 causes that it can test (65 that it cannot)".

@@ -125,6 +125,23 @@ TEST(Verdict, IsNotNoneWhereTheHandIsOffByWhatMattersAndOutlinesHardlyShowIt) {
   EXPECT_EQ(worded(report).verdict, "none");
 }
 
+/// A wrist that lagged with its acceleration: a curve over another joint's took up a part of it that moved next to
+/// nothing.
+TEST(Verdict, IsNotNoneWhereSomethingStandsOutThatNoCauseDescribes) {
+  auto cause = gain_of_elbow();
+  cause.cause = {"unexplained", "elbow", ""};
+  cause.variable = "acceleration";
+  cause.parameters.clear();
+  cause.hand_mm = 0.1;
+  cause.outline_px = 0.02;
+  auto report = report_of({});
+  report.small_causes = {cause};
+  report = worded(report);
+  EXPECT_EQ(report.verdict, "unexplained");
+  EXPECT_THAT(report.sentence, HasSubstr("Something follows the acceleration of elbow"));
+  EXPECT_TRUE(report.exclusion_limits.empty());
+}
+
 /// Six causes and a seventh that is asked for: one of the six may have a part of it.
 TEST(Verdict, OfALogThatAsksForMoreThanAModelHoldsNothingIsNamed) {
   auto report = report_of({gain_of_elbow()});
