@@ -68,9 +68,8 @@ std::string hardly_seen(const DiagnosisReport& report) {
   }
   if (hand_mm <= 0.0) return "";
   return fmt::format(
-      "This log does not tell whether the model is right: what it asks for moves outlines by {:.2g} px, which is less "
-      "than "
-      "any picture places them, but the hand by {:.2g} mm.",
+      "This log does not tell whether the model is right: what it asks for moves outlines by {:.2g} px, which is "
+      "less than any picture places them, but the hand by {:.2g} mm.",
       outline_px, hand_mm);
 }
 
@@ -80,9 +79,8 @@ std::string of_no_known_size(const DiagnosisReport& report) {
   for (const auto& cause : report.small_causes) {
     if (cause.cause.name != "unexplained") continue;
     return fmt::format(
-        "Something follows the {} of {} that no known cause describes: it stands out of the log's noise, but how much "
-        "of "
-        "what is seen it is, nothing tells.",
+        "Something follows the {} of {} that no known cause describes: it stands out of the log's noise, but how "
+        "much of what is seen it is, nothing tells.",
         cause.variable, cause.cause.joint);
   }
   return "";
@@ -120,11 +118,9 @@ std::string why_not(const DiagnosisReport& report) {
   const double still_px = std::sqrt(std::max(0.0, after.rms_px * after.rms_px - after.moved_px * after.moved_px));
   if (after.moved_px > after.encoders_px && after.rms_px > limits::kNoiseRatio * still_px) {
     return fmt::format(
-        "The model does not explain what is seen: outlines lie off by {:.2f} px, and only {:.2f} px of that is noise "
-        "of "
-        "single pictures. In the rest pictures agree that the arm stood elsewhere from instant to instant, by more "
-        "than "
-        "encoders err: something moves it that no known cause describes.",
+        "The model does not explain what is seen: outlines lie off by {:.2f} px, and only {:.2f} px of that is "
+        "noise of single pictures. In the rest pictures agree that the arm stood elsewhere from instant to instant, by "
+        "more than encoders err: something moves it that no known cause describes.",
         after.rms_px, still_px);
   }
   if (causes.empty() && report.noise_px > 0.0 && report.left_px > limits::kNoiseRatio * report.noise_px) {
