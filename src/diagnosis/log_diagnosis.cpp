@@ -107,11 +107,12 @@ class LogDiagnosis {
           return !diagnosis::why_too_short(diagnosis::log_length(pictures, roles, needed), {}, roles, needed).empty();
         });
     if (log.pictures.empty()) return;  // refuse_unusable() says why
+    const auto length = diagnosis::log_length(log.pictures, roles, needed);
+    if (diagnosis::why_too_short(length, {}, roles, needed).empty()) return;
     const auto motion = diagnosis::log_motion(log.pictures, log.cameras, log.encoders, pipeline_.shared_robot(),
                                               pipeline_.setup(), roles);
-    const auto why = diagnosis::why_too_short(diagnosis::log_length(log.pictures, roles, needed),
-                                              diagnosis::untestable(roles, motion), roles, needed);
-    if (!why.empty()) throw DataError(options_.log.string() + ": " + why);
+    throw DataError(options_.log.string() + ": " +
+                    diagnosis::why_too_short(length, diagnosis::untestable(roles, motion), roles, needed));
   }
 
   /// Where the estimator was when it had converged.

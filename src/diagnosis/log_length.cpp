@@ -67,8 +67,7 @@ std::string why_too_short(const LogLength& length, const std::vector<NotTestable
       untested.empty() ? "" : fmt::format("; this motion leaves untested besides: {}", fmt::join(untested, ", "));
   return fmt::format(
       "too short for a diagnosis: {:.1f} s of pictures; record {:.0f} s in motion, better 60 s, or {} distinct "
-      "postures "
-      "held still, of which it has {}{}",
+      "postures held still, of which it has {}{}",
       length.seconds, options.shortest_log_s, options.fewest_postures, length.postures, besides);
 }
 

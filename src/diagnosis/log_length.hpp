@@ -19,9 +19,8 @@ struct LogLength {
   double moved_rad = 0.0;    ///< a joint's furthest from where it was in the first picture
 };
 
-/// @param pictures  joints at the exposures in order of time; those without velocities count as still. An arm that
-/// needs
-///   more than a second to leave a posture (options.same_posture_rad) is still
+/// @param pictures  joints at the exposures in order of time; those without velocities count as still.
+///   An arm that needs more than a second to leave a posture (options.same_posture_rad) is still
 LogLength log_length(std::span<const JointSample> pictures, const JointRoles& roles, const DiagnosisOptions& options);
 
 /// The one sentence for a log that no diagnosis can use: what it has, what is needed, and which causes its motion would

@@ -8,6 +8,14 @@
 #include "bodyschema/camera/shutter.hpp"
 
 namespace bodyschema {
+namespace {
+
+/// Of a number that need not be chosen.
+bool is_auto(const Configuration& section, const std::string& key) {
+  return section.text_or(key, "auto") == "auto";
+}
+
+}  // namespace
 
 EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
   EstimatorOptions o;
@@ -40,12 +48,8 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
   o.refine_outline = best.boolean_or("refine_outline", o.refine_outline);
   o.remember = best.boolean_or("remember", o.remember);
   o.live_diagnosis = best.boolean_or("live_diagnosis", o.live_diagnosis);
-  if (!best.has("search_renders") || best.text("search_renders") == "auto") {
-    o.search_renders = 0;
-    static_cast<void>(best.text_or("search_renders", "auto"));
-  } else {
-    o.search_renders = static_cast<int>(best.integer_or("search_renders", 1, 1, 1'000'000));
-  }
+  o.search_renders =
+      is_auto(best, "search_renders") ? 0 : static_cast<int>(best.integer("search_renders", 1, 1'000'000));
   o.outline_spacing_px = best.number_or("outline_spacing_px", o.outline_spacing_px, 0.5, 100.0);
   o.noise.sd_px = best.number_or("outline_sd_px", o.noise.sd_px, 1e-3, 100.0);
   o.noise.floor_px = best.number_or("outline_floor_px", o.noise.floor_px, 0.0, 100.0);
@@ -60,12 +64,8 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
       static_cast<std::size_t>(best.integer_or("most_postures", static_cast<std::int64_t>(m.most_blocks), 4, 10000));
   o.least_postures =
       static_cast<std::size_t>(best.integer_or("least_postures", static_cast<std::int64_t>(o.least_postures), 1, 1000));
-  if (!best.has("converged_hand_sd_mm") || best.text("converged_hand_sd_mm") == "auto") {
-    o.converged_hand_sd_m = 0.0;
-    static_cast<void>(best.text_or("converged_hand_sd_mm", "auto"));
-  } else {
-    o.converged_hand_sd_m = 1e-3 * best.number("converged_hand_sd_mm", 1e-6, 1e3);
-  }
+  o.converged_hand_sd_m =
+      is_auto(best, "converged_hand_sd_mm") ? 0.0 : 1e-3 * best.number("converged_hand_sd_mm", 1e-6, 1e3);
   return o;
 }
 

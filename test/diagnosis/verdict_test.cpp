@@ -106,23 +106,26 @@ TEST(Verdict, OfARobotThatStandsElsewhereFromInstantToInstantIsNeitherNoneNorNam
   }
 }
 
+/// Of a log in which nothing but this stands out.
+DiagnosisReport of_small_cause(const DiagnosedCause& cause) {
+  auto report = report_of({});
+  report.small_causes = {cause};
+  return worded(report);
+}
+
 /// Meshes 3.4 % larger with a focal length 4.8 % longer: the hand was 4.3 mm off along the line of sight.
 TEST(Verdict, IsNotNoneWhereTheHandIsOffByWhatMattersAndOutlinesHardlyShowIt) {
   auto cause = gain_of_elbow();
   cause.hand_mm = 4.3;
   cause.outline_px = 0.08;
-  auto report = report_of({});
-  report.small_causes = {cause};
-  report = worded(report);
+  const auto report = of_small_cause(cause);
   EXPECT_EQ(report.verdict, "unexplained");
   EXPECT_THAT(report.sentence,
               HasSubstr("by 0.08 px, which is less than any picture places them, but the hand by 4.3 mm"));
   EXPECT_THAT(report.sentence, HasSubstr("elbow turns roughly 4 %"));
   EXPECT_TRUE(report.exclusion_limits.empty());
   cause.hand_mm = 0.4;
-  report = report_of({});
-  report.small_causes = {cause};
-  EXPECT_EQ(worded(report).verdict, "none");
+  EXPECT_EQ(of_small_cause(cause).verdict, "none");
 }
 
 /// A wrist that lagged with its acceleration: a curve over another joint's took up a part of it that moved next to
@@ -134,9 +137,7 @@ TEST(Verdict, IsNotNoneWhereSomethingStandsOutThatNoCauseDescribes) {
   cause.parameters.clear();
   cause.hand_mm = 0.1;
   cause.outline_px = 0.02;
-  auto report = report_of({});
-  report.small_causes = {cause};
-  report = worded(report);
+  const auto report = of_small_cause(cause);
   EXPECT_EQ(report.verdict, "unexplained");
   EXPECT_THAT(report.sentence, HasSubstr("Something follows the acceleration of elbow"));
   EXPECT_TRUE(report.exclusion_limits.empty());
