@@ -145,6 +145,7 @@ struct Estimator::Impl {
     distance.resize(static_cast<Eigen::Index>(options.filter.particles));
     weights.resize(static_cast<Eigen::Index>(options.filter.particles));
     reading.resize(joints);
+    usual_before = Eigen::VectorXd::Ones(joints);
     for (Eigen::Index k = 0; k < joints; ++k) {
       joint_names.push_back(model.state().parameters()[static_cast<std::size_t>(k)].name);
     }
@@ -160,6 +161,7 @@ struct Estimator::Impl {
     frame = model.take(observation, state);
     fitter.begin_frame();
     changed.clear();
+    resumed_now.clear();
     cameras_swapped = contradicted = near = hidden_only = false;
     hidden = {};
     if (!particles_only()) occlusion.cover(frame, state, hand_sd_m);
@@ -169,6 +171,7 @@ struct Estimator::Impl {
     if (!scorer.observe(observation, frame, options.min_mask_share)) {
       in_frame = particles_only() ? cloud() : memory.in_posture();
       if (memory.empty()) in_frame.x = state;
+      if (!memory.loose().empty()) in_frame.x = where_it_was(memory);
       current = EstimatorState::kHandNotInView;
       put_off_searches();
     } else if (const auto swapped = starts_swapped(observation); swapped.value_or(false)) {
@@ -262,7 +265,7 @@ struct Estimator::Impl {
   /// With a memory: whether it explains the pictures once they are exchanged, and only then.
   bool turned_swapped(const Observation& observation) {
     if (!scorer.can_be_exchanged()) return false;
-    const Eigen::VectorXd known = memory.estimate().x;
+    const Eigen::VectorXd known = where_it_was(memory);
     const Observation exchanged = with_eyes_exchanged(observation);
     scorer.observe(exchanged, frame, options.min_mask_share);
     const double other_distance = scorer.distance(known);
@@ -344,12 +347,16 @@ struct Estimator::Impl {
     start = Clock::now();
     if (!options.remember) memory.forget_all();
     read_encoders();
-    for (const auto joint : stalled.look(reading)) memory.release(std::vector{joint}, now_s);
+    for (const auto& resumed : stalled.look(reading, now_s)) believe_again(resumed);
+    memory.loosen(stalled.suspects());
+    for (Eigen::Index k = 0; k < joints; ++k) {
+      if (stalled.standing_since_s(k) == now_s) usual_before(k) = usual();
+    }
     fitter.count_still_parts_once(std::max(memory.postures(), options.least_postures));
     if (memory.empty()) {
       find_anew();
     } else {
-      OutlineFit fit = fitter.follow(frame, memory);
+      OutlineFit fit = fitter.follow(frame, memory, where_it_was(memory));
       judge(fit);
       if (verdict == FrameVerdict::kAgrees && !young()) {
         // A change that only some pictures show is searched for on these.
@@ -368,6 +375,26 @@ struct Estimator::Impl {
     times.filter_ms += elapsed_ms(start);
   }
 
+  /// A reading that stood while its joint may have moved: believed again from here on, or, where all was one slip,
+  /// since that.
+  void believe_again(const StalledEncoders::Resumed& resumed) {
+    if (resumed.went_on) {
+      memory.release(std::vector{resumed.joint}, now_s);
+      state[resumed.joint] = resumed.before_rad;  // most encoders that stalled go on as they were
+      resumed_now.push_back(resumed.joint);
+    } else {
+      memory.tighten_since(resumed.joint, resumed.stepped_s);
+    }
+  }
+
+  /// The fused state with joints that may be anywhere, or of which nothing is known any more, where they were last.
+  [[nodiscard]] Eigen::VectorXd where_it_was(const PostureMemory& known) const {
+    Eigen::VectorXd x = known.estimate().x;
+    for (const auto joint : known.loose()) x[joint] = state[joint];
+    for (const auto joint : resumed_now) x[joint] = state[joint];
+    return x;
+  }
+
   /// What innovations of these degrees of freedom hardly ever exceed, in this log.
   [[nodiscard]] double doubtful(double dof) const {
     return chi_square_quantile(limits::kDoubt_tail, std::max(1.0, dof)) * usual();
@@ -378,11 +405,23 @@ struct Estimator::Impl {
     innovation = memory.innovation(fit.quadratic);
     const double ratio = innovation.dof > 0.0 ? innovation.nis / innovation.dof : 0.0;
     const double limit = doubtful(innovation.dof);
-    verdict = !near                    ? FrameVerdict::kContradicts
-              : innovation.nis > limit ? FrameVerdict::kDoubtful
-                                       : FrameVerdict::kAgrees;
+    verdict = !near                                             ? FrameVerdict::kContradicts
+              : innovation.nis > limit || stalls(fit.quadratic) ? FrameVerdict::kDoubtful
+                                                                : FrameVerdict::kAgrees;
     if (verdict != FrameVerdict::kAgrees || innovation.dof <= 0.0) return;
     usual_sum += (ratio - usual_sum) / limits::kUsualFrames;
+  }
+  /// Whether a frame looks as if a joint had moved under its reading, by more than hardly ever happens by chance. What
+  /// is usual counts as it was before the reading stood: a joint that moves slowly makes its own deviations usual.
+  [[nodiscard]] bool stalls(const Quadratic& quadratic) const {
+    const auto standing = stalled.standing_while_others_move();
+    if (standing.empty() || young()) return false;
+    const double limit = chi_square_quantile(limits::kDoubt_tail / static_cast<double>(joints), 1.0);
+    const Eigen::VectorXd gains = memory.step_gains(quadratic, standing);
+    for (std::size_t i = 0; i < standing.size(); ++i) {
+      if (gains[static_cast<Eigen::Index>(i)] > limit * usual_before(standing[i])) return true;
+    }
+    return false;
   }
   /// What innovations are times what is believed of them, in this log.
   [[nodiscard]] double usual() const { return std::max(1.0, usual_sum); }
@@ -420,8 +459,13 @@ struct Estimator::Impl {
     hidden_only = true;
     doubted_since_s = -1.0;
     verdict = rest ? FrameVerdict::kAgrees : FrameVerdict::kDoubtful;
-    state = memory.estimate().x;
+    state = where_it_was(memory);
     in_frame = rest ? memory.in_posture(fit.seen.quadratic) : memory.in_posture();
+    if (rest) {
+      see_loose_joints();
+    } else {
+      in_frame.x = state;
+    }
     rms_px = fit.seen.evidence.rms_px();
     near = rest;
     best_likelihood = hammoude_likelihood(scorer.distance(in_frame.x));
@@ -462,7 +506,7 @@ struct Estimator::Impl {
 
   /// The frame and what is known of it, as it is reported.
   void settle_on(const OutlineFit& fit) {
-    state = memory.empty() ? fit.x : memory.estimate().x;
+    state = memory.empty() ? fit.x : where_it_was(memory);
     const PostureMemory held = contradicted || memory.empty() ? memory.beliefs() : memory;
     if (fitter.lies_near(fit.evidence)) {
       in_frame = held.in_posture(contradicted ? fit.quadratic : fit.seen.quadratic);
@@ -470,6 +514,7 @@ struct Estimator::Impl {
       in_frame = held.in_posture();
       in_frame.x = fit.x;
     }
+    see_loose_joints();
     rms_px = fit.seen.evidence.rms_px();
     near = fitter.fits(fit.evidence);
     hidden = occlusion.hidden(fit.seen.evidence);
@@ -477,11 +522,18 @@ struct Estimator::Impl {
     current = EstimatorState::kConverging;
   }
 
+  /// Joints that may be anywhere are where this frame shows them.
+  void see_loose_joints() {
+    if (memory.loose().empty()) return;
+    for (const auto joint : memory.loose()) state[joint] = in_frame.x[joint];
+    stalled.seen(in_frame.x.head(joints), in_frame.covariance.diagonal().head(joints).cwiseMax(0.0).cwiseSqrt());
+  }
+
   /// The frame contradicts the memory, or the memory is so young that it may be wrong.
   void explain_frame(const Observation& observation, OutlineFit fit) {
     if (verdict != FrameVerdict::kAgrees && turned_swapped(observation)) {
       put_off_searches();
-      doubt(memory.estimate().x);
+      doubt(where_it_was(memory));
       cameras_swapped = true;
       return;
     }
@@ -513,7 +565,7 @@ struct Estimator::Impl {
     if (doubted_since_s < 0.0) doubted_since_s = now_s;
     contradicted = true;
     settle_on(fit);
-    state = memory.estimate().x;
+    state = where_it_was(memory);
     if (now_s - doubted_since_s > limits::kPatience_s) {
       verdict = FrameVerdict::kContradicts;
       current = EstimatorState::kDiverged;
@@ -538,11 +590,13 @@ struct Estimator::Impl {
       for (Eigen::Index joint = 0; joint < joints; ++joint) list.push_back(slip(joint, fit));
       if (const auto camera = camera_parameters(); !camera.empty()) {
         // From afar: knocked by more than is looked for about a memory.
-        list.push_back({"the cameras were moved", camera, {memory.estimate().x}});
+        list.push_back({"the cameras were moved", camera, {where_it_was(memory)}});
       }
-      if (alternative && now_s - alternative_s < limits::kAlternative_s && !stalled.suspected()) {
-        list.push_back({"what was known before holds", {}, {}, &*alternative});
-      }
+    }
+    if (alternative && now_s - alternative_s < limits::kAlternative_s && !stalled.suspected()) {
+      list.push_back({"what was known before holds", {}, {}, &*alternative});
+      // One picture that is wrong may look like an arm elsewhere; the next ones are as the better memory foresees.
+      if (young()) list.back().known_instead = everything.size();
     }
     list.push_back({"the arm was found elsewhere", everything, anew, nullptr, young()});
     return list;
@@ -551,7 +605,8 @@ struct Estimator::Impl {
   /// A joint slipped: from where the outline's slopes point to, or where silhouettes say.
   [[nodiscard]] Hypothesis slip(Eigen::Index joint, const OutlineFit& fit) {
     Hypothesis result{"", {joint}, {}};
-    Eigen::VectorXd start = memory.estimate().x;
+    result.doubted_since_s = stalled.standing_since_s(joint);
+    Eigen::VectorXd start = where_it_was(memory);
     const auto order = in_order(distance);
     double step = memory.step(fit.quadratic, result.released).size[0];
     for (const auto particle : order) {
@@ -587,7 +642,7 @@ struct Estimator::Impl {
     const auto& released = better.hypothesis.released;
     if (released.size() == 1 && released[0] < joints) {
       const double step = better.fit.x[released[0]] - state[released[0]];
-      stalled.stepped(released[0], step);
+      stalled.stepped(released[0], step, better.fit.x[released[0]], now_s);
       changed =
           fmt::format("{} slipped by {:.1f} deg", joint_names[static_cast<std::size_t>(released[0])], degrees(step));
     } else if (!young()) {
@@ -596,10 +651,11 @@ struct Estimator::Impl {
     if (better.hypothesis.instead == nullptr && !young()) {
       alternative = std::move(memory);
       alternative_s = now_s;
-    } else {
+    } else if (better.hypothesis.instead != nullptr) {
       alternative.reset();
     }
     memory = std::move(better.memory);
+    memory.loosen(stalled.suspects());
     usual_sum = 1.0;
     innovation = {};
     verdict = FrameVerdict::kContradicts;
@@ -734,7 +790,7 @@ struct Estimator::Impl {
   }
 
   void report_memory(Estimate& estimate) {
-    const MemoryEstimate& known = contradicted ? in_frame : memory.estimate();
+    const MemoryEstimate& known = contradicted || !memory.loose().empty() ? in_frame : memory.estimate();
     const Eigen::MatrixXd covariance = known.covariance + (disagreement() - 1.0) * known.own + shape;
     estimate.covariance_rad2 = covariance.topLeftCorner(joints, joints);
     for (Eigen::Index k = joints; k < state.size(); ++k) {
@@ -913,6 +969,7 @@ struct Estimator::Impl {
     state = model.state().prior_mean();
     stalled = StalledEncoders(joints);
     usual_sum = 1.0;
+    usual_before.setOnes();
     doubted_since_s = -1.0;
   }
 
@@ -951,6 +1008,7 @@ struct Estimator::Impl {
   FrameVerdict verdict = FrameVerdict::kNothingKnown;
   Innovation innovation;
   double usual_sum = 1.0;
+  Eigen::VectorXd usual_before;  ///< what was usual when each joint's reading last changed
   double now_s = 0.0, doubted_since_s = -1.0;
   double best_likelihood = 0.0, effective_size = 0.0, rms_px = 0.0;
   bool contradicted = false;  ///< the memory does not explain the last frame
@@ -969,8 +1027,9 @@ struct Estimator::Impl {
   double round_since_s = 0.0;
   bool unexplained = false;  ///< the pictures before, by all that was tried
   StalledEncoders stalled;
-  Eigen::VectorXd reading;           ///< encoders of the estimated joints
-  Eigen::MatrixXd cloud_covariance;  ///< of the particles as they were last weighed
+  std::vector<Eigen::Index> resumed_now;  ///< joints whose stall ended with this frame
+  Eigen::VectorXd reading;                ///< encoders of the estimated joints
+  Eigen::MatrixXd cloud_covariance;       ///< of the particles as they were last weighed
   StageTimes times;
   Eigen::VectorXd distance;  ///< Hammoude, of the particles
   Eigen::VectorXd weights;

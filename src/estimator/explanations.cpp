@@ -17,6 +17,7 @@ PostureMemory known_under(const Hypothesis& hypothesis, const PostureMemory& kno
   if (is_anew(hypothesis, known)) {
     memory.forget_all();
   } else if (!hypothesis.released.empty()) {
+    for (const auto k : hypothesis.released) memory.loosen_since(k, hypothesis.doubted_since_s);
     memory.release(hypothesis.released, time_s);
   }
   return memory;
@@ -33,7 +34,9 @@ bool explains(const Hypothesis& hypothesis, bool anew, const OutlineFit& fit, co
       fit.seen.evidence.odd_share() > limits::kLeastExplained * held.seen.evidence.odd_share() + limits::kFewOdd) {
     return false;
   }
-  gain = held.misfit - fit.misfit - limits::kPerParameter * static_cast<double>(hypothesis.released.size());
+  const double freed = static_cast<double>(hypothesis.released.size());
+  const double bound = static_cast<double>(hypothesis.known_instead);
+  gain = held.misfit - fit.misfit - limits::kPerParameter * (freed - bound);
   const bool silhouettes_say_so = hypothesis.by_silhouette && !fitter.fits(held.evidence);
   return silhouettes_say_so || (fitter.fits(fit.evidence) && gain > least);
 }
@@ -55,7 +58,7 @@ bool go_on(ExplanationRound& round, const PostureMemory& known, const OutlineFit
       if (!fitter.may_follow(room)) return false;
       fit = fitter.follow_from(frame, hypothesis.starts.front(), memory);
     } else {
-      fit = fitter.follow(frame, memory);
+      fit = fitter.follow(frame, memory, memory.estimate().x);
     }
     double gain = 0.0;
     const double least = round.best ? round.gain : limits::kClearlyBetter;
@@ -67,7 +70,7 @@ bool go_on(ExplanationRound& round, const PostureMemory& known, const OutlineFit
   if (!round.best || best_is_of_frame) return true;
   Explanation& best = *round.best;
   best.memory = known_under(best.hypothesis, known, time_s);
-  best.fit = best.hypothesis.starts.empty() ? fitter.follow(frame, best.memory)
+  best.fit = best.hypothesis.starts.empty() ? fitter.follow(frame, best.memory, best.memory.estimate().x)
                                             : fitter.follow_from(frame, best.fit.x, best.memory);
   double gain = 0.0;
   if (!explains(best.hypothesis, is_anew(best.hypothesis, known), best.fit, held, limits::kClearlyBetter, fitter,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +22,10 @@ struct Hypothesis {
   /// Whether silhouettes alone decide against a memory that does not explain the outline at all: one so young that
   /// nothing is lost with it.
   bool by_silhouette = false;
+  /// Parameters that `instead` knows and the memory hardly does: what that memory was spared when it was taken.
+  std::size_t known_instead = 0;
+  /// Since when what was released may have been changing, unnoticed, s.
+  double doubted_since_s = std::numeric_limits<double>::infinity();
 };
 
 /// A hypothesis with what it made of the frame.

@@ -102,9 +102,9 @@ void OutlineFitter::refine(const Frame& frame, const PostureMemory& memory, std:
   for (std::size_t c = 0; c < noise_.size(); ++c) fit.misfit += fit.evidence.cost[c] / noise_[c].variance_px2();
 }
 
-OutlineFit OutlineFitter::follow(const Frame& frame, const PostureMemory& memory) {
+OutlineFit OutlineFitter::follow(const Frame& frame, const PostureMemory& memory, const Eigen::VectorXd& start) {
   OutlineFit fit;
-  fit.x = memory.estimate().x;
+  fit.x = start;
   refine(frame, memory, kNear_px, 0, fit);
   return fit;
 }

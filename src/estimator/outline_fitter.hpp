@@ -46,9 +46,9 @@ class OutlineFitter {
   OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const EstimatorOptions& options, std::size_t cameras,
                 int search_renders);
 
-  /// From where the memory puts the arm to where this frame and the memory together see it.
-  OutlineFit follow(const Frame& frame, const PostureMemory& memory);
-  /// The same from elsewhere, looking far at first.
+  /// From where the arm was to where this frame and the memory together see it.
+  OutlineFit follow(const Frame& frame, const PostureMemory& memory, const Eigen::VectorXd& start);
+  /// The same from farther away, looking far at first.
   OutlineFit follow_from(const Frame& frame, const Eigen::VectorXd& start, const PostureMemory& memory);
   /// From here on searches may look at pictures anew as often as one frame allows: counted, not timed, so that a replay
   /// finds what was found live.

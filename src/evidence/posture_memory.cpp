@@ -13,6 +13,12 @@ namespace {
 constexpr double kLeastTold = 0.1;
 /// Blocks after which the dispersion has forgotten one.
 constexpr double kRecentBlocks = 12.0;
+/// Physical. rad; a joint whose encoder says nothing may be this far from where it was last: it has a range of motion.
+constexpr double kAnywhere_rad = 1.5;
+
+bool among(std::span<const Eigen::Index> list, Eigen::Index joint) {
+  return std::find(list.begin(), list.end(), joint) != list.end();
+}
 
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& A) {
   return A.ldlt().solve(Eigen::MatrixXd::Identity(A.rows(), A.cols()));
@@ -29,13 +35,18 @@ PostureMemory::PostureMemory(MemoryLayout layout, const MemoryOptions& options)
   prior_.b.head(n) = precision.cwiseProduct(layout_.prior_mean);
 }
 
+/// What a posture gets wrong in one joint's angle.
+double PostureMemory::own_variance(Eigen::Index joint, std::span<const Eigen::Index> loose) const {
+  if (among(loose, joint)) return std::pow(kAnywhere_rad, 2);
+  return std::max(posture_variance_, std::pow(options_.encoder_sd_rad, 2));
+}
+
 /// The pictures see x + e with e the posture's own error, N(0, R): marginalised, A becomes (I + A R)^-1 A.
-Quadratic PostureMemory::with_posture_error(const Quadratic& block) const {
-  const double variance = std::max(posture_variance_, std::pow(options_.encoder_sd_rad, 2));
+Quadratic PostureMemory::with_posture_error(const Quadratic& block, std::span<const Eigen::Index> loose) const {
   Eigen::MatrixXd damping = Eigen::MatrixXd::Identity(block.A.rows(), block.A.cols());
   for (std::size_t i = 0; i < layout_.is_joint.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (layout_.is_joint[i]) damping.col(k) += variance * block.A.col(k);
+    if (layout_.is_joint[i]) damping.col(k) += own_variance(k, loose) * block.A.col(k);
   }
   const Eigen::PartialPivLU<Eigen::MatrixXd> lu(damping);
   Quadratic result{lu.solve(block.A), lu.solve(block.b)};
@@ -48,7 +59,7 @@ Quadratic PostureMemory::sum(const Block* without) const {
   const auto kept = [&](double then_s) { return std::exp(-std::max(0.0, now_s_ - then_s) / options_.memory_s); };
   if (old_) total.add(*old_, kept(old_s_));
   for (const auto& block : blocks_) {
-    if (&block != without) total.add(with_posture_error(block.pictures), kept(block.end_s));
+    if (&block != without) total.add(with_posture_error(block.pictures, block.loose), kept(block.end_s));
   }
   return total;
 }
@@ -106,7 +117,7 @@ MemoryEstimate PostureMemory::in_posture() const {
   MemoryEstimate result = estimate();
   for (std::size_t i = 0; i < layout_.is_joint.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (layout_.is_joint[i]) result.own(k, k) += std::max(posture_variance_, std::pow(options_.encoder_sd_rad, 2));
+    if (layout_.is_joint[i]) result.own(k, k) += own_variance(k, loose_);
   }
   result.covariance = with_considered(result);
   return result;
@@ -126,10 +137,10 @@ MemoryEstimate PostureMemory::in_posture(const Quadratic& frame) const {
   return after;
 }
 
-PostureMemory::Step PostureMemory::step(const Quadratic& frame, std::span<const Eigen::Index> parameters) const {
+PostureMemory::Surprise PostureMemory::surprise(const Quadratic& frame) const {
   const auto n = layout_.estimated(), m = layout_.considered_root.rows();
   const auto& known = estimate();
-  const Quadratic seen = with_posture_error(frame);
+  const Quadratic seen = with_posture_error(frame, loose_);
   // In units of what was believed.
   const Eigen::MatrixXd scale = layout_.prior_sd.asDiagonal();
   const Eigen::MatrixXd W = scale * seen.A.topLeftCorner(n, n) * scale;
@@ -138,27 +149,34 @@ PostureMemory::Step PostureMemory::step(const Quadratic& frame, std::span<const 
   Eigen::Index first = 0;
   while (first < n && eigen.eigenvalues()[first] < kLeastTold) ++first;
   const Eigen::Index told = n - first;
-  Step result{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size())), {}};
+  Surprise result;
   if (told == 0) return result;
   const Eigen::VectorXd root = eigen.eigenvalues().tail(told).cwiseSqrt();
   const Eigen::MatrixXd U = eigen.eigenvectors().rightCols(told);
-  const Eigen::VectorXd y = root.cwiseInverse().asDiagonal() * (U.transpose() * score);
+  result.y = root.cwiseInverse().asDiagonal() * (U.transpose() * score);
   // Of y: pictures' noise, what is not known, and what is considered, in memory and frame alike.
-  const Eigen::MatrixXd to_x = root.asDiagonal() * U.transpose() * layout_.prior_sd.cwiseInverse().asDiagonal();
-  Eigen::MatrixXd S = Eigen::MatrixXd::Identity(told, told) + to_x * known.own * to_x.transpose();
+  result.to_y = root.asDiagonal() * U.transpose() * layout_.prior_sd.cwiseInverse().asDiagonal();
+  result.S = Eigen::MatrixXd::Identity(told, told) + result.to_y * known.own * result.to_y.transpose();
   if (m > 0) {
     const Eigen::MatrixXd E = root.cwiseInverse().asDiagonal() *
                                   (U.transpose() * (scale * seen.A.topRightCorner(n, m))) * layout_.considered_root +
-                              to_x * known.sensitivity * layout_.considered_root;
-    S += E * E.transpose();
+                              result.to_y * known.sensitivity * layout_.considered_root;
+    result.S += E * E.transpose();
   }
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(S);
-  const Eigen::VectorXd z = ldlt.solve(y);
-  result.left = {y.dot(z), static_cast<double>(told)};
+  return result;
+}
+
+PostureMemory::Step PostureMemory::step(const Quadratic& frame, std::span<const Eigen::Index> parameters) const {
+  Step result{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size())), {}};
+  const Surprise seen = surprise(frame);
+  if (seen.y.size() == 0) return result;
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(seen.S);
+  const Eigen::VectorXd z = ldlt.solve(seen.y);
+  result.left = {seen.y.dot(z), static_cast<double>(seen.y.size())};
   if (parameters.empty()) return result;
-  Eigen::MatrixXd G(told, static_cast<Eigen::Index>(parameters.size()));
+  Eigen::MatrixXd G(seen.y.size(), static_cast<Eigen::Index>(parameters.size()));
   for (std::size_t i = 0; i < parameters.size(); ++i) {
-    G.col(static_cast<Eigen::Index>(i)) = to_x.col(parameters[i]);
+    G.col(static_cast<Eigen::Index>(i)) = seen.to_y.col(parameters[i]);
   }
   const Eigen::MatrixXd SG = ldlt.solve(G);
   Eigen::MatrixXd F = G.transpose() * SG;
@@ -166,11 +184,25 @@ PostureMemory::Step PostureMemory::step(const Quadratic& frame, std::span<const 
     const auto k = static_cast<Eigen::Index>(i);
     F(k, k) += 1.0 / std::pow(layout_.prior_sd[parameters[i]], 2);  // no further than what was believed possible
   }
-  const Eigen::VectorXd g = SG.transpose() * y;
+  const Eigen::VectorXd g = SG.transpose() * seen.y;
   result.size = F.ldlt().solve(g);
   result.left.nis -= g.dot(result.size);
   result.left.dof -= static_cast<double>(parameters.size());
   return result;
+}
+
+Eigen::VectorXd PostureMemory::step_gains(const Quadratic& frame, std::span<const Eigen::Index> parameters) const {
+  Eigen::VectorXd gains = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
+  const Surprise seen = surprise(frame);
+  if (seen.y.size() == 0) return gains;
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(seen.S);
+  const Eigen::VectorXd z = ldlt.solve(seen.y);
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const Eigen::VectorXd direction = seen.to_y.col(parameters[i]);
+    const double told = direction.dot(ldlt.solve(direction));
+    if (told > 0.0) gains[static_cast<Eigen::Index>(i)] = std::pow(direction.dot(z), 2) / told;
+  }
+  return gains;
 }
 
 Innovation PostureMemory::innovation(const Quadratic& frame) const {
@@ -188,8 +220,9 @@ std::optional<std::uint64_t> PostureMemory::add(double time_s, const Eigen::Vect
       return std::nullopt;
     }
   }
-  Block block{++begun_, time_s, time_s, q, frame, x};
-  if (!empty()) learn_posture_error(block);
+  Block block{++begun_, time_s, time_s, q, frame, x, loose_};
+  // Of postures in which some joint may be anywhere, what usual ones get wrong is not learned.
+  if (!empty() && loose_.empty()) learn_posture_error(block);
   // The posture again: it counts as one still.
   std::erase_if(blocks_,
                 [&](const Block& other) { return (q - other.q).cwiseAbs().maxCoeff() < options_.same_posture_rad; });
@@ -215,13 +248,15 @@ std::optional<PostureMemory::Stale> PostureMemory::most_stale() const {
   double most = 1.0;
   for (const auto& block : blocks_) {
     double far = 0.0;
+    Eigen::VectorXd aim = x;
+    for (const auto k : block.loose) aim[k] = block.x[k];  // where it was in that posture
     for (Eigen::Index k = 0; k < layout_.estimated(); ++k) {
       const double linear = layout_.is_joint[static_cast<std::size_t>(k)] ? kLinear_rad : kLinear * layout_.prior_sd[k];
-      far = std::max(far, std::abs(x[k] - block.x[k]) / linear);
+      far = std::max(far, std::abs(aim[k] - block.x[k]) / linear);
     }
     if (far <= most) continue;
     most = far;
-    stalest = Stale{block.number, block.x + std::min(1.0, kFarthest / far) * (x - block.x)};
+    stalest = Stale{block.number, block.x + std::min(1.0, kFarthest / far) * (aim - block.x)};
   }
   return stalest;
 }
@@ -245,7 +280,7 @@ void PostureMemory::fold_oldest() {
   const double kept = std::exp(-std::max(0.0, block->end_s - old_s_) / options_.memory_s);
   old_->A *= kept;
   old_->b *= kept;
-  old_->add(with_posture_error(block->pictures));
+  old_->add(with_posture_error(block->pictures, block->loose));
   old_s_ = std::max(old_s_, block->end_s);
   ++old_postures_;
   blocks_.erase(block);
@@ -294,6 +329,26 @@ void PostureMemory::forget_all() {
   old_.reset();
   old_postures_ = 0;
   nis_ = nis_dof_ = 0.0;
+  changed();
+}
+
+void PostureMemory::loosen(std::span<const Eigen::Index> joints) {
+  if (std::equal(joints.begin(), joints.end(), loose_.begin(), loose_.end())) return;
+  loose_.assign(joints.begin(), joints.end());
+  changed();
+}
+
+void PostureMemory::loosen_since(Eigen::Index joint, double from_s) {
+  for (auto& block : blocks_) {
+    if (block.begin_s >= from_s && !among(block.loose, joint)) block.loose.push_back(joint);
+  }
+  changed();
+}
+
+void PostureMemory::tighten_since(Eigen::Index joint, double from_s) {
+  for (auto& block : blocks_) {
+    if (block.begin_s >= from_s) std::erase(block.loose, joint);
+  }
   changed();
 }
 

@@ -187,6 +187,31 @@ TEST_F(MemoryOfTwo, AStepIsFoundAndWhatIsLeftAgrees) {
   EXPECT_GT(memory.step(slipped, the_second).left.nis, 1000.0) << "another one did not slip";
 }
 
+TEST_F(MemoryOfTwo, TheGainOfOneStepIsDistributedAsIsClaimedAndShowsOne) {
+  std::mt19937 random(31);
+  std::normal_distribution<double> noise(0.0, 0.05);
+  auto memory = this->memory();
+  for (int i = 0; i < 10; ++i) next(memory, both(sum_, 0.3 + noise(random), difference_, 0.1 + noise(random), 0.05));
+  const std::vector<Eigen::Index> each = {0, 1};
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  constexpr int kFrames = 4000;
+  for (int i = 0; i < kFrames; ++i) {
+    // What is known is drawn anew as well.
+    auto known = this->memory();
+    for (int k = 0; k < 2; ++k) {
+      next(known, both(sum_, 0.3 + noise(random), difference_, 0.1 + noise(random), 0.05));
+    }
+    mean += known.step_gains(both(sum_, 0.3 + noise(random), difference_, 0.1 + noise(random), 0.05), each) / kFrames;
+  }
+  // Chi-square with one degree of freedom; less by what beliefs, which are true to zero here, make of it.
+  EXPECT_NEAR(mean[0], 1.0, 0.1);
+  EXPECT_NEAR(mean[1], 1.0, 0.1);
+
+  const Eigen::VectorXd gains = memory.step_gains(both(sum_, 0.8, difference_, 0.6, 0.05), each);
+  EXPECT_GT(gains[0], 40.0) << "the first stepped by 0.5";
+  EXPECT_LT(gains[1], 0.5 * gains[0]);
+}
+
 TEST_F(MemoryOfTwo, WhatIsReleasedIsAsBeforeAnyPictureAndTheRestStays) {
   auto memory = this->memory();
   // The first is known by itself, the second by the sum with it.
@@ -263,6 +288,54 @@ TEST_F(MemoryOfTwoJoints, WhatPosturesDisagreeAboutIsLearned) {
     EXPECT_NEAR(std::sqrt(memory.estimate().covariance(0, 0)), least / std::sqrt(60.0), 0.3 * least / std::sqrt(60.0));
     EXPECT_LT(std::abs(memory.estimate().x(0) - 0.02), 4.0 * std::sqrt(memory.estimate().covariance(0, 0)));
   }
+}
+
+/// While an encoder says nothing its joint is wherever a picture shows it: the other joint is told by what does not
+/// depend on that, and neither is led astray.
+TEST_F(MemoryOfTwoJoints, ALooseJointIsFoundAnewInEveryPosture) {
+  auto memory = this->memory();
+  for (int i = 0; i < 6; ++i) next(memory, both(sum_, 0.03, difference_, -0.01, 0.002));
+  const Eigen::Vector2d truth(0.01, 0.02);
+  ASSERT_NEAR((memory.estimate().x - truth).norm(), 0.0, 2e-3);
+  const double sd = std::sqrt(memory.estimate().covariance(1, 1));
+
+  memory.loosen(std::vector<Eigen::Index>{0});
+  for (int i = 1; i <= 20; ++i) {
+    const double moved = 0.02 * i;
+    const auto frame = measures(sum_, 0.03 + moved, 0.002);
+    EXPECT_LT(memory.innovation(frame).nis, 9.0) << "that the loose joint moves surprises nobody";
+    EXPECT_NEAR(memory.in_posture(frame).x[0], 0.01 + moved, 0.01 + 0.001 * i);
+    next(memory, frame);
+  }
+  EXPECT_NEAR((memory.estimate().x - truth).norm(), 0.0, 2e-3);
+  EXPECT_GT(std::sqrt(memory.estimate().covariance(1, 1)), 0.9 * sd) << "these frames tell nothing of the other joint";
+
+  memory.loosen({});
+  EXPECT_GT(memory.innovation(measures(sum_, 0.13, 0.002)).nis, 25.0);
+}
+
+TEST_F(MemoryOfTwoJoints, PicturesThatAreDoubtedInRetrospectLeadNothingAstray) {
+  auto memory = this->memory();
+  for (int i = 0; i < 6; ++i) next(memory, both(sum_, 0.03, difference_, -0.01, 0.002));
+  const double moving_s = time_s_ + 0.5;
+  for (int i = 1; i <= 6; ++i) next(memory, measures(sum_, 0.03 + 0.004 * i, 0.002));
+  const auto astray = memory.estimate().x;
+  EXPECT_GT(std::abs(astray[1] - 0.02), 2e-3);
+
+  auto doubted = memory;
+  doubted.loosen_since(0, moving_s);
+  EXPECT_NEAR(doubted.estimate().x[1], 0.02, 1e-3);
+  doubted.tighten_since(0, moving_s);
+  EXPECT_NEAR((doubted.estimate().x - astray).norm(), 0.0, 1e-12) << "believed again";
+}
+
+TEST_F(MemoryOfTwoJoints, ALooseJointIsLinearisedWhereItWas) {
+  auto memory = this->memory();
+  for (int i = 0; i < 3; ++i) next(memory, both(first_, 0.0, second_, 0.0, 0.001));
+  memory.loosen(std::vector<Eigen::Index>{0});
+  q_ += Eigen::Vector2d::Constant(kFarApart_rad);
+  memory.add(time_s_ += 1.0, q_, both(first_, 0.4, second_, 0.0, 0.001), Eigen::Vector2d(0.4, 0.0));
+  EXPECT_FALSE(memory.most_stale());
 }
 
 TEST_F(MemoryOfTwoJoints, DispersionTellsPosturesThatDisagreeFromThoseThatDoNot) {

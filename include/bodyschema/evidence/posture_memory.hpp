@@ -94,6 +94,14 @@ class PostureMemory {
 
   /// Some parameters changed at a time: what was known of them before holds no longer, the rest stays.
   void release(std::span<const Eigen::Index> parameters, double from_s);
+  /// From now on pictures find these joints wherever they are: what they read is believed of no posture, and pictures
+  /// tell of the rest what they tell of it wherever these joints were. Replaces those named before.
+  void loosen(std::span<const Eigen::Index> joints);
+  /// The same of the postures that began at this time or later.
+  void loosen_since(Eigen::Index joint, double from_s);
+  /// What the joint read in postures that began at this time or later is believed again.
+  void tighten_since(Eigen::Index joint, double from_s);
+  [[nodiscard]] std::span<const Eigen::Index> loose() const { return loose_; }
 
   [[nodiscard]] const MemoryEstimate& estimate() const;
   /// The estimate of one frame: the fused one with that posture's own error, seen by the frame's pictures.
@@ -108,6 +116,9 @@ class PostureMemory {
     Innovation left;
   };
   [[nodiscard]] Step step(const Quadratic& frame, std::span<const Eigen::Index> parameters) const;
+  /// By how much a frame's normalised innovation squared falls where one parameter alone may have stepped: of
+  /// chi-square distribution with one degree of freedom where none has. Of each of them.
+  [[nodiscard]] Eigen::VectorXd step_gains(const Quadratic& frame, std::span<const Eigen::Index> parameters) const;
 
   /// Chi-square of the state of one posture against everything that is known: with that posture's own error, and what
   /// is considered.
@@ -130,11 +141,20 @@ class PostureMemory {
   struct Block {
     std::uint64_t number = 0;
     double begin_s = 0.0, end_s = 0.0;
-    Eigen::VectorXd q;   ///< of its first frame
-    Quadratic pictures;  ///< of its first frame, as last linearised ...
-    Eigen::VectorXd x;   ///< ... about this state
+    Eigen::VectorXd q;                  ///< of its first frame
+    Quadratic pictures;                 ///< of its first frame, as last linearised ...
+    Eigen::VectorXd x;                  ///< ... about this state
+    std::vector<Eigen::Index> loose{};  ///< joints of which it tells nothing that others know
   };
-  [[nodiscard]] Quadratic with_posture_error(const Quadratic& block) const;
+  /// A frame's innovation along the directions that it tells, and what one unit of each parameter adds to it.
+  struct Surprise {
+    Eigen::VectorXd y;
+    Eigen::MatrixXd S;     ///< covariance of y
+    Eigen::MatrixXd to_y;  ///< d y / d estimated
+  };
+  [[nodiscard]] Surprise surprise(const Quadratic& frame) const;
+  [[nodiscard]] Quadratic with_posture_error(const Quadratic& block, std::span<const Eigen::Index> loose) const;
+  [[nodiscard]] double own_variance(Eigen::Index joint, std::span<const Eigen::Index> loose) const;
   [[nodiscard]] Quadratic sum(const Block* without = nullptr) const;
   [[nodiscard]] MemoryEstimate solve(const Quadratic& sum) const;
   [[nodiscard]] const Eigen::MatrixXd& posture_precision() const;
@@ -147,6 +167,7 @@ class PostureMemory {
   MemoryOptions options_;
   Quadratic prior_;
   std::vector<Block> blocks_;  ///< the last one is still open
+  std::vector<Eigen::Index> loose_;
   std::optional<Quadratic> old_;
   std::size_t old_postures_ = 0;
   std::uint64_t begun_ = 0;
