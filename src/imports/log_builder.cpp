@@ -300,17 +300,22 @@ void LogBuilder::doubt_unit() {
 }
 
 ImportSummary LogBuilder::finish() {
-  const auto pictures = [&] {
-    std::uint64_t all = 0;
-    for (const auto& camera : summary_.cameras) all += camera.pictures;
-    return all;
-  }();
+  std::uint64_t pictures = 0, masks = 0;
+  for (const auto& camera : summary_.cameras) {
+    pictures += camera.pictures;
+    masks += camera.masks;
+  }
   const auto first_picture_lost = std::find_if(summary_.left_out.begin(), summary_.left_out.end(), [](const auto& l) {
     return l.first.starts_with("pictures of camera ") || l.first == "videos";
   });
   if (pictures == 0) {
     throw FileError(log_.string() + ": not written: no picture of any camera" +
                     (first_picture_lost == summary_.left_out.end() ? "" : "; " + first_picture_lost->second.first));
+  }
+  const auto first_mask_lost = std::find_if(summary_.left_out.begin(), summary_.left_out.end(),
+                                            [](const auto& l) { return l.first.starts_with("masks of camera "); });
+  if (masks == 0 && first_mask_lost != summary_.left_out.end()) {
+    throw FileError(log_.string() + ": not written: no mask can be used; " + first_mask_lost->second.first);
   }
   if (summary_.joint_messages == 0 && ignored_.empty()) {
     // All names that came are known, and none is a joint.
@@ -323,6 +328,7 @@ ImportSummary LogBuilder::finish() {
   doubt_unit();
   for (const auto& camera : summary_.cameras) {
     if (camera.pictures == 0) note("no picture of camera '" + camera.name + "'");
+    if (camera.masks == 0 && masks > 0) note("no mask of camera '" + camera.name + "'");
   }
   for (std::size_t j = 0; j < readings_.size(); ++j) {
     if (readings_[j] > 0) summary_.joints.push_back(target_.robot->joints()[j].name);

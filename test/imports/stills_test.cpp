@@ -14,6 +14,7 @@ namespace bodyschema {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -142,6 +143,23 @@ TEST_F(Stills, BadMasksAreLeftOutAndSaid) {
   EXPECT_EQ(left.count, 2u);
   EXPECT_THAT(left.first, HasSubstr("masks/left/00.png: mask whose largest value is 1; expected 0 background, 128"));
   EXPECT_THAT(summary.text("x"), HasSubstr("left out, masks of camera left: 2; the first: "));
+}
+
+/// As where a network was given pictures of another size: a log without any would look as if none had been asked for.
+TEST_F(Stills, MasksOfWhichNoneFitsAreOneError) {
+  for (const std::string camera : {"left", "right"}) {
+    for (const std::string posture : {"00", "01"}) stills_.mask(camera + "/" + posture + ".png", 255, 16, 12);
+  }
+  EXPECT_THAT(error_of(target()), AllOf(HasSubstr("no mask can be used; "),
+                                        HasSubstr("masks/left/00.png is 16x12 px, its picture 8x6 px")));
+  StillsImportOptions without;
+  without.masks = false;
+  EXPECT_EQ(import(target(), without).cameras[0].pictures, 2u);
+  stills_.mask("right/01.png", 255);
+  const auto summary = import(target());
+  EXPECT_EQ(summary.left_out.at("masks of camera left").count, 2u);
+  EXPECT_EQ(summary.left_out.at("masks of camera right").count, 1u);
+  EXPECT_THAT(summary.notes, ElementsAre("no mask of camera 'left'"));
 }
 
 /// As of a pipeline that keeps transparency.
