@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/core/picture_size.hpp"
@@ -18,6 +19,19 @@ constexpr std::size_t kMostSetsOfNames = 1000;  // different lists of names that
 
 std::string size_text(int width, int height) {
   return std::to_string(width) + "x" + std::to_string(height);
+}
+
+/// Each missing joint's likely name in the recording, as a mapping has it; of the first alone, where one name would be
+/// that of two joints.
+std::vector<std::string> guessed_names(const std::vector<std::string>& missing, const std::vector<std::string>& names) {
+  std::vector<std::string> rules;
+  std::set<std::string> taken;
+  for (const std::string& joint : missing) {
+    const std::string name = nearest_name(joint, names);
+    if (taken.insert(name).second) rules.push_back(name + ": " + joint);
+  }
+  if (rules.size() < missing.size()) rules.resize(1);
+  return rules;
 }
 
 }  // namespace
@@ -270,8 +284,11 @@ void LogBuilder::check_joints() const {
   std::string text = fmt::format("no readings of joint{} {}", missing.size() == 1 ? "" : "s", fmt::join(missing, ", "));
   if (!ignored_.empty()) {
     const std::vector<std::string> names(ignored_.begin(), ignored_.end());
-    text += fmt::format("; is {} its name in the recording? Then say so: import: {{joints: {{{}: {}}}}}",
-                        nearest_name(missing.front(), names), nearest_name(missing.front(), names), missing.front());
+    const auto guesses = guessed_names(missing, names);
+    text += guesses.size() > 1
+                ? "; are these their names in the recording?"
+                : fmt::format("; is {} its name in the recording?", nearest_name(missing.front(), names));
+    text += fmt::format(" Then say so: import: {{joints: {{{}}}}}", fmt::join(guesses, ", "));
     text += fmt::format(" (names that are no joints of this robot: {})", fmt::join(ignored_, ", "));
   }
   const bool slides = target_.slides(missing.front());

@@ -218,6 +218,12 @@ TEST_F(Stills, AJointThatMattersAndHasNoColumnIsAsked) {
   EXPECT_THAT(error_of(target()),
               HasSubstr("no readings of joint joint1; is joint_1 its name in the recording? Then say so: import: "
                         "{joints: {joint_1: joint1}}"));
+  stills_.write("joints.csv", "posture,joint_1,joint_2,joint3,joint4,joint5,joint6,joint7\n0,1,2,3,4,5,6,7\n");
+  EXPECT_THAT(error_of(target()), HasSubstr("are these their names in the recording? Then say so: import: {joints: "
+                                            "{joint_1: joint1, joint_2: joint2}}"));
+  stills_.write("joints.csv", "posture,elbow,joint3,joint4,joint5,joint6,joint7\n0,1,3,4,5,6,7\n");
+  EXPECT_THAT(error_of(target()), HasSubstr("import: {joints: {elbow: joint1}} (names")) << "not of both";
+  stills_.write("joints.csv", "posture,joint_1,joint2,joint3,joint4,joint5,joint6,joint7\n0,1,2,3,4,5,6,7\n");
   EXPECT_EQ(import(target("import: {joints: {joint_1: joint1}}\n")).joints.size(), 7u);
 }
 
