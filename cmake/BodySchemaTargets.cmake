@@ -68,7 +68,8 @@ endfunction()
 
 # bodyschema_test(<folder> SOURCES ... [LINKS lib...] [LABELS ...] [TIMEOUT seconds] [LAST] [LONG] [LONG_TESTS ...] [FRESH])
 #   One GoogleTest program per folder of test/, named test_<folder>. LAST: its tests mostly wait, by a clock, for programs
-#   that need a processor at once; they begin when all others have begun, so that they run beside each other.
+#   that need a processor at once; they begin when all others have begun, so that they run beside each other, and each
+#   alone where sanitizers make the programs slow.
 #   LONG: logs of many pictures, label long; outside the default suite, ctest -C long -L long runs them. LONG_TESTS: only
 #   these of the program, as suite.test.
 #   FRESH: draws from BODYSCHEMA_SEED (test/random_seed.hpp), which is fixed in the default suite; ctest -C fresh -L fresh
@@ -91,9 +92,12 @@ function(bodyschema_test folder)
   endif()
   bodyschema_patient(timeout ${ARG_TIMEOUT})
   set(patience BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE})
-  set(cost)
+  set(order)
   if(ARG_LAST)
-    set(cost COST -1)  # ctest begins with the dearest; those it has not timed yet cost nothing
+    set(order COST -1)  # ctest begins with the dearest; those it has not timed yet cost nothing
+    if(BODYSCHEMA_TEST_PATIENCE GREATER 1)
+      list(APPEND order RUN_SERIAL TRUE)
+    endif()
   endif()
   if(ARG_LONG)
     bodyschema_tests_of(long_tests ${ARG_SOURCES})
@@ -107,7 +111,7 @@ function(bodyschema_test folder)
       set(filter TEST_FILTER "-${left_out}")
     endif()
     gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60 ${filter}
-      PROPERTIES TIMEOUT ${timeout} LABELS "${ARG_LABELS}" ${cost} ENVIRONMENT ${patience})
+      PROPERTIES TIMEOUT ${timeout} LABELS "${ARG_LABELS}" ${order} ENVIRONMENT ${patience})
   endif()
   if(ARG_FRESH)
     add_test(NAME fresh.${folder} CONFIGURATIONS fresh COMMAND ${target})
