@@ -1,5 +1,5 @@
-"""Runs workflow/Snakefile by Snakemake's way to a cluster. No cluster is here: a stand-in takes its place, which runs each
-script that is submitted later, in another folder and with nothing of this environment. Exit 77 means skipped.
+"""Runs workflow/Snakefile by Snakemake's way to a cluster. No cluster is here: a stand-in takes its place, which runs
+each script that is submitted later, in another folder and with nothing of this environment. Exit 77 means skipped.
 
 usage: cluster_workflow.py BIN_DIR SOURCE_DIR SCRATCH_DIR VENV_DIR
 """
@@ -45,10 +45,12 @@ def check(snakemake, options, programs, source, scratch):
     submit = scratch / "submit"
     submit.write_text(SUBMIT.format(scratch=scratch), encoding="utf-8")
     submit.chmod(0o755)
+    # CI: old ones look every second whether a job is done, not every ten.
+    environment = dict(os.environ, HOME=str(scratch), XDG_CACHE_HOME=str(scratch / "cache"), CI="true")
     done = subprocess.run([*snakemake, "-s", source / "workflow/Snakefile", *options,
                            f"{submit} -c {{threads}} --mem={{resources.mem_mb}}", "--jobs", "3", "--config",
                            "logs=logs", "out=fleet", f"program={programs}/bodyschema", "memory_mb=700"],
-                          cwd=scratch, env=dict(os.environ, HOME=str(scratch), XDG_CACHE_HOME=str(scratch / "cache")),
+                          cwd=scratch, env=environment,
                           text=True, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                           timeout=250 * PATIENCE)
     assert done.returncode == 0, done.stdout + (scratch / "jobs.txt").read_text(encoding="utf-8")
