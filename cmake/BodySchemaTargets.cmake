@@ -66,15 +66,16 @@ function(bodyschema_patient variable seconds)
   set(${variable} ${limit} PARENT_SCOPE)
 endfunction()
 
-# bodyschema_test(<folder> SOURCES ... [LINKS lib...] [LABELS ...] [TIMEOUT seconds] [RUN_SERIAL] [LONG] [LONG_TESTS ...]
-#                 [FRESH])
-#   One GoogleTest program per folder of test/, named test_<folder>. RUN_SERIAL: no other test beside its own.
+# bodyschema_test(<folder> SOURCES ... [LINKS lib...] [LABELS ...] [TIMEOUT seconds] [LAST] [LONG] [LONG_TESTS ...] [FRESH])
+#   One GoogleTest program per folder of test/, named test_<folder>. LAST: its tests mostly wait, by a clock, for programs
+#   that need a processor at once; they begin when all others have begun, so that they run beside each other, and each
+#   alone where sanitizers make the programs slow.
 #   LONG: logs of many pictures, label long; outside the default suite, ctest -C long -L long runs them. LONG_TESTS: only
 #   these of the program, as suite.test.
 #   FRESH: draws from BODYSCHEMA_SEED (test/random_seed.hpp), which is fixed in the default suite; ctest -C fresh -L fresh
 #   runs it with a seed that nobody has seen, and prints that.
 function(bodyschema_test folder)
-  cmake_parse_arguments(ARG "RUN_SERIAL;LONG;FRESH" "TIMEOUT" "SOURCES;LINKS;LABELS;LONG_TESTS" ${ARGN})
+  cmake_parse_arguments(ARG "LAST;LONG;FRESH" "TIMEOUT" "SOURCES;LINKS;LABELS;LONG_TESTS" ${ARGN})
   find_package(GTest REQUIRED)
   set(target test_${folder})
   add_executable(${target} ${ARG_SOURCES})
@@ -91,6 +92,13 @@ function(bodyschema_test folder)
   endif()
   bodyschema_patient(timeout ${ARG_TIMEOUT})
   set(patience BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE})
+  set(order)
+  if(ARG_LAST)
+    set(order COST -1)  # ctest begins with the dearest; those it has not timed yet cost nothing
+    if(BODYSCHEMA_TEST_PATIENCE GREATER 1)
+      list(APPEND order RUN_SERIAL TRUE)
+    endif()
+  endif()
   if(ARG_LONG)
     bodyschema_tests_of(long_tests ${ARG_SOURCES})
     bodyschema_long_tests(${target} ${long_tests})
@@ -103,7 +111,7 @@ function(bodyschema_test folder)
       set(filter TEST_FILTER "-${left_out}")
     endif()
     gtest_discover_tests(${target} DISCOVERY_TIMEOUT 60 ${filter}
-      PROPERTIES TIMEOUT ${timeout} LABELS "${ARG_LABELS}" RUN_SERIAL ${ARG_RUN_SERIAL} ENVIRONMENT ${patience})
+      PROPERTIES TIMEOUT ${timeout} LABELS "${ARG_LABELS}" ${order} ENVIRONMENT ${patience})
   endif()
   if(ARG_FRESH)
     add_test(NAME fresh.${folder} CONFIGURATIONS fresh COMMAND ${target})
@@ -129,6 +137,6 @@ macro(bodyschema_long_tests program)
   foreach(name ${ARGN})
     add_test(NAME long.${name} CONFIGURATIONS long COMMAND ${program} --gtest_filter=${name})
     set_tests_properties(long.${name} PROPERTIES TIMEOUT ${timeout} LABELS "long;${ARG_LABELS}"
-      RUN_SERIAL ${ARG_RUN_SERIAL} ENVIRONMENT ${patience})
+      ENVIRONMENT ${patience})
   endforeach()
 endmacro()

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/core/picture_size.hpp"
@@ -18,6 +19,19 @@ constexpr std::size_t kMostSetsOfNames = 1000;  // different lists of names that
 
 std::string size_text(int width, int height) {
   return std::to_string(width) + "x" + std::to_string(height);
+}
+
+/// Each missing joint's likely name in the recording, as a mapping has it; of the first alone, where one name would be
+/// that of two joints.
+std::vector<std::string> guessed_names(const std::vector<std::string>& missing, const std::vector<std::string>& names) {
+  std::vector<std::string> rules;
+  std::set<std::string> taken;
+  for (const std::string& joint : missing) {
+    const std::string name = nearest_name(joint, names);
+    if (taken.insert(name).second) rules.push_back(name + ": " + joint);
+  }
+  if (rules.size() < missing.size()) rules.resize(1);
+  return rules;
 }
 
 }  // namespace
@@ -270,8 +284,11 @@ void LogBuilder::check_joints() const {
   std::string text = fmt::format("no readings of joint{} {}", missing.size() == 1 ? "" : "s", fmt::join(missing, ", "));
   if (!ignored_.empty()) {
     const std::vector<std::string> names(ignored_.begin(), ignored_.end());
-    text += fmt::format("; is {} its name in the recording? Then say so: import: {{joints: {{{}: {}}}}}",
-                        nearest_name(missing.front(), names), nearest_name(missing.front(), names), missing.front());
+    const auto guesses = guessed_names(missing, names);
+    text += guesses.size() > 1
+                ? "; are these their names in the recording?"
+                : fmt::format("; is {} its name in the recording?", nearest_name(missing.front(), names));
+    text += fmt::format(" Then say so: import: {{joints: {{{}}}}}", fmt::join(guesses, ", "));
     text += fmt::format(" (names that are no joints of this robot: {})", fmt::join(ignored_, ", "));
   }
   const bool slides = target_.slides(missing.front());
@@ -300,17 +317,22 @@ void LogBuilder::doubt_unit() {
 }
 
 ImportSummary LogBuilder::finish() {
-  const auto pictures = [&] {
-    std::uint64_t all = 0;
-    for (const auto& camera : summary_.cameras) all += camera.pictures;
-    return all;
-  }();
+  std::uint64_t pictures = 0, masks = 0;
+  for (const auto& camera : summary_.cameras) {
+    pictures += camera.pictures;
+    masks += camera.masks;
+  }
   const auto first_picture_lost = std::find_if(summary_.left_out.begin(), summary_.left_out.end(), [](const auto& l) {
     return l.first.starts_with("pictures of camera ") || l.first == "videos";
   });
   if (pictures == 0) {
     throw FileError(log_.string() + ": not written: no picture of any camera" +
                     (first_picture_lost == summary_.left_out.end() ? "" : "; " + first_picture_lost->second.first));
+  }
+  const auto first_mask_lost = std::find_if(summary_.left_out.begin(), summary_.left_out.end(),
+                                            [](const auto& l) { return l.first.starts_with("masks of camera "); });
+  if (masks == 0 && first_mask_lost != summary_.left_out.end()) {
+    throw FileError(log_.string() + ": not written: no mask can be used; " + first_mask_lost->second.first);
   }
   if (summary_.joint_messages == 0 && ignored_.empty()) {
     // All names that came are known, and none is a joint.
@@ -323,6 +345,7 @@ ImportSummary LogBuilder::finish() {
   doubt_unit();
   for (const auto& camera : summary_.cameras) {
     if (camera.pictures == 0) note("no picture of camera '" + camera.name + "'");
+    if (camera.masks == 0 && masks > 0) note("no mask of camera '" + camera.name + "'");
   }
   for (std::size_t j = 0; j < readings_.size(); ++j) {
     if (readings_[j] > 0) summary_.joints.push_back(target_.robot->joints()[j].name);

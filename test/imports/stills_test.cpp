@@ -14,6 +14,7 @@ namespace bodyschema {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -144,6 +145,23 @@ TEST_F(Stills, BadMasksAreLeftOutAndSaid) {
   EXPECT_THAT(summary.text("x"), HasSubstr("left out, masks of camera left: 2; the first: "));
 }
 
+/// As where a network was given pictures of another size: a log without any would look as if none had been asked for.
+TEST_F(Stills, MasksOfWhichNoneFitsAreOneError) {
+  for (const std::string camera : {"left", "right"}) {
+    for (const std::string posture : {"00", "01"}) stills_.mask(camera + "/" + posture + ".png", 255, 16, 12);
+  }
+  EXPECT_THAT(error_of(target()), AllOf(HasSubstr("no mask can be used; "),
+                                        HasSubstr("masks/left/00.png is 16x12 px, its picture 8x6 px")));
+  StillsImportOptions without;
+  without.masks = false;
+  EXPECT_EQ(import(target(), without).cameras[0].pictures, 2u);
+  stills_.mask("right/01.png", 255);
+  const auto summary = import(target());
+  EXPECT_EQ(summary.left_out.at("masks of camera left").count, 2u);
+  EXPECT_EQ(summary.left_out.at("masks of camera right").count, 1u);
+  EXPECT_THAT(summary.notes, ElementsAre("no mask of camera 'left'"));
+}
+
 /// As of a pipeline that keeps transparency.
 TEST_F(Stills, PicturesWithAnAlphaChannelAreReadWithoutIt) {
   for (const std::string camera : {"left", "right"}) {
@@ -200,6 +218,12 @@ TEST_F(Stills, AJointThatMattersAndHasNoColumnIsAsked) {
   EXPECT_THAT(error_of(target()),
               HasSubstr("no readings of joint joint1; is joint_1 its name in the recording? Then say so: import: "
                         "{joints: {joint_1: joint1}}"));
+  stills_.write("joints.csv", "posture,joint_1,joint_2,joint3,joint4,joint5,joint6,joint7\n0,1,2,3,4,5,6,7\n");
+  EXPECT_THAT(error_of(target()), HasSubstr("are these their names in the recording? Then say so: import: {joints: "
+                                            "{joint_1: joint1, joint_2: joint2}}"));
+  stills_.write("joints.csv", "posture,elbow,joint3,joint4,joint5,joint6,joint7\n0,1,3,4,5,6,7\n");
+  EXPECT_THAT(error_of(target()), HasSubstr("import: {joints: {elbow: joint1}} (names")) << "not of both";
+  stills_.write("joints.csv", "posture,joint_1,joint2,joint3,joint4,joint5,joint6,joint7\n0,1,2,3,4,5,6,7\n");
   EXPECT_EQ(import(target("import: {joints: {joint_1: joint1}}\n")).joints.size(), 7u);
 }
 

@@ -144,6 +144,14 @@ if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
   bodyschema_patient(timeout 600)
   set_tests_properties(fleet.workflow PROPERTIES LABELS integration TIMEOUT ${timeout} SKIP_RETURN_CODE 77
     ENVIRONMENT BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE})
+  # Without a cluster; skipped where neither an old Snakemake nor PyPI's, with its plugin for clusters, is to be had.
+  add_test(NAME fleet.workflow_on_a_cluster
+    COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/fleet/cluster_workflow.py
+      ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/test-fleet-cluster
+      ${PROJECT_BINARY_DIR}/venv-snakemake)
+  bodyschema_patient(timeout 600)
+  set_tests_properties(fleet.workflow_on_a_cluster PROPERTIES LABELS integration TIMEOUT ${timeout} SKIP_RETURN_CODE 77
+    ENVIRONMENT "PYTHONDONTWRITEBYTECODE=1;BODYSCHEMA_TEST_PATIENCE=${BODYSCHEMA_TEST_PATIENCE}")
 endif()
 
 find_program(BODYSCHEMA_JAVA java)

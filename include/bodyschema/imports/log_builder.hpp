@@ -93,7 +93,7 @@ class LogBuilder {
   void note(std::string sentence) { summary_.notes.push_back(std::move(sentence)); }
 
   /// Throws FileError naming a joint without readings that the robot needs, and where nothing at all, or no picture of
-  /// any camera, has been added.
+  /// any camera, has been added, or masks were there and not one of them could be used.
   ImportSummary finish();
 
  private:
