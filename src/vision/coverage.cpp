@@ -19,10 +19,20 @@ constexpr int kAnyWeight = 1;
 // blur of the outline, the second shows how colour changes.
 constexpr float kNearDepth = 1.5f;
 constexpr float kFarDepth = 3.1f;
+// Colour of compressed pictures is kept at half the resolution and less: that deep it is the robot's alone.
+constexpr float kColourDepth = 3.5f;
 // Mean depth of the robot's part in a pixel on the outline, px.
 constexpr float kEdgeDepth = 0.35f;
 // Farther than this from the outline a pixel is all robot or all background, px.
 constexpr float kReach = 1.75f;
+// The same where colour bleeds over the outline; its ramp is no flatter than this, per px.
+constexpr float kReachOfColour = 2.5f;
+constexpr float kLeastSlopeOfColour = 0.15f;
+
+/// By what colour changes from the near depth to this one, times what it changes by from a far one to the near one.
+float gain(float depth, float far) {
+  return (std::sqrt(kNearDepth) - std::sqrt(depth)) / (std::sqrt(far) - std::sqrt(kNearDepth));
+}
 
 // How far beyond the outline pixels can differ from the background by their blur, px.
 constexpr float kRoughMargin = 0.9f;
@@ -57,22 +67,31 @@ float background_change(const BackgroundModel& background, int u, int v) {
   return largest;
 }
 
-// Compression keeps colour at half the resolution and in coarse steps: its errors beside an outline are so much larger
-// than those of brightness. Squared.
-constexpr float kColourVariance = 16.0f;
+// Of red, green and blue in what JPEG and video call luma.
+constexpr std::array<float, 3> kBrightness = {0.299f, 0.587f, 0.114f};
+// Compression keeps colour in coarser steps than brightness: its errors beside an outline are larger, and it changes so
+// slowly there that the same error moves an outline by several times as much. Squared.
+constexpr float kColourVariance = 2.0f;
+// Levels, squared: the robot's brightness on the outline, from pixels that each err by two, is known no better.
+constexpr float kBrightnessVariance = 16.0f;
+
+float brightness_of(const std::array<float, 3>& colour) {
+  float sum = 0.0f;
+  for (std::size_t c = 0; c < kBrightness.size(); ++c) sum += kBrightness[c] * colour[c];
+  return sum;
+}
 
 /// Where the difference of a pixel from its background lies on the way to the robot's, both as brightness and colour
 /// of compressed pictures tell it, by their variances.
 float share_by_brightness(const std::array<float, 3>& seen, const std::array<float, 3>& inside) {
-  // Of red, green and blue in what JPEG and video call luma.
-  constexpr std::array<float, 3> kBrightness = {0.299f, 0.587f, 0.114f};
-  float seen_brightness = 0.0f, brightness = 0.0f;
-  for (std::size_t c = 0; c < kBrightness.size(); ++c) {
-    seen_brightness += kBrightness[c] * seen[c];
-    brightness += kBrightness[c] * inside[c];
+  const float seen_brightness = brightness_of(seen), brightness = brightness_of(inside);
+  float along = 0.0f, contrast = 0.0f;
+  // The square of a number that is not known well is too large by its variance.
+  if (const float square = brightness * brightness - kBrightnessVariance; square > 0.0f) {
+    along = 3.0f * seen_brightness * brightness;
+    contrast = 3.0f * square;
   }
-  float along = 3.0f * seen_brightness * brightness, contrast = 3.0f * brightness * brightness;
-  for (std::size_t c = 0; c < kBrightness.size(); ++c) {
+  for (std::size_t c = 0; c < seen.size(); ++c) {
     const float colour = inside[c] - brightness;
     along += (seen[c] - seen_brightness) * colour / kColourVariance;
     contrast += colour * colour / kColourVariance;
@@ -234,7 +253,11 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
     if (steepness < kLeastSlope) continue;
     const float nu = pixel.slope_u / steepness;
     const float nv = pixel.slope_v / steepness;
-    const float depth = std::clamp((pixel.smooth - 0.5f) * 2.5f, -kReach, kReach) - (rough ? kRoughMargin : 0.0f);
+    float depth = std::clamp((pixel.smooth - 0.5f) * 2.5f, -kReach, kReach) - (rough ? kRoughMargin : 0.0f);
+    if (!sharp_colours && !rough) {
+      depth =
+          std::clamp((pixel.smooth - 0.5f) / std::max(steepness, kLeastSlopeOfColour), -kReachOfColour, kReachOfColour);
+    }
     const auto u = static_cast<float>(pixel.u) + nu * depth;
     const auto v = static_cast<float>(pixel.v) + nv * depth;
 
@@ -243,18 +266,17 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
     std::array<float, 3> far{};
     int near_count = 0;
     int far_count = 0;
-    for (int side = rough ? 0 : -1; side <= (rough ? 0 : 1); ++side) {
-      const float su = u - nv * static_cast<float>(side);
-      const float sv = v + nu * static_cast<float>(side);
+    const auto add = [&](int side, float beneath, std::array<float, 3>& sum, int& count) {
+      const float across = static_cast<float>(side);
       std::array<float, 3> colour{};
-      if (read(su - nu * kNearDepth, sv - nv * kNearDepth, colour)) {
-        ++near_count;
-        for (std::size_t c = 0; c < channels; ++c) near[c] += colour[c];
-      }
-      if (read(su - nu * kFarDepth, sv - nv * kFarDepth, colour)) {
-        ++far_count;
-        for (std::size_t c = 0; c < channels; ++c) far[c] += colour[c];
-      }
+      if (!read(u - nv * across - nu * beneath, v + nu * across - nv * beneath, colour)) return;
+      ++count;
+      for (std::size_t c = 0; c < channels; ++c) sum[c] += colour[c];
+    };
+    const int sides = rough ? 0 : 1;
+    for (int side = -sides; side <= sides; ++side) {
+      add(side, kNearDepth, near, near_count);
+      add(side, sharp_colours ? kFarDepth : kColourDepth, far, far_count);
     }
     if (near_count == 0) {
       if (!pixel.robot_known) average_nearby(image, sure, pixel);
@@ -262,15 +284,29 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
     }
     const auto i =
         static_cast<std::size_t>(pixel.v) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(pixel.u);
-    static const float kGain =
-        (std::sqrt(kNearDepth) - std::sqrt(kEdgeDepth)) / (std::sqrt(kFarDepth) - std::sqrt(kNearDepth));
-    // Where compression has let colours bleed, what they change by with depth is that, not the robot's shading.
-    float change = 0.0f;
-    float contrast = 0.0f;
-    std::array<float, 3> step{};
     for (std::size_t c = 0; c < channels; ++c) {
       near[c] /= static_cast<float>(near_count);
-      step[c] = far_count == 0 || !sharp_colours ? 0.0f : kGain * (near[c] - far[c] / static_cast<float>(far_count));
+      far[c] = far_count == 0 ? near[c] : far[c] / static_cast<float>(far_count);
+    }
+    std::array<float, 3> step{};
+    if (sharp_colours) {
+      for (std::size_t c = 0; c < channels; ++c) step[c] = gain(kEdgeDepth, kFarDepth) * (near[c] - far[c]);
+    } else {
+      // Brightness by the law, at the pixel's own depth; what colours change by beside an outline is no shading.
+      const float change = gain(std::clamp(depth, kEdgeDepth, kNearDepth), kColourDepth);
+      if (channels == 1) {
+        step[0] = change * (near[0] - far[0]);
+      } else {
+        const float brightness = brightness_of(near), deep = brightness_of(far);
+        for (std::size_t c = 0; c < channels; ++c) {
+          near[c] = brightness + (far[c] - deep);
+          step[c] = change * (brightness - deep);
+        }
+      }
+    }
+    float change = 0.0f;
+    float contrast = 0.0f;
+    for (std::size_t c = 0; c < channels; ++c) {
       const float f = near[c] - background.mean[i * channels + c];
       change += step[c] * step[c];
       contrast += f * f;
@@ -294,7 +330,8 @@ void CoverageEstimator::estimate(const Image& image, const BackgroundModel& back
   uncertain.fill(false);
   collect_band(image, detected, sure);
   if (box_.empty()) return;
-  for (int round = 0; round < 2; ++round) {
+  const int rounds = sharp_colours ? 2 : 3;
+  for (int round = 0; round < rounds; ++round) {
     smooth();
     look_inside(image, background, sure, round == 0, sharp_colours);
     project(image, background, least_contrast_sigma, sharp_colours);

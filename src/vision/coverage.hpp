@@ -17,7 +17,9 @@ namespace bodyschema {
 /// the colour along the outline's normal just inside the outline, extrapolated to the outline
 /// itself with the law that shading follows on a smooth surface that turns away from the camera
 /// (its normal, and with it the light, changes with the square root of the depth). The outline in
-/// turn is where a is one half: two rounds, from the outline of the pixels that differ.
+/// turn is where a is one half: two rounds, from the outline of the pixels that differ. Where colours bleed, brightness
+/// follows that law and colour is read deeper inside, and both say by their variances; one round more, since the pixels
+/// that differ reach further out.
 class CoverageEstimator {
  public:
   /// @param detected  pixels where a robot may be: all of it and at most ~2 px around it

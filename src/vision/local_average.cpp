@@ -73,9 +73,9 @@ void LocalAverage::average_strip(const Image& image, const BinaryMask& wanted, c
 }
 
 void LocalAverage::around(const Image& image, const BinaryMask& robot, const BinaryMask& wanted, const PixelBox& box,
-                          int radius, BackgroundModel& local) {
+                          int beside_px, int radius, BackgroundModel& local) {
   beside_ = robot;
-  morphology_.dilate(beside_, 2);
+  morphology_.dilate(beside_, beside_px);
   // In strips of one word's pixels, and of these only the rows about what is wanted.
   for (int word = box.u0 >> 6; word <= box.u1 >> 6; ++word) {
     PixelBox strip{std::max(64 * word, box.u0), 0, std::min(64 * word + 63, box.u1), 0};

@@ -14,14 +14,16 @@ namespace bodyschema {
 /// once warm. One per camera and thread.
 class LocalAverage {
  public:
-  /// Of pixels more than two away from the robot, over squares of this half side, px. Pixels of the box without any
-  /// within reach, and those that are known already, keep what `local` says of them.
+  /// Of pixels of the box that are not near the robot. Those without any within reach, and those that are known
+  /// already, keep what `local` says of them.
   /// @param wanted  pixels that are asked for
+  /// @param beside_px  nearer than this to the robot pixels are mixtures
+  /// @param radius  half side of the squares that are averaged, px
   /// @param local  in: noise_sd; out: mean and precision of wanted pixels of the box. A varied background is as
   /// uncertain
   ///   as it is varied.
-  void around(const Image& image, const BinaryMask& robot, const BinaryMask& wanted, const PixelBox& box, int radius,
-              BackgroundModel& local);
+  void around(const Image& image, const BinaryMask& robot, const BinaryMask& wanted, const PixelBox& box, int beside_px,
+              int radius, BackgroundModel& local);
 
  private:
   static constexpr std::size_t kMostPlanes = 5;  ///< colours, their squares, the number of pixels

@@ -21,6 +21,8 @@ constexpr float kMostEvidence = 1.4f;
 constexpr float kPriorSlope = 0.08f;
 // The local background is the mean over a square with this half side, px.
 constexpr int kLocalRadius = 6;
+// So near to the robot pixels are mixtures, px.
+constexpr int kMixed = 2;
 
 }  // namespace
 
@@ -217,7 +219,7 @@ void RegionStatistics::separate(const Image& image, const BinaryMask& predicted,
     }
   }
   work_.fill(true);
-  average_.around(image, robot, work_, box_, kLocalRadius, local);
+  average_.around(image, robot, work_, box_, kMixed, kLocalRadius, local);
 }
 
 }  // namespace bodyschema

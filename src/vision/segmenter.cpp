@@ -11,6 +11,7 @@
 #include "bodyschema/vision/mask_operations.hpp"
 #include "bodyschema/vision/mask_picture.hpp"
 #include "colour_evidence.hpp"
+#include "colour_resolution.hpp"
 #include "coverage.hpp"
 #include "learned_background.hpp"
 #include "local_average.hpp"
@@ -82,6 +83,8 @@ constexpr double kHolds = 0.6, kSameThoughTurned = 0.97;
 constexpr int kMostMisfits = 10;
 // The background nobody knows is averaged over squares of this half side, px; twice that where there is none so near.
 constexpr double kAverage_px = 3.0;
+// So near to the robot pixels are mixtures; where colours bleed, up to there. Pixels of the picture, whatever its size.
+constexpr int kMixed_px = 2, kBled_px = 4;
 // Beside the robot the background varies more where pictures were compressed: measured between these distances from the
 // predicted outline, px, beyond blur and within the blocks that an outline spoils; by the quantile of squared
 // differences that nineteen in twenty stay below (chi-square of one and of three channels).
@@ -201,6 +204,7 @@ struct Segmenter::Impl {
   Image relit;                                   // auto: the last picture in the light of the learned background
   std::array<float, 3> light{1.0f, 1.0f, 1.0f};  // auto: gain of this picture, by channel
   float edge_variance = 1.0f;                    // auto: beside the robot, times that of still areas
+  bool bleeds = false;                           // auto: colour of the last picture, over outlines
   bool turned = false;                           // auto: the camera, since the background was learned
   int misfits = 0;                               // auto: pictures in a row that the background does not fit
   std::vector<float> ratios;                     // auto: of squared differences to their variances
@@ -361,8 +365,8 @@ void Segmenter::Impl::refine(const Image& image, const BackgroundModel& model, B
   // Beside a background that nobody knows, its own variety counts as noise: half as much contrast puts outlines half a
   // pixel off at most.
   const double least = (setup.method == SegmentationMethod::kAuto ? 0.5 : 1.0) * setup.least_contrast_sigma;
-  coverage_estimator.estimate(image, model, detected, sure, static_cast<float>(least), edge_variance < kCompressed,
-                              mask, uncertain, coverage);
+  coverage_estimator.estimate(image, model, detected, sure, static_cast<float>(least),
+                              !bleeds && edge_variance < kCompressed, mask, uncertain, coverage);
   if (setup.method == SegmentationMethod::kStatistics) {
     soften(mask, coverage);
   } else {
@@ -685,7 +689,8 @@ void Segmenter::Impl::measure_edge_noise(const Image& image) {
   const auto at = ratios.begin() + static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(ratios.size()));
   std::nth_element(ratios.begin(), at, ratios.end());
   const float now = std::max(1.0f, *at / (n == 1 ? kChiSquare1 : kChiSquare3));
-  edge_variance += kEdgeShare * (now - edge_variance);
+  // Of a picture that was compressed the first is as good as any: whatever else it shows, colours bleed.
+  edge_variance += (bleeds && edge_variance == 1.0f ? 1.0f : kEdgeShare) * (now - edge_variance);
 }
 
 void Segmenter::Impl::forget_background() {
@@ -732,8 +737,11 @@ void Segmenter::Impl::find_background(const Image& image, bool holds) {
     }
   }
   const double unit = unit_of(width, height);
-  average.around(image, sure, wanted, evidence.box(), static_cast<int>(kAverage_px * unit), local);
-  average.around(image, sure, wanted, evidence.box(), static_cast<int>(2.0 * kAverage_px * unit), local);
+  const int beside_px = bleeds ? kBled_px : kMixed_px;
+  for (const double radius_px : {kAverage_px, 2.0 * kAverage_px}) {
+    const int reach_px = static_cast<int>(radius_px * unit) + beside_px - kMixed_px;
+    average.around(image, sure, wanted, evidence.box(), beside_px, reach_px, local);
+  }
 }
 
 void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryMask& valid,
@@ -749,6 +757,7 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
     beside = *predicted.silhouette;
     morphology.dilate(beside, static_cast<int>(std::ceil(reach_px)));
   }
+  bleeds = colours_bleed(image, light_grid());
   const Image& seen = in_known_light(image);
   const bool holds = background_holds(seen);
   if (predicted.silhouette == nullptr) {
@@ -763,6 +772,9 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
   }
   const bool everywhere = reach_px >= ColourEvidence::kEverywhere_px * unit;
   evidence.look_at(*predicted.silhouette, reach_px, holds && everywhere);
+  // What lies beside a prediction that is far off is the robot.
+  const bool beside_it = !from_stills || reach_px < static_cast<double>(kBesideTo_px) * unit;
+  if (holds && !everywhere && beside_it) measure_edge_noise(seen);
   detected.fill(false);
   sure.fill(false);
   known.fill(false);
@@ -790,10 +802,7 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
       detected.row(v)[w] = (detected.row(v)[w] & k & near) | (robot.row(v)[w] & ~k) | sure.row(v)[w];
     }
   }
-  // What lies beside a prediction that is far off is the robot.
-  const bool beside_it = !from_stills || reach_px < static_cast<double>(kBesideTo_px) * unit;
   find_background(seen, holds);
-  if (holds && !everywhere && beside_it) measure_edge_noise(seen);
   valid.fill(true);
   refine(seen, local, mask, valid, coverage);
   evidence.mark_weak(robot);
