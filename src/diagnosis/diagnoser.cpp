@@ -171,10 +171,15 @@ class Diagnoser {
     auto trials = trials_of(field, round == 0);
     for (std::size_t tried = 0; !trials.empty() && tried < limits::kMostTried; ++tried) {
       const Trial* best = choose(field, trials);
+      auto model = with(field, *best);
+      if (model && best->candidate->z() >= threshold_of(best->candidate->stated)) {
+        best = fits_better(field, trials, *best, *model);
+      }
       const auto cause = best->candidate->cause;
       spdlog::debug("diagnosis: {} {}, z {:.1f} (chance: {:.1f}), held-out gain {:.0f}", cause.text(),
                     best->candidate->variable, best->candidate->z(), field.threshold, best->gain);
-      if (take(field, *best)) {
+      if (model) {
+        search_.take(std::move(*model));
         spdlog::debug("diagnosis: fitted, cost {:.4f}, z {:.1f}", search_.cost(), z_of_last());
         // What is large bends the very sums by which it is judged: so it is judged where it is fitted.
         const double threshold = threshold_of(best->candidate->stated);
@@ -283,7 +288,7 @@ class Diagnoser {
     return left.diagonal().cwiseQuotient(S.diagonal().tail(own)).maxCoeff() < limits::kSameChange;
   }
 
-  bool take(const Field& field, const Trial& trial) {
+  std::optional<ModelSearch::Extended> with(const Field& field, const Trial& trial) {
     const auto& candidate = *trial.candidate;
     FoundCause cause{.name = candidate.cause, .variable = candidate.variable, .from = candidate.from};
     cause.stated = candidate.stated;
@@ -293,7 +298,29 @@ class Diagnoser {
     cause.duration_s = end - begin;
     cause.amounts = candidate.amounts;
     cause.columns = static_cast<std::size_t>(candidate.columns.size());
-    return search_.add(cause, trial.heldout.estimate, field.base.size());
+    return search_.with(cause, trial.heldout.estimate, field.base.size());
+  }
+
+  /// Sums about a model that is far off rank causes poorly: those as simple as the best that seem to explain much of
+  /// the same are fitted too, and one that then leaves clearly less is taken.
+  /// @param model  the model with `best`; afterwards with the one that is returned
+  const Trial* fits_better(const Field& field, const std::vector<Trial>& trials, const Trial& best,
+                           ModelSearch::Extended& model) {
+    if (!search_.refits() || best.candidate->generic()) return &best;
+    const Trial* better = &best;
+    std::size_t tried = 1;
+    for (const auto& trial : trials) {
+      const auto& rival = *trial.candidate;
+      if (&trial == &best || rival.generic() || trial.plausible != best.plausible) continue;
+      if (rival.parameters.size() > best.candidate->parameters.size()) continue;
+      if (trial.gain < limits::kRivalShare * best.gain || tried++ == limits::kMostTried) break;
+      auto other = with(field, trial);
+      const double explained = search_.cost() - model.cost;
+      if (!other || search_.cost() - other->cost < (1.0 + limits::kAlikeShare) * explained) continue;
+      model = std::move(*other);
+      better = &trial;
+    }
+    return better;
   }
 
   /// Takes out the cause that the log needs least, where it does not need it any more.

@@ -155,13 +155,11 @@ void ModelSearch::take_over(State& to, const State& from) {
   to.set(x);
 }
 
-bool ModelSearch::add(const FoundCause& cause, const Eigen::VectorXd& estimate, Eigen::Index base) {
+std::optional<ModelSearch::Extended> ModelSearch::with(const FoundCause& cause, const Eigen::VectorXd& estimate,
+                                                       Eigen::Index base) {
   auto causes = causes_;
   causes.push_back(cause);
-  if (!in_state(cause)) {
-    causes_ = std::move(causes);
-    return true;
-  }
+  if (!in_state(cause)) return Extended{std::move(causes), state_, cost_};
   State stepped = state_;
   stepped.set(state_.x() + estimate.head(state_.size()));
   State state = state_with(causes);
@@ -177,13 +175,18 @@ bool ModelSearch::add(const FoundCause& cause, const Eigen::VectorXd& estimate, 
   }
   state.set(x);
   const double cost = fit(state, 0.0);
-  if (cost >= cost_ * (1.0 - limits::kLeastGain)) return false;
-  cost_ = cost;
-  causes_ = std::move(causes);
-  state_ = std::move(state);
+  if (cost >= cost_ * (1.0 - limits::kLeastGain)) return std::nullopt;
+  return Extended{std::move(causes), std::move(state), cost};
+}
+
+void ModelSearch::take(Extended extended) {
+  const bool beside = !in_state(extended.causes.back());
+  causes_ = std::move(extended.causes);
+  if (beside) return;
+  cost_ = extended.cost;
+  state_ = std::move(extended.state);
   measure_noise();
   cost_ = fit(state_, 0.0);
-  return true;
 }
 
 void ModelSearch::drop(std::size_t cause) {

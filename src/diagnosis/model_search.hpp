@@ -49,9 +49,17 @@ class ModelSearch {
   [[nodiscard]] LogAbout about(double block_s);
   [[nodiscard]] BlockRegression regression(const LogAbout& log) const;
 
-  /// Takes a cause in and fits again. False, and nothing changes, where that is no better.
+  /// The model with one cause more.
+  struct Extended {
+    std::vector<FoundCause> causes;
+    State state;
+    double cost = 0.0;
+  };
+  /// ... fitted again; none: that is no better. Nothing changes yet.
   /// @param estimate  of the base's parameters (steps), then of the cause's columns
-  bool add(const FoundCause& cause, const Eigen::VectorXd& estimate, Eigen::Index base);
+  std::optional<Extended> with(const FoundCause& cause, const Eigen::VectorXd& estimate, Eigen::Index base);
+  /// Takes that cause in.
+  void take(Extended extended);
   void drop(std::size_t cause);
   /// Where a part of the log lies out of sight of the model: tries a slip of every joint there.
   void look_for_lost_part();

@@ -27,10 +27,6 @@ using simulator::FaultSpec;
 using HandTruth = std::map<std::pair<Microseconds, std::size_t>, Eigen::Vector3d>;
 
 /// Faults of covers, cameras and held things, which draw_fault does not draw.
-struct Drawn {
-  const char* spec;
-  double value;  ///< in its unit, to begin with; 0: it has none
-};
 constexpr std::array<Drawn, 9> kCoversAndCameras = {{{"mesh_scale:part=hand", 2.0},
                                                      {"mesh_scale:part=forearm", 2.0},
                                                      {"cover_dilation:part=hand", 1.0},
@@ -110,7 +106,7 @@ class TrialRobot {
       return low * std::pow(ratio, random.uniform(0.0, 1.0));
     };
     if (row == kSingle && random.uniform(0.0, 1.0) < kShareOfCoversAndCameras) {
-      return {sized(draw_cover_or_camera(random), wanted(), plan)};
+      return {sized(draw_cover_or_camera(random, kind_.masks), wanted(), plan)};
     }
     simulator::DrawOptions options;
     options.outside_catalogue = row == kOutside;
@@ -138,8 +134,9 @@ class TrialRobot {
     return answers;
   }
 
-  static FaultSpec draw_cover_or_camera(simulator::Random& random) {
-    const auto& drawn = kCoversAndCameras[random.below(kCoversAndCameras.size())];
+  static FaultSpec draw_cover_or_camera(simulator::Random& random, bool masks) {
+    const auto shown = covers_and_cameras(masks);
+    const auto& drawn = shown[random.below(shown.size())];
     auto fault = FaultSpec::parse(drawn.spec);
     if (drawn.value <= 0.0) return fault;
     // A cover is never drilled out: it is as moulded, or thicker.
@@ -275,6 +272,12 @@ std::optional<TrialRobot> official_robot(const ExperimentContext& context) {
 }
 
 }  // namespace
+
+std::vector<Drawn> covers_and_cameras(bool masks) {
+  std::vector<Drawn> shown(kCoversAndCameras.begin(), kCoversAndCameras.end());
+  if (masks) std::erase_if(shown, [](const Drawn& drawn) { return is_held(FaultSpec::parse(drawn.spec)); });
+  return shown;
+}
 
 double Outcome::size() const {
   const bool held = std::any_of(faults.begin(), faults.end(), is_held);

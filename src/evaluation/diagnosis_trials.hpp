@@ -40,6 +40,13 @@ struct Outcome {
   [[nodiscard]] double size() const;
 };
 
+struct Drawn {
+  const char* spec;
+  double value;  ///< in its unit, to begin with; 0: it has none
+};
+/// Single causes of covers, cameras and held things; a mask is the robot's alone, and no held thing shows in it.
+std::vector<Drawn> covers_and_cameras(bool masks);
+
 /// Whether the answer stands behind what it lists.
 bool is_named(const Outcome& o);
 /// The fault is in the class of some cause that is named; a thing that is held is said to be there.

@@ -69,6 +69,18 @@ TEST(HiddenFault, AThickerCoverIsNamedByItsPart) {
   EXPECT_TRUE(test::names_only_part(report, "r_forearm")) << report.sentence;
 }
 
+/// As far off as outlines are looked for. Sums about a model so wrong preferred everything thicker, then took a forearm
+/// that is not, and ended in six causes and no answer.
+TEST(HiddenFault, AGloveIsThePartThatWearsIt) {
+  test::Simulated what;
+  what.seed = test::seed() + 2;
+  what.faults = {"cover_dilation:part=hand,value=8"};
+  const auto report = test::SimulatedLog(what).diagnosis();
+  EXPECT_TRUE(test::is_named(report)) << report.sentence;
+  ASSERT_FALSE(report.causes.empty());
+  EXPECT_EQ(report.causes.front().cause, (CauseName{"silhouette_bias", "", "r_hand"})) << report.sentence;
+}
+
 /// About its line of sight, where no joint offset makes up for it.
 TEST(HiddenFault, ATurnedCameraIsNamed) {
   const auto report = answer({"camera_rotation:source=left,axis=z,value=0.7"});

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace bodyschema::diagnosis_trials {
 namespace {
 
@@ -61,6 +63,17 @@ TEST(DiagnosisTrials, AThingThatIsHeldIsFoundWhereSomethingIsSaidToBeThere) {
   o.report.verdict = "unexplained";
   o.report.not_in_model = "14 cm2 beside the robot";
   EXPECT_TRUE(is_first(o));
+}
+
+/// A mask of the robot alone has nothing that lies beside it: asked for a box there, the diagnosis was always wrong.
+TEST(DiagnosisTrials, HeldThingsAreDrawnWherePicturesShowThem) {
+  const auto held = [](bool masks) {
+    const auto drawn = covers_and_cameras(masks);
+    return std::count_if(drawn.begin(), drawn.end(),
+                         [](const Drawn& d) { return FaultSpec::parse(d.spec).name == "held"; });
+  };
+  EXPECT_EQ(held(true), 0);
+  EXPECT_GT(held(false), 0);
 }
 
 TEST(DiagnosisTrials, OutsideTheCatalogueTheJointIsEnough) {
