@@ -73,6 +73,19 @@ std::string hardly_seen(const DiagnosisReport& report) {
       outline_px, hand_mm);
 }
 
+/// The same beside causes that are named: they stand, and this is neither named nor excluded.
+std::string besides(const DiagnosisReport& report) {
+  std::string text;
+  for (const auto& cause : report.small_causes) {
+    if (cause.hand_mm < report.matters_mm) continue;
+    text += fmt::format(
+        " Not told is whether {}: that moves the hand by {:.2g} mm, but outlines by {:.2g} px, which is less than any "
+        "picture places them.",
+        cause.sentence, cause.hand_mm, cause.outline_px);
+  }
+  return text;
+}
+
 /// What stands out though no cause describes it, however little a curve over it moves: the curve is a stand-in, and
 /// its size none of what is really there.
 std::string of_no_known_size(const DiagnosisReport& report) {
@@ -213,7 +226,7 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles, const std::v
   if (!causes.empty()) {
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });
     report.verdict = unexplained ? "unexplained" : several ? "class" : "named";
-    report.sentence = capitalised(list) + "." + taken_up;
+    report.sentence = capitalised(list) + "." + besides(report) + taken_up;
     return;
   }
   report.verdict = "none";

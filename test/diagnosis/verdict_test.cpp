@@ -128,6 +128,24 @@ TEST(Verdict, IsNotNoneWhereTheHandIsOffByWhatMattersAndOutlinesHardlyShowIt) {
   EXPECT_EQ(of_small_cause(cause).verdict, "none");
 }
 
+/// An elbow's play was named, and of a principal point 7 px aside, by which the hand was 4.4 mm off, nothing said.
+TEST(Verdict, BesideANameSaysWhatMayMoveTheHandUnseen) {
+  auto report = report_of({gain_of_elbow()});
+  DiagnosedCause unseen;
+  unseen.cause = {"latency", "", ""};
+  unseen.parameters = {{"delay", "ms", 58.0, {57.0, 59.0}}};
+  unseen.hand_mm = 4.35;
+  unseen.outline_px = 0.064;
+  report.small_causes = {unseen};
+  auto seen = worded(report);
+  EXPECT_EQ(seen.verdict, "named");
+  EXPECT_THAT(seen.sentence,
+              HasSubstr("Not told is whether pictures arrive 58 ms (57 to 59) late against the encoders"));
+  EXPECT_THAT(seen.sentence, HasSubstr("the hand by 4.3 mm, but outlines by 0.064 px"));
+  report.small_causes[0].hand_mm = 0.4;
+  EXPECT_THAT(worded(report).sentence, Not(HasSubstr("Not told")));
+}
+
 /// A wrist that lagged with its acceleration: a curve over another joint's took up a part of it that moved next to
 /// nothing.
 TEST(Verdict, IsNotNoneWhereSomethingStandsOutThatNoCauseDescribes) {
