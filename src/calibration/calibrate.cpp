@@ -24,6 +24,7 @@
 #include "loose_fingers.hpp"
 #include "next_posture.hpp"
 #include "raw_pictures.hpp"
+#include "section_spread.hpp"
 
 namespace bodyschema {
 namespace {
@@ -114,8 +115,9 @@ class Calibrator {
     progress(0.6);
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
+    leave_out_sections(fit, *best);
     describe(fit, *best);
-    hold_out(fit, *best);
+    judge_left_out();
     progress(0.9);
     conclude(fit, *best);
     suggest(fit, *best);
@@ -585,36 +587,48 @@ class Calibrator {
 
   // --- does it hold -------------------------------------------------------------------------------
 
-  /// Outlines of postures that a fit has not seen: of up to `kFolds` parts of the log in turn.
-  void hold_out(LogFit& fit, const BatchFit& batch) {
-    constexpr std::size_t kFolds = 5;
+  /// Fits without each of up to `kSections` parts of the log in turn: how far off the outlines of the part are that is
+  /// left out, and whether the parts agree as well as is claimed. Parts are of postures in a row, for what lasts a
+  /// while makes these err alike.
+  void leave_out_sections(LogFit& fit, BatchFit& batch) {
+    constexpr std::size_t kSections = 5;
     const auto postures = batch.postures();
     if (postures < 2 * kFewestPostures - 1) return;
-    const std::size_t folds = std::min(kFolds, postures);
-    double sum = 0.0, before = 0.0, n = 0.0;
-    std::vector<double> own;
-    for (std::size_t fold = 0; fold < folds; ++fold) {
+    const std::size_t sections = std::min(kSections, postures);
+    std::vector<Eigen::VectorXd> without;
+    for (std::size_t section = 0; section < sections; ++section) {
       std::vector<std::size_t> kept, left_out;
       for (std::size_t p = 0; p < log_->pictures().size(); ++p) {
-        (batch.posture_of()[p] % folds == fold ? left_out : kept).push_back(p);
+        (batch.posture_of()[p] * sections / postures == section ? left_out : kept).push_back(p);
       }
       if (kept.empty() || left_out.empty()) continue;
       const auto roles = log_->roles();
       const auto beliefs = Beliefs::from(configuration_, roles, rig_, pipeline_.options());
       BatchFit part(fit, batch.state(), beliefs.tolerances, settings());  // what was found besides is in that state
       part.run(0.0, kept);
-      const auto count = static_cast<double>(left_out.size());
-      own.push_back(median_outline_distance_px(fit, part.state().model(), left_out));
-      sum += count * own.back();
-      before += count * median_outline_distance_px(fit, ErrorModel(roles), left_out);
-      n += count;
+      without.push_back(part.state().x());
+      left_out_.push_back({static_cast<double>(left_out.size()),
+                           median_outline_distance_px(fit, ErrorModel(roles), left_out),
+                           median_outline_distance_px(fit, part.state().model(), left_out)});
     }
-    if (n <= 0.0) return;
+    batch.widen(section_spread(without, batch.estimate().covariance.diagonal().cwiseMax(0.0).cwiseSqrt()));
+  }
+
+  void judge_left_out() {
+    if (left_out_.empty()) return;
+    double before = 0.0, after = 0.0, pictures = 0.0;
+    std::vector<double> own;
+    for (const auto& section : left_out_) {
+      before += section.pictures * section.before_px;
+      after += section.pictures * section.after_px;
+      pictures += section.pictures;
+      own.push_back(section.after_px);
+    }
     std::sort(own.begin(), own.end());
     result_.outline_px.heldout = 0.5 * (own[own.size() / 2] + own[(own.size() - 1) / 2]);
     result_.outline_px.heldout_worst = own.back();
-    heldout_mean_px_ = sum / n;
-    helps_ = sum / n < before / n + kSame_px * picture_unit(rig_.cameras.front().intrinsics);
+    heldout_mean_px_ = after / pictures;
+    helps_ = after / pictures < before / pictures + kSame_px * picture_unit(rig_.cameras.front().intrinsics);
     if (helps_) return;
     for (auto& joint : result_.joints) {
       joint.told = false;
@@ -785,6 +799,10 @@ class Calibrator {
   std::string unsettled_;    ///< a joint whose offset depends on how masks were made
   double believed_px_ = kAnywhere_px;
   std::vector<bool> loose_;  ///< parts that are drawn and have no say
+  struct LeftOut {
+    double pictures = 0.0, before_px = 0.0, after_px = 0.0;
+  };
+  std::vector<LeftOut> left_out_;  ///< sections of the log, each by a fit without it
   double heldout_mean_px_ = 0.0;
   bool helps_ = true;  ///< outlines of postures that were left out come nearer
   double ambiguity_ = 0.0;

@@ -78,6 +78,13 @@ std::vector<OutlineSearch> BatchFit::searches() const {
   return list;
 }
 
+void BatchFit::widen(const Eigen::VectorXd& factor) {
+  widened_ = memory_.estimate();
+  for (auto* covariance : {&widened_->own, &widened_->covariance}) {
+    *covariance = (factor.asDiagonal() * *covariance * factor.asDiagonal()).eval();
+  }
+}
+
 void BatchFit::run(double from_px, const std::vector<std::size_t>& pictures) {
   const auto variance = [&] {
     double sum = 0.0;
@@ -126,6 +133,7 @@ void BatchFit::fuse(const std::vector<std::size_t>& pictures) {
   double robust_px = 0.0;
   for (const auto& noise : noise_) robust_px = std::max(robust_px, noise.robust_px());
   const Eigen::VectorXd start = state_.x();
+  widened_.reset();
   for (int round = 0; round < kRounds; ++round) {
     at_ = fit_.linearise(state_.model(), coordinates, {kFinest_px, settings_.spacing_px, robust_px}, pictures);
     misfit_ = fit_.misfit(at_, at_.sampled());

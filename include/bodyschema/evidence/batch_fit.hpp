@@ -36,7 +36,10 @@ class BatchFit {
 
   [[nodiscard]] const State& state() const { return state_; }
   /// Values and covariance over the state's parameters.
-  [[nodiscard]] const MemoryEstimate& estimate() const { return memory_.estimate(); }
+  [[nodiscard]] const MemoryEstimate& estimate() const { return widened_ ? *widened_ : memory_.estimate(); }
+  /// Standard deviations of the estimate times these factors, one a parameter: what a log says of itself beyond what
+  /// its pictures' noise explains.
+  void widen(const Eigen::VectorXd& factor);
   [[nodiscard]] const PostureMemory& memory() const { return memory_; }
   [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
   /// The pictures about the result; evidence over LinearLog::coordinates.
@@ -59,6 +62,7 @@ class BatchFit {
   Considered beside_;
   BatchSettings settings_;
   PostureMemory memory_;
+  std::optional<MemoryEstimate> widened_;
   std::vector<OutlineNoise> noise_;
   LinearLog at_;
   double misfit_ = 0.0;
