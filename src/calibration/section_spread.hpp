@@ -6,8 +6,9 @@
 namespace bodyschema {
 
 /// By how much standard deviations are too small, by the answers of a log without each of its sections in turn: the
-/// jackknife's deviation (Quenouille 1956, Tukey 1958) over the one that is claimed. One factor a parameter, at least 1:
-/// what sections scatter by beyond that counts where it hardly happens by chance (chi-square of their number less one).
+/// jackknife's deviation (Quenouille 1956, Tukey 1958) over the one that is claimed. One factor a parameter, at least
+/// 1: what sections scatter by beyond that counts where it hardly happens by chance (chi-square of their number less
+/// one).
 ///
 /// What pictures' noise and posture errors do not explain, and lasts for a while, shows here: a hand that holds
 /// something for a time, masks that are wrong in some pictures alike.

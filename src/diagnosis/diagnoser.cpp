@@ -161,6 +161,72 @@ class Diagnoser {
       asked_.reset();
     }
     while (drop_one()) asked_.reset();
+    while (search_.refits() && say_one_simpler()) {
+    }
+  }
+
+  /// A cause that was taken while others were still missing may say more than the log asks for in the end: a simpler
+  /// one of the same joint that is a part of it takes its place where nothing of the rest stands out any more. A joint
+  /// moved along its link is a longer link.
+  bool say_one_simpler() {
+    for (std::size_t c = 0; c < search_.causes().size(); ++c) {
+      const FoundCause& found = search_.causes()[c];
+      if (found.generic() || found.columns < 2 || found.name.joint.empty()) continue;
+      if (std::find(said_simply_.begin(), said_simply_.end(), found.name) != said_simply_.end()) continue;
+      said_simply_.push_back(found.name);  // tried once
+      if (replace_by_part(c)) return true;
+    }
+    return false;
+  }
+
+  /// @return whether a simpler cause took its place; otherwise all is as it was
+  bool replace_by_part(std::size_t cause) {
+    const CauseName name = search_.causes()[cause].name;
+    auto before = search_.now();
+    search_.drop(cause);
+    asked_.reset();
+    if (const auto simpler = part_of(name); simpler && take_part(*simpler, name)) {
+      spdlog::debug("diagnosis: {} says what {} said", simpler->text(), name.text());
+      return true;
+    }
+    search_.go_back_to(std::move(before));
+    asked_.reset();
+    return false;
+  }
+
+  /// Of the candidates the best one of the same joint that can say nothing that this one cannot.
+  std::optional<CauseName> part_of(const CauseName& name) {
+    const Field& field = this->field();
+    const auto whole = std::find_if(field.candidates.begin(), field.candidates.end(),
+                                    [&](const Candidate& c) { return c.cause == name; });
+    if (whole == field.candidates.end()) return std::nullopt;
+    const Candidate* best = nullptr;
+    for (const auto& part : field.candidates) {
+      if (part.generic() || part.cause.joint != name.joint || part.parameters.size() >= whole->parameters.size()) {
+        continue;
+      }
+      if (part.z() < threshold_of(part.stated) || (best != nullptr && part.z() <= best->z())) continue;
+      if (is_part(field, part, *whole)) best = &part;
+    }
+    return best == nullptr ? std::nullopt : std::optional(best->cause);
+  }
+
+  /// @return whether nothing of the whole stands out beside it
+  bool take_part(const CauseName& simpler, const CauseName& whole) {
+    const auto named = [](const Field& field, const CauseName& name) {
+      return std::find_if(field.candidates.begin(), field.candidates.end(),
+                          [&](const Candidate& c) { return c.cause == name; });
+    };
+    const Field& without = *asked_;
+    const auto candidate = named(without, simpler);
+    Trial trial{&*candidate, without.base.heldout(candidate->columns), 0.0, true};
+    trial.gain = without.base.heldout().total() - trial.heldout.total();
+    auto model = with(without, trial);
+    if (!model) return false;
+    search_.take(std::move(*model));
+    const Field& left = field();
+    const auto rest = named(left, whole);
+    return rest == left.candidates.end() || rest->z() < threshold_of(rest->stated);
   }
 
   /// Finds the next cause and takes it into the model; false: there is none.
@@ -408,6 +474,7 @@ class Diagnoser {
   std::optional<Field> asked_;  ///< about the present model
   double alike_ = 0.0;          ///< correlation of neighbouring blocks, at the last look
   std::vector<CauseName> refused_;
+  std::vector<CauseName> said_simply_;  ///< of more parameters, looked at once whether fewer do
 };
 
 }  // namespace

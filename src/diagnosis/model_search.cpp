@@ -189,6 +189,12 @@ void ModelSearch::take(Extended extended) {
   cost_ = fit(state_, 0.0);
 }
 
+void ModelSearch::go_back_to(Extended before) {
+  causes_ = std::move(before.causes);
+  state_ = std::move(before.state);
+  cost_ = before.cost;
+}
+
 void ModelSearch::drop(std::size_t cause) {
   auto causes = causes_;
   const bool beside = !in_state(causes[cause]);

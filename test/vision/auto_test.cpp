@@ -3,16 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 
 #include "bodyschema/vision/mask_operations.hpp"
 #include "bodyschema/vision/segmenter.hpp"
+#include "compressed.hpp"
 #include "scene.hpp"
 
 namespace bodyschema {
 namespace {
 
+using test::compressed;
 using test::Scene;
 using test::Texture;
 
@@ -298,17 +299,6 @@ TEST(AutomaticMasks, ColoursThatCompressionLetsBleedAreNoRobot) {
   std::printf("    seed 17: IoU %.3f\n", iou(out.mask, scene.true_mask()));
   EXPECT_LT(std::abs(edge.bias), 0.15);  // colours read beside the outline put it 0.2 px out
   EXPECT_GT(edge.found, 0.75);
-}
-
-/// Through JPEG and back.
-Image compressed(Image image, int quality) {
-  cv::Mat bgr, back;
-  cv::cvtColor(cv::Mat(image.height, image.width, CV_8UC3, image.data.data()), bgr, cv::COLOR_RGB2BGR);
-  std::vector<std::uint8_t> file;
-  cv::imencode(".jpg", bgr, file, {cv::IMWRITE_JPEG_QUALITY, quality});
-  cv::cvtColor(cv::imdecode(file, cv::IMREAD_COLOR), back, cv::COLOR_BGR2RGB);
-  std::copy(back.data, back.data + image.data.size(), image.data.begin());
-  return image;
 }
 
 /// A grey hand before a green wall: lit from above, it is brighter on one side and as dark as the wall on the other.

@@ -3,15 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <vector>
 
+#include "compressed.hpp"
 #include "scene.hpp"
 
 namespace bodyschema {
 namespace {
 
+using test::compressed;
 using test::Scene;
 using test::Texture;
 
@@ -20,16 +21,6 @@ Scene scene_of(Texture texture) {
   scene.texture = texture;
   scene.shapes = test::hand(78.0, 62.0);
   return scene;
-}
-
-Image compressed(Image image, int quality) {
-  cv::Mat bgr, back;
-  cv::cvtColor(cv::Mat(image.height, image.width, CV_8UC3, image.data.data()), bgr, cv::COLOR_RGB2BGR);
-  std::vector<std::uint8_t> file;
-  cv::imencode(".jpg", bgr, file, {cv::IMWRITE_JPEG_QUALITY, quality});
-  cv::cvtColor(cv::imdecode(file, cv::IMREAD_COLOR), back, cv::COLOR_BGR2RGB);
-  std::copy(back.data, back.data + image.data.size(), image.data.begin());
-  return image;
 }
 
 TEST(ColourResolution, IsLowerInCompressedPictures) {
