@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <map>
 
 #include "agreed_motion.hpp"
 #include "bodyschema/evidence/distributions.hpp"
@@ -380,6 +382,37 @@ void Findings::add_estimated(const LogAbout& log, const BlockRegression& all, co
   report_.estimated.push_back(std::move(cause));
 }
 
+std::vector<double> Findings::bend(const LogAbout& log, const FoundCause& found, const Eigen::VectorXd& size) const {
+  std::vector<double> shares(static_cast<std::size_t>(size.size()), 0.0);
+  if (search_.in_state(found) || effect_kind(found.name.name).timing != EffectTiming::kAlways) return shares;
+  ErrorModel model(log.state.model().roles());
+  auto& effect = model.add(found.name.name, {found.name.joint, found.name.source});
+  const auto refs = fitted_parameters(model);
+  const auto small = fit_.directions(log.at, model, refs);
+  for (std::size_t k = 0; k < refs.size(); ++k) {
+    effect.parameters()[refs[k].parameter].value = size[static_cast<Eigen::Index>(k)];
+  }
+  const auto large = fit_.directions(log.at, model, refs);
+  for (std::size_t k = 0; k < refs.size(); ++k) {
+    double moved = 0.0;
+    Eigen::VectorXd otherwise = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(log.blocks));
+    for (std::size_t p = 0; p < small.size(); ++p) {
+      std::map<std::uint32_t, double> rate;
+      for (const auto& step : small[p][k]) rate[step.coordinate] += step.amount;
+      double along = 0.0, all = 0.0;
+      for (const auto& [coordinate, amount] : rate) all += amount * amount;
+      for (const auto& step : large[p][k]) {
+        if (const auto at = rate.find(step.coordinate); at != rate.end()) along += step.amount * at->second;
+      }
+      moved += all;
+      // From nothing to its size it moves things by the mean of both rates.
+      otherwise[static_cast<Eigen::Index>(log.block_of[p])] += 0.5 * (along - all);
+    }
+    if (moved > 0.0) shares[k] = otherwise.norm() / moved;
+  }
+  return shares;
+}
+
 DiagnosedParameter Findings::parameter_of(const LogAbout& log, const EffectParameter& parameter, double value,
                                           double sd) const {
   const double half = quantile(log) * sd, unit = parameter.si_per_unit;
@@ -431,12 +464,14 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
     cause.outline_px = size.outline_px;
     if (!found.generic()) {
       const auto effect = make_effect(found.name.name, {found.name.joint, found.name.source}, state.model().roles());
+      const auto shares = bend(log, found, all.step()(columns));
       std::size_t next = 0;
       for (const auto& parameter : std::as_const(*effect).parameters()) {
         if (!parameter.fitted) continue;
+        const double share = shares[next];
         const auto i = columns[next++];
         const double value = search_.in_state(found) ? state.x()[i] : all.step()[i];
-        auto e = parameter_of(log, parameter, value, std::sqrt(covariance_(i, i)));
+        auto e = parameter_of(log, parameter, value, std::hypot(std::sqrt(covariance_(i, i)), share * value));
         const auto timing = effect_kind(found.name.name).timing;
         if (timing == EffectTiming::kFromATime) e.from = found.from;
         if (timing == EffectTiming::kOverTheLog) {

@@ -70,6 +70,11 @@ class Findings {
   void find_class(const Reduced& reduced, const std::vector<Eigen::Index>& out,
                   const std::vector<Eigen::Index>& columns, const AddedColumns& own,
                   const std::vector<Candidate>& candidates, DiagnosedCause& cause);
+  /// A cause that no fit has taken in is judged by what it moves while it is small. Per parameter, the share of its
+  /// size that is not known for that: by how much more or less it moves at its size, block by block, which pictures
+  /// weigh each in its own way.
+  [[nodiscard]] std::vector<double> bend(const LogAbout& log, const FoundCause& found,
+                                         const Eigen::VectorXd& size) const;
   [[nodiscard]] DiagnosedParameter parameter_of(const LogAbout& log, const EffectParameter& parameter, double value,
                                                 double sd) const;
   void exclude(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);

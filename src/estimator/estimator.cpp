@@ -402,26 +402,24 @@ struct Estimator::Impl {
   /// How the frame agrees with the memory that its fit was held by.
   void judge(const OutlineFit& fit) {
     near = fitter.lies_near(fit.evidence);
-    innovation = memory.innovation(fit.quadratic);
+    // Few postures say little, of a step as of all else.
+    const auto standing = young() ? std::vector<Eigen::Index>() : stalled.standing_while_others_move();
+    const auto agreement = memory.agreement(fit.quadratic, standing);
+    innovation = agreement.innovation;
     const double ratio = innovation.dof > 0.0 ? innovation.nis / innovation.dof : 0.0;
     const double limit = doubtful(innovation.dof);
-    verdict = !near                                             ? FrameVerdict::kContradicts
-              : innovation.nis > limit || stalls(fit.quadratic) ? FrameVerdict::kDoubtful
-                                                                : FrameVerdict::kAgrees;
+    verdict = !near                                                             ? FrameVerdict::kContradicts
+              : innovation.nis > limit || stalls(standing, agreement.step_gain) ? FrameVerdict::kDoubtful
+                                                                                : FrameVerdict::kAgrees;
     if (verdict != FrameVerdict::kAgrees || innovation.dof <= 0.0) return;
     usual_sum += (ratio - usual_sum) / limits::kUsualFrames;
   }
   /// Whether a frame looks as if a joint had moved under its reading, by more than hardly ever happens by chance. What
   /// is usual counts as it was before the reading stood: a joint that moves slowly makes its own deviations usual.
-  [[nodiscard]] bool stalls(const Quadratic& quadratic) const {
-    const auto standing = stalled.standing_while_others_move();
-    if (standing.empty() || young()) return false;
+  [[nodiscard]] bool stalls(const std::vector<Eigen::Index>& standing, const Eigen::VectorXd& step_gain) const {
+    if (standing.empty()) return false;
     const double limit = chi_square_quantile(limits::kDoubt_tail / static_cast<double>(joints), 1.0);
-    const Eigen::VectorXd gains = memory.step_gains(quadratic, standing);
-    for (std::size_t i = 0; i < standing.size(); ++i) {
-      if (gains[static_cast<Eigen::Index>(i)] > limit * usual_before(standing[i])) return true;
-    }
-    return false;
+    return (step_gain.array() > limit * usual_before(standing).array()).any();
   }
   /// What innovations are times what is believed of them, in this log.
   [[nodiscard]] double usual() const { return std::max(1.0, usual_sum); }
@@ -968,6 +966,7 @@ struct Estimator::Impl {
     alternative.reset();
     state = model.state().prior_mean();
     stalled = StalledEncoders(joints);
+    memory.loosen({});
     usual_sum = 1.0;
     usual_before.setOnes();
     doubted_since_s = -1.0;

@@ -173,7 +173,6 @@ PostureMemory::Step PostureMemory::step(const Quadratic& frame, std::span<const 
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(seen.S);
   const Eigen::VectorXd z = ldlt.solve(seen.y);
   result.left = {seen.y.dot(z), static_cast<double>(seen.y.size())};
-  if (parameters.empty()) return result;
   Eigen::MatrixXd G(seen.y.size(), static_cast<Eigen::Index>(parameters.size()));
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     G.col(static_cast<Eigen::Index>(i)) = seen.to_y.col(parameters[i]);
@@ -191,22 +190,24 @@ PostureMemory::Step PostureMemory::step(const Quadratic& frame, std::span<const 
   return result;
 }
 
-Eigen::VectorXd PostureMemory::step_gains(const Quadratic& frame, std::span<const Eigen::Index> parameters) const {
-  Eigen::VectorXd gains = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
+PostureMemory::Agreement PostureMemory::agreement(const Quadratic& frame,
+                                                  std::span<const Eigen::Index> parameters) const {
+  Agreement result{{}, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()))};
   const Surprise seen = surprise(frame);
-  if (seen.y.size() == 0) return gains;
+  if (seen.y.size() == 0) return result;
   const Eigen::LDLT<Eigen::MatrixXd> ldlt(seen.S);
   const Eigen::VectorXd z = ldlt.solve(seen.y);
+  result.innovation = {seen.y.dot(z), static_cast<double>(seen.y.size())};
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const Eigen::VectorXd direction = seen.to_y.col(parameters[i]);
     const double told = direction.dot(ldlt.solve(direction));
-    if (told > 0.0) gains[static_cast<Eigen::Index>(i)] = std::pow(direction.dot(z), 2) / told;
+    if (told > 0.0) result.step_gain[static_cast<Eigen::Index>(i)] = std::pow(direction.dot(z), 2) / told;
   }
-  return gains;
+  return result;
 }
 
 Innovation PostureMemory::innovation(const Quadratic& frame) const {
-  return step(frame, {}).left;
+  return agreement(frame, {}).innovation;
 }
 
 std::optional<std::uint64_t> PostureMemory::add(double time_s, const Eigen::VectorXd& q, const Quadratic& frame,

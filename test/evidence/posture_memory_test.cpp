@@ -201,13 +201,14 @@ TEST_F(MemoryOfTwo, TheGainOfOneStepIsDistributedAsIsClaimedAndShowsOne) {
     for (int k = 0; k < 2; ++k) {
       next(known, both(sum_, 0.3 + noise(random), difference_, 0.1 + noise(random), 0.05));
     }
-    mean += known.step_gains(both(sum_, 0.3 + noise(random), difference_, 0.1 + noise(random), 0.05), each) / kFrames;
+    mean += known.agreement(both(sum_, 0.3 + noise(random), difference_, 0.1 + noise(random), 0.05), each).step_gain /
+            kFrames;
   }
   // Chi-square with one degree of freedom; less by what beliefs, which are true to zero here, make of it.
   EXPECT_NEAR(mean[0], 1.0, 0.1);
   EXPECT_NEAR(mean[1], 1.0, 0.1);
 
-  const Eigen::VectorXd gains = memory.step_gains(both(sum_, 0.8, difference_, 0.6, 0.05), each);
+  const Eigen::VectorXd gains = memory.agreement(both(sum_, 0.8, difference_, 0.6, 0.05), each).step_gain;
   EXPECT_GT(gains[0], 40.0) << "the first stepped by 0.5";
   EXPECT_LT(gains[1], 0.5 * gains[0]);
 }

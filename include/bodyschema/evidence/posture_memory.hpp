@@ -116,9 +116,13 @@ class PostureMemory {
     Innovation left;
   };
   [[nodiscard]] Step step(const Quadratic& frame, std::span<const Eigen::Index> parameters) const;
-  /// By how much a frame's normalised innovation squared falls where one parameter alone may have stepped: of
-  /// chi-square distribution with one degree of freedom where none has. Of each of them.
-  [[nodiscard]] Eigen::VectorXd step_gains(const Quadratic& frame, std::span<const Eigen::Index> parameters) const;
+  /// How a frame agrees, and by how much its normalised innovation squared falls where one parameter alone may have
+  /// stepped, for each of some: of chi-square distribution with one degree of freedom where none has.
+  struct Agreement {
+    Innovation innovation;
+    Eigen::VectorXd step_gain;
+  };
+  [[nodiscard]] Agreement agreement(const Quadratic& frame, std::span<const Eigen::Index> parameters) const;
 
   /// Chi-square of the state of one posture against everything that is known: with that posture's own error, and what
   /// is considered.
