@@ -57,6 +57,10 @@ function(bodyschema_warnings target)
     # GCC 12 reports std::string's operator+ as overlapping (GCC bug 105651).
     target_compile_options(${target} PRIVATE -Wno-restrict)
   endif()
+  if(CMAKE_UNITY_BUILD)
+    # What a source keeps to itself lies in an included file then, which GCC takes for a header.
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+  endif()
 endfunction()
 
 # bodyschema_patient(<variable> <seconds>)
@@ -79,6 +83,7 @@ function(bodyschema_test folder)
   find_package(GTest REQUIRED)
   set(target test_${folder})
   add_executable(${target} ${ARG_SOURCES})
+  set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)  # tests' own helpers are named alike
   bodyschema_warnings(${target})
   target_link_libraries(${target} PRIVATE ${ARG_LINKS} GTest::gtest GTest::gmock GTest::gtest_main)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/test)

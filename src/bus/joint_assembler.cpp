@@ -2,12 +2,9 @@
 
 #include <algorithm>
 
-namespace bodyschema {
+#include "clock_step.hpp"
 
-namespace {
-/// As for Synchroniser.
-constexpr int kStepEvidence = 3;
-}  // namespace
+namespace bodyschema {
 
 JointAssembler::JointAssembler(const std::vector<std::string>& joint_names,
                                const std::map<std::string, double>& resting_rad, Microseconds clock_step,

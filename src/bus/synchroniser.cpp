@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <numeric>
 
-namespace bodyschema {
+#include "clock_step.hpp"
 
-namespace {
-/// How many stamps in a row must be far in the past before the clock is believed to have stepped.
-constexpr int kStepEvidence = 3;
-}  // namespace
+namespace bodyschema {
 
 std::string_view name_of(DropReason reason) {
   static constexpr std::array<std::string_view, kDropReasonCount> kNames{

@@ -16,9 +16,9 @@
 namespace bodyschema {
 namespace {
 
-constexpr std::size_t kPostures = 6;  ///< that are looked at
-constexpr std::size_t kFewest = 3;    ///< fewer leave the distance open
-constexpr int kWidth_px = 128;        ///< pictures are looked at about this large
+constexpr std::size_t kPostures = 6;        ///< that are looked at
+constexpr std::size_t kFewestPictured = 3;  ///< fewer leave the distance open
+constexpr int kWidth_px = 128;              ///< pictures are looked at about this large
 constexpr int kDirections = 160, kRolls = 12;
 constexpr std::size_t kSeeds = 30;  ///< places that are moved
 constexpr int kRounds = 14, kSamples = 48, kElite = 8;
@@ -148,7 +148,7 @@ struct CameraSearch::Impl {
 
   bool prepare(std::size_t camera) {
     const auto pictures = chosen(camera);
-    if (pictures.size() < kFewest) return false;
+    if (pictures.size() < kFewestPictured) return false;
     const auto& rig = log.rig();
     const auto& k = rig.cameras[camera].intrinsics;
     const int factor = std::max(1, k.width / kWidth_px);

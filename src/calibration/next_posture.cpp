@@ -10,7 +10,7 @@
 namespace bodyschema {
 namespace {
 
-constexpr int kPostures = 300;        ///< that are drawn
+constexpr int kDrawnPostures = 300;   ///< that are drawn
 constexpr double kBeyond_rad = 0.35;  ///< beyond what was recorded, a joint goes no further: who knows what is there
 constexpr double kInView = 0.6;       ///< of the outline that recorded pictures show
 constexpr double kWorthIt = 0.9;      ///< of the standard deviation that is left
@@ -50,7 +50,7 @@ std::optional<NextPosture> next_posture(LogFit& fit, const BatchFit& batch, cons
   Instant at;
   at.qdot = at.qddot = Eigen::VectorXd::Zero(low.size());
   Corrections corrections = roles.no_corrections();
-  for (int i = 0; i < kPostures; ++i) {
+  for (int i = 0; i < kDrawnPostures; ++i) {
     Trial trial{log.pictures().front().joints.q, {}};
     for (const auto j : roles.arm) {
       const auto& info = joints[static_cast<std::size_t>(j)];

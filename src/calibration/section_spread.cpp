@@ -7,7 +7,7 @@
 namespace bodyschema {
 namespace {
 
-constexpr std::size_t kFewest = 3;
+constexpr std::size_t kFewestSections = 3;
 /// Statistical: one parameter in a hundred is widened though all is as claimed.
 constexpr double kChance = 0.01;
 
@@ -15,7 +15,7 @@ constexpr double kChance = 0.01;
 
 Eigen::VectorXd section_spread(const std::vector<Eigen::VectorXd>& without, const Eigen::VectorXd& sd) {
   Eigen::VectorXd factor = Eigen::VectorXd::Ones(sd.size());
-  if (without.size() < kFewest) return factor;
+  if (without.size() < kFewestSections) return factor;
   const auto count = static_cast<double>(without.size());
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(sd.size());
   for (const auto& x : without) mean += x / count;

@@ -15,7 +15,7 @@ constexpr double kFewestIndependent = 4.0;
 constexpr double kMedian = 1.253;      ///< standard error of a median of normal values over that of their mean
 constexpr double kMiddleHalf = 1.349;  ///< width of the middle half of a normal distribution, in standard deviations
 
-double quantile(const std::vector<double>& sorted, double share) {
+double quantile_of_sorted(const std::vector<double>& sorted, double share) {
   const double at = share * static_cast<double>(sorted.size() - 1);
   const auto low = static_cast<std::size_t>(at);
   const double part = at - static_cast<double>(low);
@@ -64,7 +64,7 @@ double usual_step_s(const SignsOfCameras& cameras) {
     }
   }
   std::sort(steps.begin(), steps.end());
-  return steps.empty() ? 0.0 : quantile(steps, 0.5);
+  return steps.empty() ? 0.0 : quantile_of_sorted(steps, 0.5);
 }
 
 /// Mean product of signs of the two cameras within half a step of each other.
@@ -110,7 +110,7 @@ ErrorMemory error_memory(const std::vector<ResidualPoint>& all) {
   leave_out_unknown(points);
   if (points.size() < kFewest) return {};
   const auto sorted = sorted_y(points.begin(), points.end());
-  const double middle = quantile(sorted, 0.5);
+  const double middle = quantile_of_sorted(sorted, 0.5);
   SignsOfCameras cameras;
   for (const auto& p : points) {
     auto& camera = cameras[p.camera == 0 ? 0 : 1];
@@ -130,7 +130,7 @@ ErrorMemory error_memory(const std::vector<ResidualPoint>& all) {
   // A memory that fades evenly has kept / (1 - kept).
   memory.kept = sum / (1.0 + sum);
   memory.shared = shared_by(cameras[0], cameras[1], memory.step_s);
-  memory.spread = (quantile(sorted, 0.75) - quantile(sorted, 0.25)) / kMiddleHalf;
+  memory.spread = (quantile_of_sorted(sorted, 0.75) - quantile_of_sorted(sorted, 0.25)) / kMiddleHalf;
   return memory;
 }
 
@@ -152,7 +152,7 @@ ResidualCurve residual_curve(std::vector<ResidualPoint> points, const ErrorMemor
   ResidualCurve curve;
   if (points.size() < 2 * kFewestPerBin) return curve;
   std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) { return a.x < b.x; });
-  const double centre = centred ? quantile(sorted_y(points.begin(), points.end()), 0.5) : 0.0;
+  const double centre = centred ? quantile_of_sorted(sorted_y(points.begin(), points.end()), 0.5) : 0.0;
   const std::size_t bins = std::clamp<std::size_t>(points.size() / 12, 2, std::max<std::size_t>(2, most_bins));
   for (std::size_t b = 0; b < bins; ++b) {
     const auto from = points.begin() + static_cast<std::ptrdiff_t>(b * points.size() / bins);
@@ -161,9 +161,9 @@ ResidualCurve residual_curve(std::vector<ResidualPoint> points, const ErrorMemor
     double x = 0.0;
     for (auto p = from; p != to; ++p) x += p->x / static_cast<double>(to - from);
     const auto values = sorted_y(from, to);
-    const double median = quantile(values, 0.5) - centre;
+    const double median = quantile_of_sorted(values, 0.5) - centre;
     // Standard error of a median from the middle half of the values; values that err alike lie closer as well.
-    const double own = (quantile(values, 0.75) - quantile(values, 0.25)) / kMiddleHalf;
+    const double own = (quantile_of_sorted(values, 0.75) - quantile_of_sorted(values, 0.25)) / kMiddleHalf;
     const double worth = independent({from, to}, memory);
     const bool pooled = worth < kFewestIndependent && memory.spread > 0.0;
     const double dof = std::max(kLeastDof, worth - 1.0);

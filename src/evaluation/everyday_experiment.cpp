@@ -36,28 +36,28 @@ constexpr std::size_t kLastFrames = 50;
 /// Beyond these a converged frame is wrong: by chance one frame in 400, or one offset in two million, is.
 constexpr double kWrongHand_sd = 3.0, kWrongHand_mm = 2.0, kWrongOffset_sd = 5.0;
 
-struct Row {
+struct EverydayRow {
   const char* name;
   const char* scene;
   bool lens_known = false;    ///< the configuration has what the lens does
   bool lens_unknown = false;  ///< nobody calibrated it, and the configuration says so
 };
-constexpr std::array<Row, 13> kRows = {{{"plain", "plain"},
-                                        {"room", "room"},
-                                        {"head", "head"},
-                                        {"materials", "materials"},
-                                        {"light", "light"},
-                                        {"object", "object"},
-                                        {"object_part", "object_part"},
-                                        {"person", "person"},
-                                        {"shutter", "shutter"},
-                                        {"lens", "plain", true},
-                                        {"lens_forgotten", "lens_forgotten", false, true},
-                                        {"jpeg", "jpeg"},
-                                        {"all", "kitchen"}}};
+constexpr std::array<EverydayRow, 13> kEverydayRows = {{{"plain", "plain"},
+                                                        {"room", "room"},
+                                                        {"head", "head"},
+                                                        {"materials", "materials"},
+                                                        {"light", "light"},
+                                                        {"object", "object"},
+                                                        {"object_part", "object_part"},
+                                                        {"person", "person"},
+                                                        {"shutter", "shutter"},
+                                                        {"lens", "plain", true},
+                                                        {"lens_forgotten", "lens_forgotten", false, true},
+                                                        {"jpeg", "jpeg"},
+                                                        {"all", "kitchen"}}};
 
-struct Job {
-  const Row* row;
+struct EverydayRun {
+  const EverydayRow* row;
   std::string robot;  ///< folder of its configuration
   std::uint64_t seed;
 };
@@ -95,7 +95,7 @@ EverydayFrame frame_of(const Estimate& estimate, const simulator::SimulatedFrame
   return frame;
 }
 
-std::vector<EverydayFrame> play(const ExperimentContext& context, const Job& job) {
+std::vector<EverydayFrame> play(const ExperimentContext& context, const EverydayRun& job) {
   // A configuration of its own: they are read by one thread.
   // One method throughout, that nobody has to choose; --set vision.method compares others.
   std::vector<std::string> overrides = {"vision.method=auto"};
@@ -145,7 +145,7 @@ std::vector<EverydayFrame> play(const ExperimentContext& context, const Job& job
 }
 
 /// Runs the jobs on as many threads as the options say; results in their order.
-std::vector<EverydayLog> play_all(const ExperimentContext& context, const std::vector<Job>& jobs) {
+std::vector<EverydayLog> play_all(const ExperimentContext& context, const std::vector<EverydayRun>& jobs) {
   std::vector<EverydayLog> logs(jobs.size());
   ProgressBar bar("everyday pictures", jobs.size());
   std::atomic<std::size_t> next{0};
@@ -205,18 +205,19 @@ EverydayLog judge_everyday(const std::vector<EverydayFrame>& frames, int first_c
 
 void run_everyday(ExperimentContext& context) {
   for (const auto& name : context.options.rows) {
-    const bool known = std::any_of(kRows.begin(), kRows.end(), [&](const Row& row) { return name == row.name; });
+    const bool known = std::any_of(kEverydayRows.begin(), kEverydayRows.end(),
+                                   [&](const EverydayRow& row) { return name == row.name; });
     if (known) continue;
     std::vector<std::string> names;
-    for (const auto& row : kRows) names.emplace_back(row.name);
+    for (const auto& row : kEverydayRows) names.emplace_back(row.name);
     throw ConfigurationError("--rows: everyday has no row '" + name + "'; did you mean '" + nearest_name(name, names) +
                              "'?");
   }
   const bool among_all = context.options.experiment == "all";
   const int trials = among_all ? std::min(context.options.trials, kMostEverydayTrials) : context.options.trials;
   const bool official = !context.options.data.empty() && fs::exists(context.options.data / "icub-models");
-  std::vector<Job> jobs;
-  for (const auto& row : kRows) {
+  std::vector<EverydayRun> jobs;
+  for (const auto& row : kEverydayRows) {
     if (!context.options.rows.empty() &&
         std::find(context.options.rows.begin(), context.options.rows.end(), row.name) == context.options.rows.end()) {
       continue;

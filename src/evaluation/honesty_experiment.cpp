@@ -132,23 +132,23 @@ void add_latency(TrialSetting& setting, Random&, double times) {
 }
 
 /// One error that the model knows nothing of, or that lies far outside of what it believes possible.
-struct Row {
+struct HonestyRow {
   const char* key;
   const char* title;
   /// @param times  how many times its size
   void (*add)(TrialSetting& setting, Random& random, double times);
 };
 
-constexpr std::array kRows = {Row{"link_length", "link lengths, sd 5 mm", add_links},
-                              Row{"other_hand", "another hand on the arm", add_other_hand},
-                              Row{"focal_length", "focal length, 1 %", add_focal_length},
-                              Row{"lens", "lens k1 -0.1 to -0.3 left out", add_lens},
-                              Row{"camera_pose", "cameras' pose, 0.5 deg and 5 mm", add_camera_pose},
-                              Row{"dilation", "outlines dilated by 1 px", add_dilation},
-                              Row{"outline_noise", "outline noise 1 px over 20 px", add_outline_noise},
-                              Row{"fingers", "fingers curled 15 deg more", add_curled_fingers},
-                              Row{"held", "a thing held in the hand", add_held},
-                              Row{"latency", "latency, 20 ms", add_latency}};
+constexpr std::array kHonestyRows = {HonestyRow{"link_length", "link lengths, sd 5 mm", add_links},
+                                     HonestyRow{"other_hand", "another hand on the arm", add_other_hand},
+                                     HonestyRow{"focal_length", "focal length, 1 %", add_focal_length},
+                                     HonestyRow{"lens", "lens k1 -0.1 to -0.3 left out", add_lens},
+                                     HonestyRow{"camera_pose", "cameras' pose, 0.5 deg and 5 mm", add_camera_pose},
+                                     HonestyRow{"dilation", "outlines dilated by 1 px", add_dilation},
+                                     HonestyRow{"outline_noise", "outline noise 1 px over 20 px", add_outline_noise},
+                                     HonestyRow{"fingers", "fingers curled 15 deg more", add_curled_fingers},
+                                     HonestyRow{"held", "a thing held in the hand", add_held},
+                                     HonestyRow{"latency", "latency, 20 ms", add_latency}};
 
 TrialSetting honesty_setting(const ExperimentContext& context, const Configuration& estimator, Random& random) {
   TrialSetting setting = standard_setting(context);
@@ -249,8 +249,8 @@ void add_healthy(ExperimentContext& context, const Configuration& estimator, int
 }
 
 /// One log with an error.
-struct Job {
-  const Row* row;
+struct HonestyRun {
+  const HonestyRow* row;
   std::uint64_t seed;
   bool twice;
 };
@@ -265,7 +265,7 @@ bool wanted(const ExperimentContext& context, const std::string& row) {
 /// Throws ConfigurationError for a row that does not exist.
 void check_rows(const ExperimentContext& context) {
   std::vector<std::string> names = {kHealthy};
-  for (const auto& row : kRows) names.emplace_back(row.key);
+  for (const auto& row : kHonestyRows) names.emplace_back(row.key);
   for (const auto& name : context.options.rows) {
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
     throw ConfigurationError("--rows: honesty has no row '" + name + "'; did you mean '" + nearest_name(name, names) +
@@ -275,25 +275,25 @@ void check_rows(const ExperimentContext& context) {
 
 /// Errors in turn; of each, every fourth log draws at twice the size. A log's seed does not depend on which rows are
 /// asked for.
-std::vector<Job> jobs_of(const ExperimentContext& context, std::uint64_t first, std::size_t faulty) {
-  std::vector<Job> jobs;
+std::vector<HonestyRun> jobs_of(const ExperimentContext& context, std::uint64_t first, std::size_t faulty) {
+  std::vector<HonestyRun> jobs;
   for (std::size_t t = 0; t < faulty; ++t) {
-    const Row& row = kRows[t % kRows.size()];
+    const HonestyRow& row = kHonestyRows[t % kHonestyRows.size()];
     if (wanted(context, row.key)) {
-      jobs.push_back({&row, first + t, (t / kRows.size() + t) % kEveryFourth == kEveryFourth - 1});
+      jobs.push_back({&row, first + t, (t / kHonestyRows.size() + t) % kEveryFourth == kEveryFourth - 1});
     }
   }
   return jobs;
 }
 
 std::vector<TrialRecord> run_jobs(const ExperimentContext& context, const Configuration& estimator,
-                                  const std::vector<Job>& jobs) {
+                                  const std::vector<HonestyRun>& jobs) {
   std::vector<std::uint64_t> seeds;
   for (const auto& job : jobs) seeds.push_back(job.seed);
   return run_trials(context, "honesty: one error each", seeds,
                     [&](std::uint64_t seed) {
-                      const auto job =
-                          std::find_if(jobs.begin(), jobs.end(), [&](const Job& one) { return one.seed == seed; });
+                      const auto job = std::find_if(jobs.begin(), jobs.end(),
+                                                    [&](const HonestyRun& one) { return one.seed == seed; });
                       auto random = random_of(seed);
                       TrialSetting setting = honesty_setting(context, estimator, random);
                       job->row->add(setting, random, job->twice ? 2.0 : 1.0);
@@ -303,10 +303,10 @@ std::vector<TrialRecord> run_jobs(const ExperimentContext& context, const Config
 }
 
 /// A line for every row; the largest of their medians of sd over error, of logs with an error at its size.
-double add_rows(ExperimentContext& context, Json& summary, const std::vector<Job>& jobs,
+double add_rows(ExperimentContext& context, Json& summary, const std::vector<HonestyRun>& jobs,
                 const std::vector<HonestyLog>& logs) {
   double worst_ratio = 0.0;
-  for (const auto& row : kRows) {
+  for (const auto& row : kHonestyRows) {
     std::vector<const HonestyLog*> of_row, at_size;
     for (std::size_t i = 0; i < jobs.size(); ++i) {
       if (jobs[i].row != &row) continue;

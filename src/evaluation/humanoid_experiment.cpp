@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kEpisodesAmongAll = 3;  ///< where everything is evaluated, which takes long
-constexpr double kRate_hz = 3.0;              ///< pictures a second that a calibration looks at
+constexpr double kLookRate_hz = 3.0;          ///< pictures a second that a calibration looks at
 constexpr double kRateTogether_hz = 1.5;      ///< ... where it looks at many episodes
 constexpr std::size_t kCommonPostures = 10;
 constexpr double kRows_hz = 30.0;  ///< of the recording
@@ -96,7 +96,7 @@ class HumanoidExperiment {
     import(episodes, out);
     ProgressBar bar("G1", episodes.size());
     for (const auto episode : episodes) {
-      answers_.push_back(answer_of(episode, out.log_of(episode), kRate_hz));
+      answers_.push_back(answer_of(episode, out.log_of(episode), kLookRate_hz));
       bar.set(answers_.size());
     }
   }

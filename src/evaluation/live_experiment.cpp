@@ -34,7 +34,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kRun_s = 60.0, kPictureRate_hz = 10.0;
+constexpr double kRun_s = 60.0, kCameraRate_hz = 10.0;
 /// Sizes that a user cares about, times the smallest that a log shows at all.
 constexpr double kLowest = 6.0, kHighest = 12.0;
 constexpr std::array<const char*, 7> kFaults = {"latency",     "slip",        "backlash",      "encoder_gain",
@@ -204,7 +204,7 @@ class Runs {
                  "--seed",
                  std::to_string(run.seed),
                  "--set",
-                 fmt::format("simulator.cameras.rate_hz={}", kPictureRate_hz)};
+                 fmt::format("simulator.cameras.rate_hz={}", kCameraRate_hz)};
     if (run.fault) arguments.insert(arguments.end(), {"--fault", run.fault->text()});
     Program robot(std::move(arguments), folder_ / fmt::format("robot_{}.txt", run.seed));
     until([&] { return !service.running(); }, kRun_s + kEnd_s);

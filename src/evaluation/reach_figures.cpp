@@ -8,7 +8,7 @@
 namespace bodyschema {
 namespace {
 
-constexpr std::size_t kLastFrames = 10;
+constexpr std::size_t kReachedFrames = 10;
 
 /// Frames until below 1 mm and 1 degree for good; nothing when that never happens.
 std::optional<double> frames_to_converge(const std::vector<FrameRecord>& frames, std::size_t camera) {
@@ -43,7 +43,7 @@ double mean_of_last(const std::vector<FrameRecord>& frames, std::size_t camera,
                     const std::array<double, 2> FrameRecord::*figure) {
   double sum = 0.0;
   int n = 0;
-  for (std::size_t i = frames.size() - std::min(kLastFrames, frames.size()); i < frames.size(); ++i) {
+  for (std::size_t i = frames.size() - std::min(kReachedFrames, frames.size()); i < frames.size(); ++i) {
     const double value = (frames[i].*figure)[camera];
     if (value < 0.0) continue;
     sum += value;

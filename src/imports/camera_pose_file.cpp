@@ -13,7 +13,7 @@
 namespace bodyschema {
 namespace {
 
-constexpr std::uintmax_t kMaxBytes = 1 << 20;
+constexpr std::uintmax_t kMaxPoseBytes = 1 << 20;
 
 Pose pose_of(const nlohmann::json& rows, const std::string& where) {
   const std::string expected = where + ": expected a rigid transform as four rows of four numbers, m";
@@ -44,7 +44,7 @@ Pose pose_of(const nlohmann::json& rows, const std::string& where) {
 CameraPoses CameraPoses::read(const std::filesystem::path& file, const std::string& method) {
   std::ifstream stream(file);
   if (!stream) throw FileError(file.string() + ": no such file");
-  file_size_at_most(file, kMaxBytes);
+  file_size_at_most(file, kMaxPoseBytes);
   nlohmann::json json;
   try {
     json = nlohmann::json::parse(stream);

@@ -7,27 +7,14 @@
 #include <set>
 
 #include "bodyschema/core/file_size.hpp"
+#include "text_line.hpp"
 
 namespace bodyschema {
 namespace {
 
-constexpr std::uintmax_t kMaxBytes = 256u << 20;
-constexpr std::size_t kMaxLineBytes = 1 << 16;
+constexpr std::uintmax_t kMaxTableBytes = 256u << 20;
 constexpr std::size_t kMaxColumns = 4096;
 constexpr std::size_t kMaxValues = 32u << 20;  // of all rows: 256 MiB
-
-/// The next line without its end; of one that is too long, enough to see that it is.
-bool next_line(std::istream& in, std::string& line) {
-  line.clear();
-  bool any = false;
-  for (int c = 0; (c = in.get()) != std::char_traits<char>::eof();) {
-    any = true;
-    if (c == '\n') break;
-    if (line.size() <= kMaxLineBytes) line += static_cast<char>(c);
-  }
-  if (!line.empty() && line.back() == '\r') line.pop_back();
-  return any;
-}
 
 std::string trimmed(const std::string& text) {
   const auto begin = text.find_first_not_of(" \t");
@@ -71,7 +58,7 @@ std::size_t CsvTable::find(std::initializer_list<const char*> wanted) const {
 CsvTable CsvTable::read(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in || !std::filesystem::is_regular_file(file)) throw FileError(file.string() + ": no such file");
-  file_size_at_most(file, kMaxBytes);
+  file_size_at_most(file, kMaxTableBytes);
   CsvTable table;
   table.file = file;
   std::string line;

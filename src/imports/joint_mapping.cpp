@@ -5,13 +5,11 @@
 namespace bodyschema {
 namespace {
 
-constexpr const char* kUnused = "-";
-
 JointMapping::Rule read_rule(const Configuration& joints, const std::string& column) {
   JointMapping::Rule rule;
   if (!joints.is_mapping(column)) {
     const std::string joint = joints.text(column);
-    if (joint != kUnused) rule.joint = joint;
+    if (joint != JointMapping::kUnused) rule.joint = joint;
     return rule;
   }
   const Configuration section = joints.section(column);

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kReader = "read_lerobot.py";
+constexpr const char* kLeRobotReader = "read_lerobot.py";
 constexpr int kJpegQuality = 95;  // of pictures that a video codec has been through already
 constexpr std::int64_t kMostEpisodes = 10'000'000;
 
@@ -153,7 +153,6 @@ class Episodes {
 
   static Image pixels_of(Record& record, const std::string& where) {
     const std::int64_t width = record.integer("width"), height = record.integer("height");
-    constexpr std::int64_t kMaxSide_px = 4096;  // as of pictures that are received
     if (width < 1 || height < 1 || width > kMaxSide_px || height > kMaxSide_px ||
         record.payload.size() != static_cast<std::size_t>(3 * width * height)) {
       throw FileError(fmt::format("{}: {} bytes for {}x{} px", where, record.payload.size(), width, height));
@@ -329,7 +328,7 @@ LerobotImport import_lerobot_records(ByteSource& records, const std::string& fol
 
 LerobotSet LerobotSet::list(const fs::path& folder, const std::function<void(const std::string&)>& say) {
   if (!fs::is_directory(folder)) throw FileError(folder.string() + ": no such folder");
-  return read_with_python("lerobot", {kReader, folder.string(), "list"}, folder.string(), say,
+  return read_with_python("lerobot", {kLeRobotReader, folder.string(), "list"}, folder.string(), say,
                           [&](ByteSource& records) { return LerobotSet::read(records, folder.string()); });
 }
 
@@ -346,10 +345,11 @@ LerobotImport import_lerobot(const fs::path& folder, const ImportTarget& target,
   const auto count = [&](std::uint64_t done) {
     if (progress) progress(done, episodes.size());
   };
-  return read_with_python(
-      "lerobot", {kReader, folder.string(), "read", wanted.dump()}, folder.string(), say, [&](ByteSource& records) {
-        return import_lerobot_records(records, folder.string(), set, cameras, target, options, out, count);
-      });
+  return read_with_python("lerobot", {kLeRobotReader, folder.string(), "read", wanted.dump()}, folder.string(), say,
+                          [&](ByteSource& records) {
+                            return import_lerobot_records(records, folder.string(), set, cameras, target, options, out,
+                                                          count);
+                          });
 }
 
 }  // namespace bodyschema

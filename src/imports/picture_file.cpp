@@ -19,8 +19,7 @@
 namespace bodyschema {
 namespace {
 
-constexpr std::uintmax_t kMaxBytes = 64u << 20;
-constexpr int kMaxSide_px = 4096;  // as of pictures that are received
+constexpr std::uintmax_t kMaxPictureBytes = 64u << 20;
 constexpr std::array<std::uint8_t, 8> kPng = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
 
 void check(const PictureSize& size, const std::filesystem::path& file) {
@@ -85,7 +84,7 @@ Image read_picture_file(const std::filesystem::path& file) {
   std::array<std::uint8_t, 8> begin{};
   in.read(reinterpret_cast<char*>(begin.data()), begin.size());
   if (!is_png(begin) && !is_jpeg(begin)) return read_netpbm(file);
-  file_size_at_most(file, kMaxBytes);
+  file_size_at_most(file, kMaxPictureBytes);
   in.clear();
   in.seekg(0);
   const std::vector<std::uint8_t> bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());

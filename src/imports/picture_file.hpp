@@ -8,6 +8,9 @@
 
 namespace bodyschema {
 
+/// Of a side of a picture: MessageLimits as shipped, which refuse what is larger where the log is played.
+inline constexpr int kMaxSide_px = 4096;
+
 /// Reads a picture of a recording as gray or RGB: binary PPM or PGM, PNG or JPEG, told by its content.
 /// Throws FileError naming the file and what is wrong with it; sizes are checked before memory for
 /// pixels is taken, and a file cut short is an error.

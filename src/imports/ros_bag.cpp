@@ -21,7 +21,7 @@
 namespace bodyschema {
 namespace {
 
-constexpr const char* kReader = "read_ros_bag.py";
+constexpr const char* kBagReader = "read_ros_bag.py";
 constexpr std::size_t kMostTopics = 100'000;
 
 std::string lower(std::string text) {
@@ -475,7 +475,7 @@ ImportSummary import_bag_records(ByteSource& records, const std::string& bag, co
 
 std::vector<BagTopic> list_bag(const std::filesystem::path& bag, const std::function<void(const std::string&)>& say) {
   if (!std::filesystem::exists(bag)) throw FileError(bag.string() + ": no such bag");
-  return read_with_python("ros-bag", {kReader, bag.string(), "list"}, bag.string(), say,
+  return read_with_python("ros-bag", {kBagReader, bag.string(), "list"}, bag.string(), say,
                           [&](ByteSource& records) { return read_bag_topics(records, bag.string()); });
 }
 
@@ -500,7 +500,7 @@ ImportSummary import_ros_bag(const std::filesystem::path& bag, const ImportTarge
     if (progress) progress(std::min(done, total), total);
   };
   return read_with_python(
-      "ros-bag", {kReader, bag.string(), "read", wanted.dump()}, bag.string(), say,
+      "ros-bag", {kBagReader, bag.string(), "read", wanted.dump()}, bag.string(), say,
       [&](ByteSource& records) { return import_bag_records(records, bag.string(), selection, target, log, bounded); });
 }
 

@@ -3,6 +3,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "bodyschema/imports/ros_bag.hpp"
+#include "picture_file.hpp"
 
 namespace bodyschema {
 namespace {
@@ -53,7 +54,6 @@ Image decode_ros_image(const std::string& name, std::int64_t width, std::int64_t
     for (const Encoding& e : kEncodings) known += std::string(known.empty() ? "" : ", ") + e.name;
     throw FileError(where + ": encoding '" + name.substr(0, 32) + "' cannot be read; expected one of " + known);
   }
-  constexpr std::int64_t kMaxSide_px = 4096;  // as of pictures that are received
   const std::string size = std::to_string(width) + "x" + std::to_string(height);
   if (width < 1 || height < 1 || width > kMaxSide_px || height > kMaxSide_px) {
     throw FileError(where + ": picture of " + size + " px; expected 1 to " + std::to_string(kMaxSide_px) + " a side");

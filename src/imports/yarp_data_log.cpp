@@ -9,11 +9,11 @@
 #include <optional>
 
 #include "bodyschema/core/file_size.hpp"
+#include "text_line.hpp"
 
 namespace bodyschema {
 namespace {
 
-constexpr std::size_t kMaxLineBytes = 1 << 16;
 constexpr std::uintmax_t kMaxDataBytes = 256u << 20;  // rows are kept; an hour of an arm at 100 Hz has some 50 MB
 constexpr std::uint64_t kMaxRows = 10 * 3600 * 200;   // ten hours at 200 Hz; rows take more than their text
 
@@ -35,16 +35,6 @@ double parse_number(const std::string& text, const std::string& where) {
   }
   if (!std::isfinite(value)) throw FileError(where + ": '" + text + "' is not a finite number");
   return value;
-}
-
-/// The next line; of one that is too long, enough to see that it is.
-bool next_line(std::istream& in, std::string& line) {
-  line.clear();
-  for (int c = 0; (c = in.get()) != std::char_traits<char>::eof();) {
-    if (c == '\n') return true;
-    if (line.size() <= kMaxLineBytes) line += static_cast<char>(c);
-  }
-  return !line.empty();
 }
 
 /// Whether two stamps stand before the values, sender's first: `Stamp: tx+rx;` in info.log.

@@ -19,8 +19,6 @@ namespace bodyschema {
 
 namespace {
 
-constexpr const char* kUnused = "-";
-constexpr int kMaxSide_px = 4096;  // BusOptions::limits as shipped: what is larger is refused where the log is played
 /// Encoder rows of one folder as joints in radians.
 class EncoderRows {
  public:
@@ -44,7 +42,7 @@ class EncoderRows {
     }
     for (std::size_t c = 0; c < encoders.columns.size(); ++c) {
       const std::string& name = encoders.columns[c];
-      if (name == kUnused || combined.count(name) != 0) continue;
+      if (name == JointMapping::kUnused || combined.count(name) != 0) continue;
       add(name, {{c, unit}});
     }
     for (const YarpLine& line : log.lines()) {
@@ -56,7 +54,7 @@ class EncoderRows {
       }
       stamps_.push_back(line.utime);
       for (std::size_t c = 0; c < columns_; ++c) {
-        if (encoders.columns[c] != kUnused) largest_ = std::max(largest_, std::abs(line.values[c]));
+        if (encoders.columns[c] != JointMapping::kUnused) largest_ = std::max(largest_, std::abs(line.values[c]));
       }
     }
   }
@@ -221,7 +219,7 @@ YarpImportOptions YarpImportOptions::from(const Configuration& yarp_import) {
       port.fewest = static_cast<std::size_t>(first - port.columns.begin());
     }
     for (const std::string& column : options.encoders.back().columns) {
-      if (column == kUnused) continue;
+      if (column == JointMapping::kUnused) continue;
       if (!folder_of_column.emplace(column, folder).second) encoders.fail(folder, "column '" + column + "' only once");
       columns.push_back(column);
     }

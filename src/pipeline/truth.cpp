@@ -13,10 +13,9 @@ namespace {
 
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 30;  // an hour at 30 Hz is a fifth of it
 
-using Json = nlohmann::json;
 constexpr Microseconds kTolerance_us = 60'000;
 
-Pose pose_from(const Json& rows) {
+Pose pose_from(const nlohmann::json& rows) {
   Eigen::Matrix4d m;
   for (int r = 0; r < 4; ++r) {
     for (int c = 0; c < 4; ++c)
@@ -28,7 +27,7 @@ Pose pose_from(const Json& rows) {
 }
 
 /// @param unit_us  of the number
-Microseconds time_from(const Json& number, const char* key, double unit_us) {
+Microseconds time_from(const nlohmann::json& number, const char* key, double unit_us) {
   const double time_us = number.get<double>() * unit_us;
   if (!(std::abs(time_us) <= static_cast<double>(kLatestStamp))) {
     throw FileError(std::string(key) + " is " + number.dump() + ", expected a time of acquisition");
@@ -36,7 +35,7 @@ Microseconds time_from(const Json& number, const char* key, double unit_us) {
   return static_cast<Microseconds>(std::llround(time_us));
 }
 
-std::vector<Eigen::Vector3d> points_from(const Json& list) {
+std::vector<Eigen::Vector3d> points_from(const nlohmann::json& list) {
   std::vector<Eigen::Vector3d> points;
   for (const auto& p : list) {
     points.emplace_back(p.at(0).get<double>(), p.at(1).get<double>(), p.at(2).get<double>());
@@ -44,7 +43,7 @@ std::vector<Eigen::Vector3d> points_from(const Json& list) {
   return points;
 }
 
-std::vector<Pose> hand_in(const std::vector<std::string>& cameras, const Json& instant) {
+std::vector<Pose> hand_in(const std::vector<std::string>& cameras, const nlohmann::json& instant) {
   std::vector<Pose> poses;
   for (const auto& camera : cameras) poses.push_back(pose_from(instant.at("hand_in_" + camera + "_camera")));
   return poses;
@@ -58,7 +57,7 @@ Truth Truth::load(const std::filesystem::path& file, const std::vector<std::stri
   file_size_at_most(file, kMaxFileBytes);
   Truth truth;
   try {
-    const Json json = Json::parse(stream);
+    const nlohmann::json json = nlohmann::json::parse(stream);
     if (json.contains("fingers")) truth.fingers_ = json.at("fingers").get<std::vector<std::string>>();
     std::vector<Eigen::Vector3d> common_tips;
     if (json.contains("fingertips_in_hand_m")) {
@@ -96,7 +95,7 @@ Truth Truth::load(const std::filesystem::path& file, const std::vector<std::stri
         }
       }
     }
-  } catch (const Json::exception& e) {
+  } catch (const nlohmann::json::exception& e) {
     throw FileError(file.string() + ": not a truth file: " + e.what());
   } catch (const FileError& e) {
     throw FileError(file.string() + ": " + e.what());

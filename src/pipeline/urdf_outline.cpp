@@ -69,10 +69,6 @@ fs::path folder_to_allow(const fs::path& mesh) {
   return mesh.parent_path();
 }
 
-bool among(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
 void add(std::vector<fs::path>& folders, const fs::path& folder) {
   if (std::find(folders.begin(), folders.end(), folder) == folders.end()) folders.push_back(folder);
 }
@@ -219,7 +215,7 @@ UrdfOutline::Hand UrdfOutline::guess_hand() const {
       hand = follow_fixed(hand, [&](const std::string& part) { return shapes_on(part) > 0; });
     }
     while (!has_shape(hand) && above_.contains(hand)) hand = above_.at(hand).parent;
-    if (!among(ends, hand)) ends.push_back(hand);
+    if (std::find(ends.begin(), ends.end(), hand) == ends.end()) ends.push_back(hand);
   }
   return {ends.front(), {ends.begin() + 1, ends.end()}};
 }

@@ -161,7 +161,7 @@ void add_frame(const AddedFrame& frame, KinematicTree& tree) {
   tree.nodes.push_back(std::move(node));
 }
 
-constexpr std::size_t kMaxTriangles = 4'000'000;  // of all rendered links together
+constexpr std::size_t kMaxRenderedTriangles = 4'000'000;  // of all rendered links together
 
 constexpr double kMaxReach_m = 1e6;  // beyond, what is computed with vertices overflows
 
@@ -249,7 +249,7 @@ LinkMesh link_mesh(const urdf::Link& link, const fs::path& file, const RobotMode
   for (const auto& visual : link.visual_array) {
     TriangleMesh part = visual_mesh(*visual, where, file.parent_path(), options);
     if (part.triangles.size() > budget) {
-      throw FileError(where + ": the rendered links have more than " + std::to_string(kMaxTriangles) +
+      throw FileError(where + ": the rendered links have more than " + std::to_string(kMaxRenderedTriangles) +
                       " triangles together");
     }
     budget -= part.triangles.size();
@@ -289,7 +289,7 @@ std::shared_ptr<const RobotModel> RobotModel::load(const RobotModelOptions& opti
   for (const AddedFrame& frame : options.added_frames) add_frame(frame, impl.tree);
 
   std::set<std::string> rendered;
-  std::size_t budget = kMaxTriangles;
+  std::size_t budget = kMaxRenderedTriangles;
   for (const std::string& name : options.rendered_links) {
     const auto link = urdf_tree.model->getLink(name);
     if (!link) {

@@ -31,13 +31,13 @@ const std::array<FaceAxes, 6>& face_axes() {
   return axes;
 }
 
-enum class Fill { kPlain, kStripes, kChecks, kSpeckle, kGradient };
+enum class Pattern { kPlain, kStripes, kChecks, kSpeckle, kGradient };
 
 struct Shape {
   Eigen::Vector3f centre, right, down;  // on the unit sphere, tangent axes
   float half_width, half_height;        // tangent of the half angle
   bool ellipse;
-  Fill fill;
+  Pattern fill;
   float pitch;
   std::uint32_t salt;
   Eigen::Vector3f first, second;
@@ -53,14 +53,14 @@ struct Shape {
     if (ellipse ? ax * ax + ay * ay > 1.0f : (std::abs(ax) > 1.0f || std::abs(ay) > 1.0f)) return false;
     float mix = 0.0f;
     switch (fill) {
-      case Fill::kPlain: break;
-      case Fill::kStripes: mix = std::sin(x / pitch * 6.2831853f) > 0.0f ? 1.0f : 0.0f; break;
-      case Fill::kChecks:
+      case Pattern::kPlain: break;
+      case Pattern::kStripes: mix = std::sin(x / pitch * 6.2831853f) > 0.0f ? 1.0f : 0.0f; break;
+      case Pattern::kChecks:
         mix =
             (static_cast<int>(std::floor(x / pitch)) + static_cast<int>(std::floor(y / pitch))) % 2 == 0 ? 1.0f : 0.0f;
         break;
-      case Fill::kSpeckle: mix = value_noise(x / pitch * 3.0f, y / pitch * 3.0f, salt); break;
-      case Fill::kGradient: mix = 0.5f + 0.5f * ay; break;
+      case Pattern::kSpeckle: mix = value_noise(x / pitch * 3.0f, y / pitch * 3.0f, salt); break;
+      case Pattern::kGradient: mix = 0.5f + 0.5f * ay; break;
     }
     out = first + mix * (second - first);
     return true;
@@ -114,7 +114,7 @@ Background Background::clutter(const std::vector<Eigen::Vector3f>& near_colours,
     s.half_width = scale * static_cast<float>(random.uniform(0.05, 0.40));
     s.half_height = scale * static_cast<float>(random.uniform(0.05, 0.40));
     s.ellipse = random.uniform() < 0.35;
-    s.fill = static_cast<Fill>(random.below(5));
+    s.fill = static_cast<Pattern>(random.below(5));
     s.pitch = static_cast<float>(random.uniform(0.015, 0.10));
     s.salt = static_cast<std::uint32_t>(random.bits());
     s.first = colour();

@@ -13,10 +13,10 @@ namespace {
 constexpr int kRing = 16;
 // Robot colours are first taken from where the prediction is deepest, as long as that leaves this
 // share of it: at its edge it may well be wrong.
-constexpr double kSureShare = 0.25;
-constexpr float kMemory = 0.9f;
+constexpr double kSureShareOfBox = 0.25;
+constexpr float kHistogramMemory = 0.9f;
 // One colour alone never decides against all its neighbours.
-constexpr float kMostEvidence = 1.4f;
+constexpr float kMostLogOdds = 1.4f;
 // Log odds per px of distance from the predicted outline.
 constexpr float kPriorSlope = 0.08f;
 // The local background is the mean over a square with this half side, px.
@@ -114,7 +114,7 @@ void RegionStatistics::decide(const Image& image, int reach, BinaryMask& robot) 
   for (std::size_t i = 0; i < kBins; ++i) {
     const float odds =
         (robot_histogram_[i] * robot_scale + kFloor) / (background_histogram_[i] * background_scale + kFloor);
-    evidence_[i] = std::clamp(std::log(odds), -kMostEvidence, kMostEvidence);
+    evidence_[i] = std::clamp(std::log(odds), -kMostLogOdds, kMostLogOdds);
   }
 
   // Mean evidence of 3x3 pixels plus the prediction's say.
@@ -163,7 +163,7 @@ void RegionStatistics::separate(const Image& image, const BinaryMask& predicted,
   // Where the prediction is most likely right: deep inside, and well outside.
   inside_ = predicted;
   work_ = predicted;
-  const auto enough = static_cast<std::size_t>(kSureShare * static_cast<double>(predicted.count()));
+  const auto enough = static_cast<std::size_t>(kSureShareOfBox * static_cast<double>(predicted.count()));
   for (int depth = 0; depth < reach; ++depth) {
     morphology_.erode(work_);
     if (work_.count() <= enough) break;
@@ -214,7 +214,7 @@ void RegionStatistics::separate(const Image& image, const BinaryMask& predicted,
       for (auto& value : remembered_) value /= count;
     } else {
       for (std::size_t i = 0; i < kBins; ++i) {
-        remembered_[i] = kMemory * remembered_[i] + (1.0f - kMemory) * robot_histogram_[i] / count;
+        remembered_[i] = kHistogramMemory * remembered_[i] + (1.0f - kHistogramMemory) * robot_histogram_[i] / count;
       }
     }
   }

@@ -8,14 +8,14 @@ namespace bodyschema {
 namespace {
 
 /// Share of a prediction that is always believed.
-constexpr double kSureShare = 0.3;
+constexpr double kCoreShare = 0.3;
 
 BinaryMask core_of(const BinaryMask& predicted, double reach_px) {
   MaskMorphology morphology;
   for (int by = static_cast<int>(reach_px); by > 0; by = by * 3 / 4) {
     BinaryMask core = predicted;
     morphology.erode(core, by);
-    if (static_cast<double>(core.count()) >= kSureShare * static_cast<double>(predicted.count())) return core;
+    if (static_cast<double>(core.count()) >= kCoreShare * static_cast<double>(predicted.count())) return core;
   }
   return predicted;
 }

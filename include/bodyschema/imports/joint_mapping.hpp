@@ -23,6 +23,7 @@ namespace bodyschema {
 ///       masks:
 ///         left: /segmentation/left
 struct JointMapping {
+  static constexpr const char* kUnused = "-";  ///< in place of a joint: left out
   struct Rule {
     std::string joint;            ///< of the URDF; empty: left out
     std::optional<double> scale;  ///< rad (m) per unit of the source; absent: that of `in_degrees`
