@@ -57,7 +57,8 @@ function(bodyschema_warnings target)
     # GCC 12 reports std::string's operator+ as overlapping (GCC bug 105651).
     target_compile_options(${target} PRIVATE -Wno-restrict)
   endif()
-  if(CMAKE_UNITY_BUILD)
+  get_target_property(together ${target} UNITY_BUILD)
+  if(together)
     # What a source keeps to itself lies in an included file then, which GCC takes for a header.
     target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
   endif()
