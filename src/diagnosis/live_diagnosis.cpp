@@ -96,7 +96,7 @@ class Window {
     found.utime = last;
     found.span_s = seconds(last - log_.pictures().front().joints.utime);
     found_ = found;
-    if (found.span_s < diagnosis_.shortest_log_s) return found;
+    if (found.span_s < options_.first_look_s) return found;
     // A share of what may be wrong for every look, all of them together (Lan and DeMets 1983): of the k-th 6 / (pi
     // k)^2.
     const double k = static_cast<double>(++looks_);

@@ -5,7 +5,11 @@
 
 #include "answers.hpp"
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/imports/stills.hpp"
+#include "bodyschema/pipeline/starter_configuration.hpp"
 #include "picture_log.hpp"
+#include "temporary_folder.hpp"
+#include "test_data.hpp"
 
 namespace bodyschema {
 namespace {
@@ -69,6 +73,27 @@ TEST(LogDiagnosis, OfAHealthyLogSaysNothingOfMethodsAndLostPictures) {
   // No picture places a flank nearer than the floor, however many there are.
   ASSERT_EQ(report.offsets_ci95_deg.size(), 7u);
   for (const auto& [joint, ci] : report.offsets_ci95_deg) EXPECT_GT(0.5 * (ci[1] - ci[0]), 0.02) << joint;
+}
+
+/// One sweep of a Panda, with a board on its gripper that no URDF shows: too little tells causes apart, and none is
+/// named. It was refused as too short.
+TEST(LogDiagnosis, NamesNothingInASweepOfARealArm) {
+  SKIP_WITHOUT("real");
+  const TemporaryFolder folder;
+  const auto set = data_folder() / "real/panda_1";
+  StarterOptions starter;
+  starter.urdf = data_folder() / "real/robots/panda/panda.urdf";
+  starter.stills = set;
+  starter.camera_pose = set / "camera_pose.json";
+  starter.out = folder.path() / "arm";
+  ASSERT_TRUE(write_starter_configuration(starter).usable);
+  const auto configuration = Configuration::load(starter.out / "estimator.yaml");
+  LogDiagnosisOptions options;
+  options.log = folder.path() / "log";
+  options.quiet = true;
+  (void)import_stills(set, ImportTarget::from(configuration), {}, options.log);
+  const auto report = diagnose_log(configuration, options);
+  EXPECT_EQ(report.verdict, "unexplained") << report.sentence;
 }
 
 }  // namespace

@@ -98,7 +98,7 @@ TEST(LogTestability, ADiagnosisRefusesAShortLogAtOnceAndInTheSameWords) {
   const auto file = log_of("short", 4.0, true);
   const auto short_log = testability_of(robot(), file);
   EXPECT_THAT(short_log.refusal,
-              HasSubstr("too short for a diagnosis: 3.8 s of pictures; record 10 s in motion, better 60 s, or 5 "
+              HasSubstr("too short for a diagnosis: 3.8 s of pictures; record 8 s in motion, better 60 s, or 5 "
                         "distinct postures held still, of which it has 0; this motion leaves untested besides: "));
   EXPECT_THAT(short_log.refusal, HasSubstr("base_shift"));
   EXPECT_THAT(short_log.refusal, testing::Not(HasSubstr("backlash"))) << "the elbow's can be tested";

@@ -18,7 +18,7 @@ struct DiagnosisOptions {
   double matters_m = 0.0005;
   double block_s = 1.0;            ///< shortest block; longer ones where neighbours err alike
   double same_posture_rad = 0.05;  ///< a block ends only where the arm has moved by this
-  double shortest_log_s = 10.0;    ///< of pictures; shorter and fewer still postures than `fewest_postures`: refused
+  double shortest_log_s = 8.0;     ///< of pictures; shorter and fewer still postures than `fewest_postures`: refused
   std::size_t fewest_postures = 5;
   double spacing_px = 3.0;          ///< of outline samples, px of a 320x240 picture
   OutlineNoise::Prior noise;        ///< of outlines, before any was seen

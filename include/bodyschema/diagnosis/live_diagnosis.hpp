@@ -12,6 +12,7 @@ struct LiveDiagnosisOptions {
   /// From one look to the next, s: at least the first, then a share of what was seen (what has seen hardly anything new
   /// cannot say anything new), at most the last.
   double least_period_s = 5.0, period_share = 0.2, most_period_s = 20.0;
+  double first_look_s = 10.0;     ///< of pictures, before the first look
   double picture_period_s = 0.5;  ///< from one frame that is looked at to the next
   double window_s = 90.0;         ///< older pictures are forgotten
   double answer_s = 3.0;          ///< what a look found is said this much later, when it is surely known
