@@ -424,7 +424,7 @@ class Calibrator {
       const auto& p = state.parameters()[static_cast<std::size_t>(k)];
       if (k < state.joints()) {
         CalibratedJoint joint{p.name, x[k], sd[k], false, {}};
-        joint.told = sd[k] < kTold_rad && sd[k] < p.prior_sd / 3.0;
+        joint.told = sd[k] < kTold_rad && sd[k] < kToldShare * p.prior_sd;
         if (!joint.told) joint.untold_why = why_untold(batch, k);
         result_.joints.push_back(std::move(joint));
       } else {
@@ -593,7 +593,7 @@ class Calibrator {
   void leave_out_sections(LogFit& fit, BatchFit& batch) {
     constexpr std::size_t kSections = 5;
     const auto postures = batch.postures();
-    if (postures < 2 * kFewestPostures - 1) return;
+    if (postures <= kFewestPostures) return;
     const std::size_t sections = std::min(kSections, postures);
     std::vector<Eigen::VectorXd> without;
     for (std::size_t section = 0; section < sections; ++section) {
@@ -611,7 +611,12 @@ class Calibrator {
                            median_outline_distance_px(fit, ErrorModel(roles), left_out),
                            median_outline_distance_px(fit, part.state().model(), left_out)});
     }
-    batch.widen(section_spread(without, batch.estimate().covariance.diagonal().cwiseMax(0.0).cwiseSqrt()));
+    const Eigen::VectorXd sd = batch.estimate().covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+    std::vector<Eigen::Index> told;
+    for (Eigen::Index k = 0; k < batch.state().joints(); ++k) {
+      if (sd[k] < kToldShare * batch.state().prior_sd()[k]) told.push_back(k);
+    }
+    batch.widen(section_spread(without, sd, told, settings().memory.posture_prior));
   }
 
   void judge_left_out() {
@@ -788,6 +793,7 @@ class Calibrator {
   }
 
   static constexpr double kTold_rad = 0.5 * kPi / 180.0;
+  static constexpr double kToldShare = 1.0 / 3.0;  ///< of what was believed before
 
   const Configuration& configuration_;
   CalibrationOptions options_;

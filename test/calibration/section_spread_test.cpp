@@ -56,5 +56,35 @@ TEST(SectionSpread, EachParameterForItself) {
   EXPECT_EQ(factor[1], 1.0);
 }
 
+/// Sections that are told apart by several parameters at once: `kTold` of them, each with its own values.
+constexpr int kTold = 5;
+const std::vector<Eigen::Index> kAllTold = {0, 1, 2, 3, 4};
+
+std::vector<Eigen::VectorXd> left_out_of_all(std::mt19937& random, double spread) {
+  std::vector<Eigen::VectorXd> without(kSections, Eigen::VectorXd::Zero(kTold));
+  for (Eigen::Index k = 0; k < kTold; ++k) {
+    const auto own = left_out(random, spread);
+    for (std::size_t i = 0; i < without.size(); ++i) without[i][k] = own[i][0];
+  }
+  return without;
+}
+
+/// Twice what is claimed: one parameter alone is rarely convicted of that by five sections, five together are.
+TEST(SectionSpread, ParametersThatAreToldAreLookedAtTogether) {
+  std::mt19937 random(19);
+  const Eigen::VectorXd claimed = kClaimed.replicate(kTold, 1);
+  double alone = 0.0, together = 0.0, healthy = 0.0;
+  constexpr int kTrials = 1000;
+  for (int i = 0; i < kTrials; ++i) {
+    const auto without = left_out_of_all(random, 2.0);
+    alone += section_spread(without, claimed)[0] > 1.0 ? 1.0 / kTrials : 0.0;
+    together += section_spread(without, claimed, kAllTold)[0] > 1.3 ? 1.0 / kTrials : 0.0;
+    healthy += section_spread(left_out_of_all(random, 1.0), claimed, kAllTold)[0] / kTrials;
+  }
+  EXPECT_LT(alone, 0.6);
+  EXPECT_GT(together, 0.9);
+  EXPECT_LT(healthy, 1.1) << "what scatters as is claimed costs next to nothing";
+}
+
 }  // namespace
 }  // namespace bodyschema
