@@ -83,6 +83,7 @@ Frame FrameModel::take(const Observation& observation, const Eigen::VectorXd& x)
   state_.set(x);
   probes_.follow(state_.model());
   Frame frame;
+  frame.time_s = seconds(observation.utime);
   frame.exposures.resize(rig_.cameras.size());
   frame.seen.resize(rig_.cameras.size(), nullptr);
   // The earlier exposure first: what has a memory goes with time.
