@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "bodyschema/core/order_statistics.hpp"
+
 namespace bodyschema::diagnosis {
 namespace {
 
@@ -16,13 +18,6 @@ constexpr double kMostNormal = 1.645;  ///< ... which lie within so many standar
 /// Of the changes. Readings in steps never change by less than one, and often by just that: the smallest changes are
 /// alike. Without steps they are as small as one cares to look.
 constexpr double kSmallest = 0.01, kSmall = 0.05, kAlike = 1.5;
-
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 double median_period(std::span<const JointSample> encoders) {
   std::vector<double> periods;

@@ -3,16 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bodyschema/core/order_statistics.hpp"
 #include "bodyschema/geometry/pose.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
-
-double quantile(std::vector<double> values, double share) {
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 /// How often the arm's joints come: messages of head and arm may come at different rates, and a joint says something
 /// new only when it moves. The quicker quarter of the times between changes; the mean period of all messages while
