@@ -56,7 +56,7 @@ void add_replay(CLI::App& app) {
     if (!a->looks.empty()) options.looks = a->looks;
     options.watcher = [](const Pipeline& pipeline) -> ReplayOptions::Watcher {
       if (!pipeline.options().live_diagnosis) return {};
-      auto live = std::make_shared<LiveDiagnosis>(pipeline, LiveDiagnosisOptions{.waits = true});
+      auto live = std::make_shared<LiveDiagnosis>(pipeline, true);
       return [live](const Observation& observation, Estimate& estimate) { live->watch(observation, estimate); };
     };
     std::fputs(replay(configuration, options).c_str(), stdout);

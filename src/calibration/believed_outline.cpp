@@ -9,8 +9,7 @@ double believed_outline_sd_px(LogFit& fit, const State& state, const std::vector
   constexpr std::size_t kPictures = 12;
   OutlineSearch search{.search_px = 6.0, .spacing_px = 6.0, .robust_px = 3.0};
   for (const bool out : left_out) search.part_weight.push_back(out ? 0.0 : 1.0);
-  std::vector<ParameterRef> refs;
-  for (const auto& parameter : state.parameters()) refs.push_back(parameter.ref);
+  const auto refs = state.refs();
   const auto coordinates = fit.moved_by(state.model(), refs);
   const LinearLog at = fit.predict(state.model(), coordinates);
   const auto directions = fit.directions(at, state.model(), refs);

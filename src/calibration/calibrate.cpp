@@ -563,9 +563,7 @@ class Calibrator {
 
   [[nodiscard]] double hand_sd_m(LogFit& fit, const BatchFit& batch) const {
     const auto& state = batch.state();
-    std::vector<ParameterRef> refs;
-    for (const auto& p : state.parameters()) refs.push_back(p.ref);
-    const auto directions = fit.directions(batch.at(), state.model(), refs);
+    const auto directions = fit.directions(batch.at(), state.model(), state.refs());
     double sum = 0.0, n = 0.0;
     auto& measurement = fit.measurement();
     for (std::size_t p = 0; p < log_->pictures().size(); ++p) {

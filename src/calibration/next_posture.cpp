@@ -22,8 +22,7 @@ std::optional<NextPosture> next_posture(LogFit& fit, const BatchFit& batch, cons
   const auto& roles = log.roles();
   const auto& state = batch.state();
   const auto n = state.size();
-  std::vector<ParameterRef> refs;
-  for (const auto& p : state.parameters()) refs.push_back(p.ref);
+  const auto refs = state.refs();
   EffectProbes probes(state.model(), refs, fit.coordinates());
   const auto active = fit.moved_by(state.model(), refs);
   std::vector<Eigen::Index> position(static_cast<std::size_t>(fit.coordinates().size()), -1);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "quantile.hpp"
+#include "bodyschema/core/order_statistics.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {

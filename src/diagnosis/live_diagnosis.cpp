@@ -27,6 +27,16 @@ constexpr std::size_t kMostWaiting = 60;        // frames kept for a look that i
 constexpr std::size_t kMostChanges = 3;         // that slips are asked of, the last ones
 constexpr double kNoisePictures = 100.0;        // after so many a picture's noise has faded
 
+/// From one look to the next, s: at least the first, then a share of what was seen (what has seen hardly anything new
+/// cannot say anything new), at most the last.
+constexpr double kLeastPeriod_s = 5.0, kPeriodShare = 0.2, kMostPeriod_s = 20.0;
+constexpr double kFirstLook_s = 10.0;     // of pictures, before the first look
+constexpr double kPicturePeriod_s = 0.5;  // from one frame that is looked at to the next
+constexpr double kWindow_s = 90.0;        // older pictures are forgotten
+constexpr double kAnswer_s = 3.0;         // what a look found is said this much later, when it is surely known
+/// In how many looks together anything may be named in a robot without a fault, ever: every look has its share.
+constexpr double kLevel = 0.01;
+
 /// What a look works on.
 struct Batch {
   std::vector<Observation> frames;    ///< new ones: masks, joints and encoders
@@ -74,9 +84,8 @@ bool agree(const Finding& a, const Finding& b) {
 /// The window of pictures, and the looks at it. Used by the worker's thread alone.
 class Window {
  public:
-  Window(const Pipeline& pipeline, const LiveDiagnosisOptions& options)
-      : options_(options), tolerances_(pipeline.beliefs().tolerances),
-        state_(pipeline.known_effects(), pipeline.beliefs().state),
+  explicit Window(const Pipeline& pipeline)
+      : tolerances_(pipeline.beliefs().tolerances), state_(pipeline.known_effects(), pipeline.beliefs().state),
         log_(pipeline.shared_robot(), pipeline.setup(), pipeline.rig()), fit_(log_, 1) {
     diagnosis_.noise = pipeline.options().noise;
     diagnosis_.spacing_px = pipeline.options().outline_spacing_px;
@@ -96,11 +105,11 @@ class Window {
     found.utime = last;
     found.span_s = seconds(last - log_.pictures().front().joints.utime);
     found_ = found;
-    if (found.span_s < options_.first_look_s) return found;
+    if (found.span_s < kFirstLook_s) return found;
     // A share of what may be wrong for every look, all of them together (Lan and DeMets 1983): of the k-th 6 / (pi
     // k)^2.
     const double k = static_cast<double>(++looks_);
-    diagnosis_.level = options_.level * 6.0 / (kPi * kPi * k * k);
+    diagnosis_.level = kLevel * 6.0 / (kPi * kPi * k * k);
     const auto report = diagnosis::look(fit_, state_, at_, noise_, tolerances_, diagnosis_, changes_);
     found.blocks = report.blocks;
     found.z_threshold = report.z_threshold;
@@ -131,7 +140,7 @@ class Window {
   /// Pictures of the window date a slip no better than they follow each other.
   [[nodiscard]] bool is_slip_at_change(const Finding& finding) const {
     return finding.effect == "slip" && std::any_of(changes_.begin(), changes_.end(), [&](Microseconds change) {
-             return std::abs(seconds(finding.from - change)) <= options_.picture_period_s;
+             return std::abs(seconds(finding.from - change)) <= kPicturePeriod_s;
            });
   }
 
@@ -148,7 +157,7 @@ class Window {
     const auto newest = at_ ? at_->instants.back().utime : 0;
     for (const auto& frame : batch.frames) log_.add(frame);
     if (log_.pictures().empty() || log_.pictures().back().joints.utime <= newest) return false;
-    log_.forget_before(log_.pictures().back().joints.utime - microseconds(options_.window_s));
+    log_.forget_before(log_.pictures().back().joints.utime - microseconds(kWindow_s));
     remember(batch.changes);
     log_.finish();
     fit_.weigh_parts();
@@ -226,7 +235,6 @@ class Window {
     evidence.b -= pull;
   }
 
-  LiveDiagnosisOptions options_;
   DiagnosisOptions diagnosis_;
   std::vector<Belief> tolerances_;
   State state_;
@@ -243,8 +251,8 @@ class Window {
 }  // namespace
 
 struct LiveDiagnosis::Impl {
-  Impl(const Pipeline& pipeline, const LiveDiagnosisOptions& live)
-      : options(live), least_postures(pipeline.options().least_postures), window(pipeline, live) {}
+  Impl(const Pipeline& pipeline, bool wait)
+      : waits(wait), least_postures(pipeline.options().least_postures), window(pipeline) {}
 
   bool watch(const Observation& observation, Estimate& estimate) {
     if (observation.encoders_begin_anew) begin_anew();
@@ -293,7 +301,7 @@ struct LiveDiagnosis::Impl {
     if (estimate.state == EstimatorState::kHandNotInView || estimate.state == EstimatorState::kLearningBackground) {
       return;
     }
-    if (kept_utime > 0 && seconds(observation.utime - kept_utime) < options.picture_period_s) return;
+    if (kept_utime > 0 && seconds(observation.utime - kept_utime) < kPicturePeriod_s) return;
     if (waiting.frames.size() >= kMostWaiting) return;
     kept_utime = observation.utime;
     Observation frame;
@@ -314,8 +322,8 @@ struct LiveDiagnosis::Impl {
 
   /// Says what the look under way has found, once it is time.
   bool answer(Microseconds now) {
-    if (!looking.valid() || seconds(now - look_utime) < options.answer_s) return false;
-    if (!options.waits && looking.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+    if (!looking.valid() || seconds(now - look_utime) < kAnswer_s) return false;
+    if (!waits && looking.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
     LiveFindings found = looking.get();
     said = found;
     std::erase_if(said.causes, [&](const Finding& f) {
@@ -330,10 +338,9 @@ struct LiveDiagnosis::Impl {
   void begin_look(Microseconds now) {
     if (waiting.frames.empty() || looking.valid()) return;
     if (look_utime == 0) first_utime = look_utime = now;
-    const double period_s =
-        std::clamp(options.period_share * seconds(now - first_utime), options.least_period_s, options.most_period_s);
+    const double period_s = std::clamp(kPeriodShare * seconds(now - first_utime), kLeastPeriod_s, kMostPeriod_s);
     // What has changed is looked at as soon as some pictures tell of it.
-    const bool changed = change_utime > look_utime && seconds(now - change_utime) >= options.least_period_s;
+    const bool changed = change_utime > look_utime && seconds(now - change_utime) >= kLeastPeriod_s;
     if (!changed && seconds(now - look_utime) < period_s) return;
     look_utime = now;
     waiting.x = x;
@@ -346,7 +353,7 @@ struct LiveDiagnosis::Impl {
     });
   }
 
-  LiveDiagnosisOptions options;
+  bool waits;
   std::size_t least_postures;
   Window window;  ///< the worker's
   std::atomic<double> used_s{0.0};
@@ -361,8 +368,7 @@ struct LiveDiagnosis::Impl {
   BackgroundWorker worker;  ///< last: it ends before what it works on
 };
 
-LiveDiagnosis::LiveDiagnosis(const Pipeline& pipeline, const LiveDiagnosisOptions& options)
-    : impl_(std::make_unique<Impl>(pipeline, options)) {}
+LiveDiagnosis::LiveDiagnosis(const Pipeline& pipeline, bool waits) : impl_(std::make_unique<Impl>(pipeline, waits)) {}
 LiveDiagnosis::~LiveDiagnosis() = default;
 
 bool LiveDiagnosis::watch(const Observation& observation, Estimate& estimate) {

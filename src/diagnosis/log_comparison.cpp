@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "bodyschema/core/order_statistics.hpp"
 #include "bodyschema/core/write_file.hpp"
 #include "bodyschema/evidence/distributions.hpp"
 #include "bodyschema/report/report.hpp"
@@ -184,10 +185,8 @@ class Comparison {
     }
     constexpr std::size_t kFewest = 4;
     if (sizes.size() < kFewest) return 1.0;
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
     constexpr double kHalf = 0.5;
-    return std::max(1.0, *middle / normal_quantile(kHalf));
+    return std::max(1.0, median(sizes) / normal_quantile(kHalf));
   }
 
   /// At the end of one log against the beginning of the next.

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bodyschema/core/order_statistics.hpp"
 #include "bodyschema/geometry/pose.hpp"
-#include "quantile.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {

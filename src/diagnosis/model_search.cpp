@@ -25,12 +25,6 @@ Belief wide_belief(const CauseName& cause, const JointRoles& roles) {
 namespace bodyschema::diagnosis {
 namespace {
 
-std::vector<ParameterRef> refs_of(const State& state) {
-  std::vector<ParameterRef> refs;
-  for (const auto& p : state.parameters()) refs.push_back(p.ref);
-  return refs;
-}
-
 /// A part of a log in which the robot is hardly found.
 struct LostPart {
   std::size_t split = 0;  ///< the first picture after it changed
@@ -234,7 +228,7 @@ LogAbout ModelSearch::about(double block_s) {
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint32_t>(i);
   LogAbout log(state_,
                given_ ? given_ : std::make_shared<const LinearLog>(fit_.linearise(state_.model(), all, search())));
-  log.base = fit_.directions(log.at, state_.model(), refs_of(state_));
+  log.base = fit_.directions(log.at, state_.model(), state_.refs());
   add_causes(log);
   add_considered(log);
   for (std::size_t p = 0; p < log.base.size(); ++p) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bodyschema/core/order_statistics.hpp"
 #include "bodyschema/pipeline/silhouette_preview.hpp"
 #include "limits.hpp"
 
@@ -60,17 +61,13 @@ Surplus surplus(LogFit& fit, const LogAbout& log, const std::vector<std::size_t>
   }
   std::vector<double> areas;
   double seen = 0.0;
-  for (auto& areas_of_pictures : of_block) {
+  for (const auto& areas_of_pictures : of_block) {
     if (areas_of_pictures.empty()) continue;
     seen += 1.0;
-    const auto middle = areas_of_pictures.begin() + static_cast<std::ptrdiff_t>(areas_of_pictures.size() / 2);
-    std::nth_element(areas_of_pictures.begin(), middle, areas_of_pictures.end());
-    if (*middle > 0.0) areas.push_back(*middle);
+    if (const double area = median(areas_of_pictures); area > 0.0) areas.push_back(area);
   }
   if (areas.empty()) return {};
-  const auto middle = areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2);
-  std::nth_element(areas.begin(), middle, areas.end());
-  return {static_cast<double>(areas.size()) / seen, *middle};
+  return {static_cast<double>(areas.size()) / seen, median(areas)};
 }
 
 }  // namespace bodyschema::diagnosis

@@ -18,15 +18,11 @@ EffectKind axis_shift() {
                               targets.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(2, targets.size())));
                 return targets;
               },
-          .make =
-              [](const EffectTarget& target, const JointRoles& roles) {
-                return plain("axis_shift", target, {in_mm("shift_1", 3.0), in_mm("shift_2", 3.0)},
-                             [joint = static_cast<std::size_t>(roles.index(target.joint))](Parameters p, const Instant&,
-                                                                                           Corrections& c) {
-                               c.adjustments[joint].shift_1_m += p[0].value;
-                               c.adjustments[joint].shift_2_m += p[1].value;
-                             });
-              },
+          .make = on_joint("axis_shift", {in_mm("shift_1", 3.0), in_mm("shift_2", 3.0)},
+                           [](Eigen::Index joint, Parameters p, const Instant&, Corrections& c) {
+                             c.adjustments[static_cast<std::size_t>(joint)].shift_1_m += p[0].value;
+                             c.adjustments[static_cast<std::size_t>(joint)].shift_2_m += p[1].value;
+                           }),
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
                 return "the axis of " + e.target().joint + " lies beside where the URDF has it, by " + both(amounts);

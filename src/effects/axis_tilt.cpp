@@ -9,21 +9,16 @@ namespace bodyschema::effects {
 EffectKind axis_tilt() {
   return {.name = "axis_tilt",
           .targets = arm_targets,
-          .make =
-              [](const EffectTarget& target, const JointRoles& roles) {
-                return plain("axis_tilt", target, {in_degrees("tilt_1", 0.5), in_degrees("tilt_2", 0.5)},
-                             [joint = static_cast<std::size_t>(roles.index(target.joint))](Parameters p, const Instant&,
-                                                                                           Corrections& c) {
-                               c.adjustments[joint].tilt_1_rad += p[0].value;
-                               c.adjustments[joint].tilt_2_rad += p[1].value;
-                             });
-              },
+          .make = on_joint("axis_tilt", {in_degrees("tilt_1", 0.5), in_degrees("tilt_2", 0.5)},
+                           [](Eigen::Index joint, Parameters p, const Instant&, Corrections& c) {
+                             c.adjustments[static_cast<std::size_t>(joint)].tilt_1_rad += p[0].value;
+                             c.adjustments[static_cast<std::size_t>(joint)].tilt_2_rad += p[1].value;
+                           }),
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
                 return "the axis of " + e.target().joint + " is tilted against the URDF's, by " + both(amounts);
               },
-          .not_testable = [](const EffectTarget& target, const JointRoles& roles,
-                             const LogMotion& motion) { return too_little_motion(target.joint, roles, motion); },
+          .not_testable = joint_hardly_moved,
           .lookalikes = {"joint_coupling"},
           .splitting_motion = "Move the joint and its neighbours one at a time through their full ranges.",
           .home = EffectHome::kUrdf};

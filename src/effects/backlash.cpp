@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 namespace {
@@ -72,7 +73,7 @@ std::string not_testable(const EffectTarget& target, const JointRoles& roles, co
     return "the arm's encoders come every " + short_number(1e3 * motion.reading_period_s, 0) +
            " ms; the direction of motion needs 100 Hz or more";
   }
-  if (auto still = too_little_motion(target.joint, roles, motion); !still.empty()) return still;
+  if (auto still = joint_hardly_moved(target, roles, motion); !still.empty()) return still;
   // Backlash shows where a joint passes the same angles in both directions.
   const int reversals = motion.reversals[static_cast<std::size_t>(roles.index(target.joint))];
   if (reversals >= 2) return {};
@@ -82,7 +83,7 @@ std::string not_testable(const EffectTarget& target, const JointRoles& roles, co
 
 }  // namespace
 
-std::string needs_motion_that_was_seen(const LogMotion& motion) {
+std::string needs_motion_that_was_seen(const EffectTarget&, const JointRoles&, const LogMotion& motion) {
   if (!jumps_between_postures(motion)) return "";
   return "the arm was seen in single postures, " + short_number(motion.reading_step_rad / kDeg, 0) +
          " deg apart (median); each would be taken before or after a change, and none shows it happen";
@@ -93,10 +94,7 @@ EffectKind backlash() {
           .targets = arm_targets,
           .make = [](const EffectTarget& target,
                      const JointRoles& roles) { return std::make_unique<Backlash>(target, roles.index(target.joint)); },
-          .sentence =
-              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return e.target().joint + " has " + amounts[0] + " of play between encoder and link";
-              },
+          .sentence = in_words("{joint} has {size} of play between encoder and link"),
           .not_testable = not_testable,
           .lookalikes = {"latency"},
           .splitting_motion = "Repeat the same path at two speeds and in both directions.",

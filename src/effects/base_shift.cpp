@@ -8,13 +8,10 @@ namespace bodyschema::effects {
 EffectKind base_shift() {
   return {.name = "base_shift",
           .targets = whole_robot,
-          .make =
-              [](const EffectTarget& target, const JointRoles&) {
-                return plain("base_shift", target, {in_mm("x", 3.0), in_mm("y", 3.0), in_mm("z", 3.0)},
+          .make = everywhere("base_shift", {in_mm("x", 3.0), in_mm("y", 3.0), in_mm("z", 3.0)},
                              [](Parameters p, const Instant&, Corrections& c) {
                                c.base_shift_m += Eigen::Vector3d(p[0].value, p[1].value, p[2].value);
-                             });
-              },
+                             }),
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
                 std::string text;

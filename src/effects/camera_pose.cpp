@@ -7,16 +7,13 @@ namespace bodyschema::effects {
 EffectKind camera_pose() {
   return {.name = "camera_pose",
           .targets = whole_robot,
-          .make =
-              [](const EffectTarget& target, const JointRoles&) {
-                return plain("camera_pose", target,
+          .make = everywhere("camera_pose",
                              {in_mm("x", 5.0), in_mm("y", 5.0), in_mm("z", 5.0), in_degrees("turn_x", 0.5),
                               in_degrees("turn_y", 0.5), in_degrees("turn_z", 0.5)},
                              [](Parameters p, const Instant&, Corrections& c) {
                                c.camera.rig_shift_m += Eigen::Vector3d(p[0].value, p[1].value, p[2].value);
                                c.camera.rig_turn_rad += Eigen::Vector3d(p[3].value, p[4].value, p[5].value);
-                             });
-              },
+                             }),
           .sentence =
               [](const Effect& e, const JointRoles& roles, std::span<const std::string> amounts) {
                 return std::string(roles.cameras.size() > 1 ? "the cameras sit" : "the camera sits") +

@@ -57,20 +57,20 @@ std::string short_number(double value, int decimals) {
   return text.str();
 }
 
-std::string too_little_motion(const std::string& joint, const JointRoles& roles, const LogMotion& motion) {
+std::string joint_hardly_moved(const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) {
   constexpr double kLeastRange = 5.0 * kDeg;
-  const double range = motion.range_rad[roles.index(joint)];
-  return range < kLeastRange ? joint + " moved " + short_number(range / kDeg) + " deg" : "";
+  const double range = motion.range_rad[roles.index(target.joint)];
+  return range < kLeastRange ? target.joint + " moved " + short_number(range / kDeg) + " deg" : "";
 }
 
-std::string too_slow(const LogMotion& motion) {
+std::string too_slow(const EffectTarget&, const JointRoles&, const LogMotion& motion) {
   constexpr double kLeastSpeed = 3.0 * kDeg;  // rad/s
   return motion.arm_speed_rad_s < kLeastSpeed
              ? "the arm moved at " + short_number(motion.arm_speed_rad_s / kDeg) + " deg/s"
              : "";
 }
 
-std::string needs_two_cameras(const LogMotion& motion) {
+std::string needs_two_cameras(const EffectTarget&, const JointRoles&, const LogMotion& motion) {
   return motion.cameras < 2 ? "the log has one camera" : "";
 }
 

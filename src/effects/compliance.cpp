@@ -1,4 +1,5 @@
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -7,21 +8,13 @@ EffectKind compliance() {
   return {
       .name = "compliance",
       .targets = arm_targets,
-      .make =
-          [](const EffectTarget& target, const JointRoles& roles) {
-            return plain(
-                "compliance", target,
-                {{.name = "compliance", .unit = "deg/Nm", .si_per_unit = kDeg, .typical = 0.3 * kDeg}},
-                [joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
-                  if (at.gravity_torque.size() > 0) c.dq[joint] += p[0].value * at.gravity_torque[joint];
-                },
-                Follows::kGravity);
+      .make = on_joint(
+          "compliance", {{.name = "compliance", .unit = "deg/Nm", .si_per_unit = kDeg, .typical = 0.3 * kDeg}},
+          [](Eigen::Index joint, Parameters p, const Instant& at, Corrections& c) {
+            if (at.gravity_torque.size() > 0) c.dq[joint] += p[0].value * at.gravity_torque[joint];
           },
-      .sentence =
-          [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-            return e.target().joint + by_sign(e.parameters()[0], " gives way", " rises") +
-                   " under gravity's torque by " + amounts[0];
-          },
+          Follows::kGravity),
+      .sentence = in_words("{joint} {gives way|rises} under gravity's torque by {size}"),
       .not_testable = [](const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) -> std::string {
         constexpr double kLeastTorque_nm = 0.05;
         if (!motion.has_masses) return "the robot's URDF has no masses";

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -9,25 +10,17 @@ namespace bodyschema::effects {
 EffectKind drift() {
   return {.name = "drift",
           .targets = arm_targets,
-          .make =
-              [](const EffectTarget& target, const JointRoles& roles) {
-                return plain("drift", target,
-                             {{.name = "change", .unit = "deg/log", .si_per_unit = kDeg, .typical = 0.5 * kDeg},
-                              {.name = "begin", .unit = "s", .fitted = false},
-                              {.name = "duration", .unit = "s", .value = 60.0, .fitted = false}},
-                             [joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
-                               if (p[2].value <= 0.0) return;
-                               c.dq[joint] +=
-                                   p[0].value * std::clamp((seconds(at.utime) - p[1].value) / p[2].value, 0.0, 1.0);
-                             });
-              },
-          .sentence =
-              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return "the offset of " + e.target().joint + " creeps: " + amounts[0] + " over the log" +
-                       by_sign(e.parameters()[0], "", ", downwards");
-              },
-          .not_testable = [](const EffectTarget&, const JointRoles&,
-                             const LogMotion& motion) { return needs_motion_that_was_seen(motion); },
+          .make = on_joint("drift",
+                           {{.name = "change", .unit = "deg/log", .si_per_unit = kDeg, .typical = 0.5 * kDeg},
+                            {.name = "begin", .unit = "s", .fitted = false},
+                            {.name = "duration", .unit = "s", .value = 60.0, .fitted = false}},
+                           [](Eigen::Index joint, Parameters p, const Instant& at, Corrections& c) {
+                             if (p[2].value <= 0.0) return;
+                             c.dq[joint] +=
+                                 p[0].value * std::clamp((seconds(at.utime) - p[1].value) / p[2].value, 0.0, 1.0);
+                           }),
+          .sentence = in_words("the offset of {joint} creeps: {size} over the log{|, downwards}"),
+          .not_testable = needs_motion_that_was_seen,
           .lookalikes = {"slip"},
           .splitting_motion = "Revisit the first postures in the middle and at the end of the log.",
           .timing = EffectTiming::kOverTheLog,

@@ -1,4 +1,5 @@
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -7,20 +8,12 @@ namespace bodyschema::effects {
 EffectKind encoder_gain() {
   return {.name = "encoder_gain",
           .targets = arm_targets,
-          .make =
-              [](const EffectTarget& target, const JointRoles& roles) {
-                return plain("encoder_gain", target, {in_percent("gain", 1.0)},
-                             [joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
-                               c.dq[joint] += p[0].value * at.q[joint];
-                             });
-              },
-          .sentence =
-              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return e.target().joint + " turns " + amounts[0] + by_sign(e.parameters()[0], " further", " less far") +
-                       " than its encoder says";
-              },
-          .not_testable = [](const EffectTarget& target, const JointRoles& roles,
-                             const LogMotion& motion) { return too_little_motion(target.joint, roles, motion); },
+          .make = on_joint("encoder_gain", {in_percent("gain", 1.0)},
+                           [](Eigen::Index joint, Parameters p, const Instant& at, Corrections& c) {
+                             c.dq[joint] += p[0].value * at.q[joint];
+                           }),
+          .sentence = in_words("{joint} turns {size} {further|less far} than its encoder says"),
+          .not_testable = joint_hardly_moved,
           .lookalikes = {"eccentricity"},
           .splitting_motion = "Sweep the joint through more than 90 deg.",
           .remark = "scale the reading, offset taken off, by 1 + gain where the encoder is read"};

@@ -259,7 +259,11 @@ void ErrorModel::save(const std::filesystem::path& file) const {
 }
 
 Effect* ErrorModel::find(const std::string& name, const EffectTarget& target) {
-  for (auto& effect : effects_) {
+  return const_cast<Effect*>(std::as_const(*this).find(name, target));
+}
+
+const Effect* ErrorModel::find(const std::string& name, const EffectTarget& target) const {
+  for (const auto& effect : effects_) {
     if (effect->name() == name && effect->target() == target) return effect.get();
   }
   return nullptr;
@@ -297,12 +301,10 @@ void ErrorModel::observe(const JointSample& sample) {
   for (auto& effect : effects_) effect->observe(sample);
 }
 
-void ErrorModel::corrections(const Instant& at, Corrections& out, bool include_offsets) const {
+void ErrorModel::corrections(const Instant& at, Corrections& out) const {
   out.clear();
   out.qdot = at.qdot;
-  for (const auto& effect : effects_) {
-    if (include_offsets || effect->name() != "joint_offset") effect->apply(at, out);
-  }
+  for (const auto& effect : effects_) effect->apply(at, out);
 }
 
 StereoRig ErrorModel::corrected(const StereoRig& rig) const {

@@ -1,4 +1,5 @@
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -14,11 +15,7 @@ EffectKind finger_posture() {
                                for (const auto joint : fingers) c.dq[joint] += p[0].value;
                              });
               },
-          .sentence =
-              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return "the fingers are curled " + amounts[0] + by_sign(e.parameters()[0], " more", " less") +
-                       " than their encoders say";
-              },
+          .sentence = in_words("the fingers are curled {size} {more|less} than their encoders say"),
           .lookalikes = {"mesh_scale"},
           .splitting_motion = "Show the hand near and far, and from palm and back.",
           .remark = "the finger encoders' zero; recalibrate the hand"};

@@ -47,8 +47,8 @@ EffectKind joint_coupling() {
           },
       .not_testable =
           [](const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) {
-            const auto source = too_little_motion(target.source, roles, motion);
-            return source.empty() ? too_little_motion(target.joint, roles, motion) : source;
+            const auto source = joint_hardly_moved({target.source, ""}, roles, motion);
+            return source.empty() ? joint_hardly_moved(target, roles, motion) : source;
           },
       .lookalikes = {"axis_tilt"},
       .splitting_motion = "Move the joint and its neighbours one at a time through their full ranges.",

@@ -64,6 +64,25 @@ std::unique_ptr<Effect> plain(std::string name, const EffectTarget& target, std:
                                               std::move(apply));
 }
 
+/// EffectKind::make of an effect without memory that is the same on every target.
+template <class Apply>
+auto everywhere(const char* name, std::vector<EffectParameter> parameters, Apply apply,
+                Follows follows = Follows::kPosture) {
+  return [=](const EffectTarget& target, const JointRoles&) { return plain(name, target, parameters, apply, follows); };
+}
+/// ... of one that acts on its target's joint.
+/// @param apply  void(Eigen::Index joint, Parameters, const Instant&, Corrections& add_to)
+template <class Apply>
+auto on_joint(const char* name, std::vector<EffectParameter> parameters, Apply apply,
+              Follows follows = Follows::kPosture) {
+  return [=](const EffectTarget& target, const JointRoles& roles) {
+    const auto add = [apply, joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
+      apply(joint, p, at, c);
+    };
+    return plain(name, target, parameters, add, follows);
+  };
+}
+
 /// The whole robot.
 inline Targets whole_robot(const JointRoles&) {
   return {EffectTarget{}};
@@ -94,12 +113,11 @@ std::string short_number(double value, int decimals = 1);
 /// ("at most") are left out, unless all do.
 std::string camera_place(Parameters shifts_and_turns, std::span<const std::string> amounts);
 
-/// Reasons that several effects share; empty: testable.
-std::string too_little_motion(const std::string& joint, const JointRoles& roles, const LogMotion& motion);
-std::string too_slow(const LogMotion& motion);
-std::string needs_two_cameras(const LogMotion& motion);
-
-/// Why a log of single postures cannot tell what changed in the course of it; empty: the arm was seen moving.
-std::string needs_motion_that_was_seen(const LogMotion& motion);
+/// Reasons that several effects share (EffectKind::not_testable); empty: testable.
+std::string joint_hardly_moved(const EffectTarget& target, const JointRoles& roles, const LogMotion& motion);
+std::string too_slow(const EffectTarget&, const JointRoles&, const LogMotion& motion);
+std::string needs_two_cameras(const EffectTarget&, const JointRoles&, const LogMotion& motion);
+/// A log of single postures cannot tell what changed in the course of it.
+std::string needs_motion_that_was_seen(const EffectTarget&, const JointRoles&, const LogMotion& motion);
 
 }  // namespace bodyschema::effects

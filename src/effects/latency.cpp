@@ -1,4 +1,5 @@
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -6,28 +7,20 @@ namespace bodyschema::effects {
 /// arm alike. dq = -delay * velocity + delay^2 / 2 * acceleration; without the second term 60 ms would be
 /// 0.2 deg off in an arm that babbles.
 EffectKind latency() {
-  return {
-      .name = "latency",
-      .targets = whole_robot,
-      .make =
-          [](const EffectTarget& target, const JointRoles&) {
-            return plain(
-                "latency", target, {in_ms("delay", 20.0)},
-                [](Parameters p, const Instant& at, Corrections& c) {
-                  c.dq.noalias() -= p[0].value * at.qdot;
-                  c.dq.noalias() += 0.5 * p[0].value * p[0].value * at.qddot;
-                },
-                Follows::kMotion);
-          },
-      .sentence =
-          [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-            return "pictures arrive " + amounts[0] + by_sign(e.parameters()[0], " late", " early") +
-                   " against the encoders";
-          },
-      .not_testable = [](const EffectTarget&, const JointRoles&, const LogMotion& motion) { return too_slow(motion); },
-      .lookalikes = {"backlash", "camera_skew"},
-      .splitting_motion = "Repeat the same path at two speeds and in both directions.",
-      .remark = "stamp the pictures earlier by the delay"};
+  return {.name = "latency",
+          .targets = whole_robot,
+          .make = everywhere(
+              "latency", {in_ms("delay", 20.0)},
+              [](Parameters p, const Instant& at, Corrections& c) {
+                c.dq.noalias() -= p[0].value * at.qdot;
+                c.dq.noalias() += 0.5 * p[0].value * p[0].value * at.qddot;
+              },
+              Follows::kMotion),
+          .sentence = in_words("pictures arrive {size} {late|early} against the encoders"),
+          .not_testable = too_slow,
+          .lookalikes = {"backlash", "camera_skew"},
+          .splitting_motion = "Repeat the same path at two speeds and in both directions.",
+          .remark = "stamp the pictures earlier by the delay"};
 }
 
 }  // namespace bodyschema::effects

@@ -43,8 +43,8 @@ EffectKind principal_point() {
                        " along x and " + amounts.back() + " along y";
               },
           .not_testable =
-              [](const EffectTarget& target, const JointRoles&, const LogMotion& motion) {
-                return target.source == "common" ? std::string() : needs_two_cameras(motion);
+              [](const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) {
+                return target.source == "common" ? std::string() : needs_two_cameras(target, roles, motion);
               },
           .lookalikes = {"head_offset", "base_shift", "vergence", "camera_pose", "camera_pair"},
           .splitting_motion = "Move the head by 20 to 30 deg with the arm still.",

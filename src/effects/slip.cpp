@@ -1,4 +1,5 @@
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -6,21 +7,14 @@ namespace bodyschema::effects {
 EffectKind slip() {
   return {.name = "slip",
           .targets = arm_targets,
-          .make =
-              [](const EffectTarget& target, const JointRoles& roles) {
-                return plain("slip", target,
-                             {in_degrees("step", 1.0),
-                              {.name = "time", .unit = "s", .si_per_unit = 1.0, .fitted = false, .typical = 0.0}},
-                             [joint = roles.index(target.joint)](Parameters p, const Instant& at, Corrections& c) {
-                               if (seconds(at.utime) >= p[1].value) c.dq[joint] += p[0].value;
-                             });
-              },
-          .sentence =
-              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return e.target().joint + " slipped by " + amounts[0] + by_sign(e.parameters()[0], "", ", backwards");
-              },
-          .not_testable = [](const EffectTarget&, const JointRoles&,
-                             const LogMotion& motion) { return needs_motion_that_was_seen(motion); },
+          .make = on_joint("slip",
+                           {in_degrees("step", 1.0),
+                            {.name = "time", .unit = "s", .si_per_unit = 1.0, .fitted = false, .typical = 0.0}},
+                           [](Eigen::Index joint, Parameters p, const Instant& at, Corrections& c) {
+                             if (seconds(at.utime) >= p[1].value) c.dq[joint] += p[0].value;
+                           }),
+          .sentence = in_words("{joint} slipped by {size}{|, backwards}"),
+          .not_testable = needs_motion_that_was_seen,
           .lookalikes = {"drift"},
           .splitting_motion = "Revisit the first postures in the middle and at the end of the log.",
           .timing = EffectTiming::kFromATime,

@@ -1,4 +1,5 @@
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -16,13 +17,8 @@ EffectKind vergence() {
                       c.dq[right] -= 0.5 * p[0].value;
                     });
               },
-          .sentence =
-              [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return "the eyes look " + amounts[0] + by_sign(e.parameters()[0], " further", " less far") +
-                       " inwards than their encoders say";
-              },
-          .not_testable = [](const EffectTarget&, const JointRoles&,
-                             const LogMotion& motion) { return needs_two_cameras(motion); },
+          .sentence = in_words("the eyes look {size} {further|less far} inwards than their encoders say"),
+          .not_testable = needs_two_cameras,
           .lookalikes = {"principal_point", "baseline", "camera_pair"},
           .splitting_motion =
               "Show the hand at depths from 0.2 to 0.6 m and in the corners of the picture, or a checkerboard.",

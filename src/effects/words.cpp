@@ -49,6 +49,28 @@ std::string both(std::span<const std::string> amounts) {
   return text;
 }
 
+decltype(EffectKind::sentence) in_words(std::string pattern) {
+  return [pattern = std::move(pattern)](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
+    std::string text;
+    std::size_t at = 0;
+    for (auto open = pattern.find('{'); open != std::string::npos; open = pattern.find('{', at)) {
+      const auto close = pattern.find('}', open);
+      const std::string word = pattern.substr(open + 1, close - open - 1);
+      text += pattern.substr(at, open - at);
+      if (word == "joint") {
+        text += e.target().joint;
+      } else if (word == "size") {
+        text += amounts[0];
+      } else {
+        const auto bar = word.find('|');
+        text += e.parameters()[0].value < 0.0 ? word.substr(bar + 1) : word.substr(0, bar);
+      }
+      at = close + 1;
+    }
+    return text + pattern.substr(at);
+  };
+}
+
 }  // namespace effects
 
 std::vector<AcrossAxis> across_axes(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,

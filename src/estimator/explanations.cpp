@@ -43,12 +43,12 @@ bool explains(const Hypothesis& hypothesis, bool anew, const OutlineFit& fit, co
 
 }  // namespace
 
-bool go_on(ExplanationRound& round, const PostureMemory& known, const OutlineFit& held, double time_s,
-           const Frame& frame, OutlineFitter& fitter, int room) {
+bool go_on(ExplanationRound& round, const PostureMemory& known, const OutlineFit& held, const Frame& frame,
+           OutlineFitter& fitter, int room) {
   bool best_is_of_frame = false;
   for (; round.at < round.hypotheses.size(); ++round.at, round.search = {}) {
     const Hypothesis& hypothesis = round.hypotheses[round.at];
-    PostureMemory memory = known_under(hypothesis, known, time_s);
+    PostureMemory memory = known_under(hypothesis, known, frame.time_s);
     OutlineFit fit;
     if (hypothesis.starts.size() > 1) {
       if (round.search.starts.empty()) round.search.starts = hypothesis.starts;
@@ -69,7 +69,7 @@ bool go_on(ExplanationRound& round, const PostureMemory& known, const OutlineFit
   }
   if (!round.best || best_is_of_frame) return true;
   Explanation& best = *round.best;
-  best.memory = known_under(best.hypothesis, known, time_s);
+  best.memory = known_under(best.hypothesis, known, frame.time_s);
   best.fit = best.hypothesis.starts.empty() ? fitter.follow(frame, best.memory, best.memory.estimate().x)
                                             : fitter.follow_from(frame, best.fit.x, best.memory);
   double gain = 0.0;

@@ -4,15 +4,6 @@
 #include <utility>
 
 namespace bodyschema {
-namespace {
-
-std::vector<ParameterRef> refs_of(const State& state) {
-  std::vector<ParameterRef> refs;
-  for (const auto& parameter : state.parameters()) refs.push_back(parameter.ref);
-  return refs;
-}
-
-}  // namespace
 
 bool Frame::exposed() const {
   return std::any_of(seen.begin(), seen.end(), [](const auto* camera) { return camera != nullptr; });
@@ -22,7 +13,7 @@ FrameModel::FrameModel(std::shared_ptr<const RobotModel> robot, const RobotSetup
                        const JointRoles& roles, State state, const ErrorModel& beside, const SilhouetteModel* drawn)
     : roles_(roles), rig_(rig), state_(std::move(state)),
       measurement_(robot, setup, rig, roles, drawn != nullptr ? *drawn : silhouette_model(*robot, setup)),
-      track_(robot, setup), probes_(state_.model(), refs_of(state_), measurement_.coordinates()),
+      track_(robot, setup), probes_(state_.model(), state_.refs(), measurement_.coordinates()),
       beside_(beside, fitted_parameters(beside), measurement_.coordinates()),
       settled_(rig.cameras.size(), roles.no_corrections()), scratch_(roles.no_corrections()), nothing_(scratch_),
       position_(static_cast<std::size_t>(measurement_.coordinates().size()), -1) {
@@ -83,6 +74,7 @@ Frame FrameModel::take(const Observation& observation, const Eigen::VectorXd& x)
   state_.set(x);
   probes_.follow(state_.model());
   Frame frame;
+  frame.time_s = seconds(observation.utime);
   frame.exposures.resize(rig_.cameras.size());
   frame.seen.resize(rig_.cameras.size(), nullptr);
   // The earlier exposure first: what has a memory goes with time.

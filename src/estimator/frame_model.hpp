@@ -30,6 +30,7 @@ struct FrameEvidence {
 
 /// The pictures of one frame with what is known of their exposures: all that is needed to look at them again.
 struct Frame {
+  double time_s = 0.0;
   std::vector<Exposure> exposures;             ///< per camera; where one saw nothing, another's
   std::vector<const CameraObservation*> seen;  ///< per camera; null: nothing. Not owned
   std::vector<BinaryMask> covered;             ///< per camera: where a held thing may be; empty: nowhere

@@ -2,12 +2,12 @@
 
 #include <fmt/core.h>
 
-#include <chrono>
 #include <utility>
 
 #include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/search/fastest_engine.hpp"
 #include "bodyschema/search/search_level.hpp"
+#include "stage_timer.hpp"
 
 namespace bodyschema {
 namespace {
@@ -54,16 +54,15 @@ HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& sil
   level_text_ = fmt::format(", 1/{} of the pictures' rows and columns, {} of {} triangles", step_, drawn, triangles);
 }
 
-bool HypothesisScorer::observe(const Observation& observation, const Frame& frame, double min_share, bool every_pixel) {
+bool HypothesisScorer::observe(const Frame& frame, double min_share, bool every_pixel) {
   frame_ = &frame;
   camera_mask_ = 0;
   double seen_px = 0.0, pixels = 0.0;
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
-    const bool present =
-        c < observation.cameras.size() && observation.cameras[c] && !observation.cameras[c]->mask.empty();
-    if (present) {
-      observed_[c].mask = observation.cameras[c]->mask;
-      observed_[c].valid = observation.cameras[c]->valid;
+    const CameraObservation* seen = frame.seen[c];
+    if (seen != nullptr && !seen->mask.empty()) {
+      observed_[c].mask = seen->mask;
+      observed_[c].valid = seen->valid;
       if (c < frame.covered.size()) leave_out(frame.covered[c], observed_[c].valid);
       seen_px += static_cast<double>(observed_[c].mask.count());
       pixels += static_cast<double>(cameras_[c].width) * static_cast<double>(cameras_[c].height);
@@ -95,7 +94,7 @@ void HypothesisScorer::place(const Eigen::VectorXd& x, std::size_t slot) {
 }
 
 void HypothesisScorer::score_slots(std::size_t begin, std::size_t n, Eigen::VectorXd& distances) {
-  const auto start = std::chrono::steady_clock::now();
+  const StageTimer timer(scoring_ms_);
   const std::size_t cameras = cameras_.size(), per_slot = cameras * model_.part_count();
   scorer_->score({X_CB_.data() + begin * per_slot, n * per_slot}, {counts_.data(), n * cameras}, camera_mask_);
   for (std::size_t i = 0; i < n; ++i) {
@@ -106,7 +105,6 @@ void HypothesisScorer::score_slots(std::size_t begin, std::size_t n, Eigen::Vect
     }
     distances(static_cast<Eigen::Index>(i)) = hammoude_distance(in_union, in_both);
   }
-  scoring_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
 const Eigen::VectorXd& HypothesisScorer::score(std::size_t n) {

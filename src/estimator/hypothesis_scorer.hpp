@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "bodyschema/observation/observation.hpp"
 #include "bodyschema/silhouette/silhouette_scorer.hpp"
 #include "frame_model.hpp"
 
@@ -28,10 +27,10 @@ class HypothesisScorer {
   HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes, const SilhouetteModel* outlines,
                    std::vector<PinholeIntrinsics> cameras, const SilhouetteOptions& options, std::size_t slots);
 
-  /// The observation that hypotheses are compared with until the next call, and its exposures; both must live as long.
-  /// A camera without a mask is not used. False when less than this share of the pictures is robot.
+  /// The frame that hypotheses are compared with until the next call; it and what it has seen must live as long. A
+  /// camera without a mask is not used. False when less than this share of the pictures is robot.
   /// @param every_pixel  compares full pictures, whatever the scorer is for
-  bool observe(const Observation& observation, const Frame& frame, double min_share, bool every_pixel = false);
+  bool observe(const Frame& frame, double min_share, bool every_pixel = false);
 
   void place(const Eigen::VectorXd& x, std::size_t slot);
   /// Distances of slots 0 to n - 1; valid until the next call.

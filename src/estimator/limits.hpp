@@ -40,9 +40,8 @@ inline constexpr double kNoisePictures = 100.0;
 /// Statistical. A frame whose innovation exceeds what this share of frames reach by chance is doubted: chi-square of
 /// its degrees of freedom, times what is usual in this log.
 inline constexpr double kDoubt_tail = 1e-4;
-/// Statistical. Frames over which the usual innovation is the mean; before any, the belief counts as so many.
+/// Statistical. Frames over which the usual innovation is the mean.
 inline constexpr double kUsualFrames = 30.0;
-inline constexpr double kUsualPrior = 5.0;
 /// Statistical. Chi-square by which another explanation must be better: a likelihood ratio of 1 : 1e5.
 inline constexpr double kClearlyBetter = 23.0;
 /// Physical. Hammoude distance of an arm found elsewhere against that of the one believed in: wrong arms are off by far

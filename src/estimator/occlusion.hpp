@@ -35,7 +35,6 @@ class Occlusion {
   void learn(const Frame& frame, const Eigen::VectorXd& x, double hand_sd_m);
   /// What a frame's outlines left out.
   [[nodiscard]] HiddenShare hidden(const FrameEvidence& seen) const;
-  [[nodiscard]] bool holds() const { return held_.known(); }
   void forget() { held_.forget(); }
 
  private:

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "bodyschema/core/order_statistics.hpp"
 #include "limits.hpp"
 
 namespace bodyschema {
@@ -49,14 +50,12 @@ double ShapeError::variance_px2(double floor_px, double fitted) const {
         part.seen < limits::kPosturesOfShape ? 0.0 : std::max(0.0, part.square / n - mean * mean) / (n - 1.0);
     errors.push_back(mean * mean - of_mean);
   }
-  auto sorted = errors;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double middle = median(errors);
   double square = 0.0, weight = 0.0, alike = 0.0, weight_square = 0.0;
   auto error = errors.begin();
   for (const auto& [place, part] : parts_) {
     const double own = part.weight * part.weight / part.postures;
-    square += own * std::max(*middle, *error++);
+    square += own * std::max(middle, *error++);
     alike += own;
     weight += part.weight;
     weight_square += part.weight * part.weight;

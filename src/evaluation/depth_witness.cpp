@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
+#include <utility>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/order_statistics.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
 #include "bodyschema/simulator/rasterizer.hpp"
 
@@ -52,9 +54,7 @@ double median_depth_distance_mm(const Pipeline& robot, const PinholeIntrinsics& 
     }
   }
   if (distances.empty()) throw DataError("no pixel that shows the model has a depth");
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return median(std::move(distances));
 }
 
 }  // namespace bodyschema

@@ -11,6 +11,7 @@
 #include "bodyschema/calibration/calibrate.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/installation.hpp"
+#include "bodyschema/core/order_statistics.hpp"
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/imports/lerobot.hpp"
 #include "drawn_outlines.hpp"
@@ -39,12 +40,6 @@ struct Answer {
   Calibration calibration;
   HumanoidModel model;
 };
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 /// Root of the mean squared distance from the mean.
 double scatter(const std::vector<double>& values) {

@@ -14,12 +14,6 @@ MemoryOptions unfading(MemoryOptions options) {
   return options;
 }
 
-std::vector<ParameterRef> refs_of(const State& state) {
-  std::vector<ParameterRef> refs;
-  for (const auto& parameter : state.parameters()) refs.push_back(parameter.ref);
-  return refs;
-}
-
 constexpr double kFinest_px = 6.0;
 
 }  // namespace
@@ -121,7 +115,7 @@ void BatchFit::measure(const std::vector<std::size_t>& pictures) {
 /// All postures about the state, fused; the state moves to what comes of it until it stays.
 void BatchFit::fuse(const std::vector<std::size_t>& pictures) {
   constexpr int kRounds = 4;
-  const auto refs = refs_of(state_);
+  const auto refs = state_.refs();
   auto beside = fitted_parameters(beside_.effects);
   auto coordinates = fit_.moved_by(state_.model(), refs);
   const auto more = fit_.moved_by(beside_.effects, beside);

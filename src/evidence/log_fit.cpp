@@ -290,8 +290,7 @@ double LogFit::mean_cost(const LinearLog& at, double usual_points, double Outlin
 }
 
 double LogFit::fit(State& state, const FitSettings& settings, std::span<const std::size_t> pictures) {
-  std::vector<ParameterRef> parameters;
-  for (const auto& p : state.parameters()) parameters.push_back(p.ref);
+  const auto parameters = state.refs();
   const auto coordinates = moved_by(state.model(), parameters);
   const Eigen::VectorXd precision = state.prior_sd().array().square().inverse();
 

@@ -1,8 +1,10 @@
 #include "bodyschema/evidence/outline_distance.hpp"
 
-#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
+
+#include "bodyschema/core/order_statistics.hpp"
 
 namespace bodyschema {
 
@@ -20,10 +22,7 @@ double median_outline_distance_px(LogFit& fit, const ErrorModel& model, std::spa
     own[p].resize(static_cast<std::size_t>(at.evidence[p].sampled), kReach_px * unit);
     all.insert(all.end(), own[p].begin(), own[p].end());
   }
-  if (all.empty()) return 0.0;
-  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-  std::nth_element(all.begin(), middle, all.end());
-  return *middle;
+  return median(std::move(all));
 }
 
 }  // namespace bodyschema

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "bodyschema/core/order_statistics.hpp"
+
 namespace bodyschema {
 namespace {
 
@@ -37,9 +39,7 @@ void OutlineNoise::add(std::span<const OutlinePoint> points, double unit_px, dou
     // With w = c^4 / (r^2 + c^2)^2: d(w r)/dr = w (4 sqrt(w) - 3).
     slope_ += p.weight * (4.0 * std::sqrt(p.weight) - 3.0);
   }
-  const auto middle = size.begin() + static_cast<std::ptrdiff_t>(size.size() / 2);
-  std::nth_element(size.begin(), middle, size.end());
-  median_square_ += std::pow(kMedianToSd * *middle, 2);
+  median_square_ += std::pow(kMedianToSd * median(std::move(size)), 2);
   points_ += static_cast<double>(points.size());
   pictures_ += 1.0;
   const double reach = kBin_px.back() * unit_px;

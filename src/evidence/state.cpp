@@ -69,13 +69,6 @@ std::string name_of(const Effect& effect, const EffectParameter& parameter) {
   return effect.description() + (fitted > 1 ? " " + parameter.name : "");
 }
 
-const Effect* find(const ErrorModel& model, const std::string& name, const EffectTarget& target) {
-  for (std::size_t e = 0; e < model.size(); ++e) {
-    if (model[e].name() == name && model[e].target() == target) return &model[e];
-  }
-  return nullptr;
-}
-
 /// R with R R' = C; its units may differ by orders of magnitude.
 Eigen::MatrixXd root_of(const Eigen::MatrixXd& C) {
   if (C.isDiagonal()) return C.diagonal().cwiseSqrt().asDiagonal();
@@ -151,6 +144,12 @@ State::State(const ErrorModel& known, const std::vector<Belief>& beliefs) : mode
   prior_mean_ = x();
 }
 
+std::vector<ParameterRef> State::refs() const {
+  std::vector<ParameterRef> refs;
+  for (const auto& parameter : parameters_) refs.push_back(parameter.ref);
+  return refs;
+}
+
 Eigen::VectorXd State::x() const {
   Eigen::VectorXd x(size());
   for (Eigen::Index i = 0; i < size(); ++i) {
@@ -184,7 +183,7 @@ Considered Considered::beside(const State& state, const std::vector<Belief>& tol
     open[i] = p.effect != "joint_offset" && state.find(p.effect, p.target, p.parameter) < 0;
     if (!open[i] || result.effects.find(p.effect, p.target) != nullptr) continue;
     // As it is known: some effects move nothing until they have a time, or a size.
-    const auto* own = find(state.model(), p.effect, p.target);
+    const auto* own = state.model().find(p.effect, p.target);
     result.effects.add(own != nullptr ? own->clone() : make_effect(p.effect, p.target, state.model().roles()));
   }
   const auto refs = fitted_parameters(result.effects);
@@ -200,7 +199,7 @@ Considered Considered::beside(const State& state, const std::vector<Belief>& tol
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   for (const auto& belief : tolerances) {
     std::size_t fitted = 0;
-    const auto* effect = find(result.effects, belief.effect, belief.target);
+    const auto* effect = result.effects.find(belief.effect, belief.target);
     for (std::size_t p = 0; p < effect->parameters().size(); ++p) {
       if (!effect->parameters()[p].fitted) continue;
       const auto k = position(belief.effect, belief.target, p);

@@ -17,6 +17,7 @@
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/installation.hpp"
+#include "bodyschema/core/order_statistics.hpp"
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/gl/context.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
@@ -41,12 +42,6 @@ constexpr std::size_t kStereoPair_bytes = 2 * 320 * 240 * 3;
 
 double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
 }
 
 class SelfTest {

@@ -42,7 +42,7 @@ Said listen(const std::string& fault, double seconds_long, std::uint64_t seed = 
   simulator::Simulator simulator(robot, setup, rig, settings, plan);
 
   Pipeline pipeline(c);
-  LiveDiagnosis live(pipeline, {.waits = true});
+  LiveDiagnosis live(pipeline, true);
   Said said;
   std::vector<JointSample> encoders;
   Microseconds first = 0;

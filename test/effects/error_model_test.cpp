@@ -89,7 +89,7 @@ TEST(ErrorModel, CopiesAreIndependent) {
   EXPECT_EQ(copy.size() + 1, model.size());
 }
 
-TEST(ErrorModel, SumsEffectsAndLeavesOffsetsOutOnRequest) {
+TEST(ErrorModel, SumsEffectsAndOffsets) {
   ErrorModel model(roles());
   model.add("joint_offset", {"elbow", ""}).parameters()[0].value = radians(3.0);
   model.add("encoder_gain", {"elbow", ""}).parameters()[0].value = 0.02;
@@ -98,8 +98,6 @@ TEST(ErrorModel, SumsEffectsAndLeavesOffsetsOutOnRequest) {
   Corrections c = model.roles().no_corrections();
   model.corrections(at, c);
   EXPECT_NEAR(degrees(c.dq[9]), -2.0, 1e-12);
-  model.corrections(at, c, false);
-  EXPECT_NEAR(degrees(c.dq[9]), 1.0, 1e-12);
   EXPECT_NEAR(degrees(model.offsets()[9]), 3.0, 1e-12);
 }
 

@@ -8,21 +8,6 @@
 
 namespace bodyschema {
 
-struct LiveDiagnosisOptions {
-  /// From one look to the next, s: at least the first, then a share of what was seen (what has seen hardly anything new
-  /// cannot say anything new), at most the last.
-  double least_period_s = 5.0, period_share = 0.2, most_period_s = 20.0;
-  double first_look_s = 10.0;     ///< of pictures, before the first look
-  double picture_period_s = 0.5;  ///< from one frame that is looked at to the next
-  double window_s = 90.0;         ///< older pictures are forgotten
-  double answer_s = 3.0;          ///< what a look found is said this much later, when it is surely known
-  /// In how many looks together anything may be named in a robot without a fault, ever: every look has its share.
-  double level = 0.01;
-  /// true: every answer is waited for, so that it depends on the pictures alone (replay). false: one that is late, on a
-  /// machine that is overloaded, is said when it is there.
-  bool waits = false;
-};
-
 /// The diagnosis of a robot that runs: what recent pictures ask for outside the state that is estimated. The search of
 /// `bodyschema diagnose` over the same candidates and the same statistics of blocks, from the pictures' linearisation
 /// alone; no fit is repeated.
@@ -34,7 +19,9 @@ struct LiveDiagnosisOptions {
 /// those of stamps.
 class LiveDiagnosis {
  public:
-  explicit LiveDiagnosis(const Pipeline& pipeline, const LiveDiagnosisOptions& options = {});
+  /// @param waits  true: every answer is waited for, so that it depends on the pictures alone (replay). false: one that
+  ///   is late, on a machine that is overloaded, is said when it is there
+  explicit LiveDiagnosis(const Pipeline& pipeline, bool waits = false);
   ~LiveDiagnosis();
   LiveDiagnosis(const LiveDiagnosis&) = delete;
   LiveDiagnosis& operator=(const LiveDiagnosis&) = delete;

@@ -37,7 +37,6 @@ class CorrectedKinematics {
   [[nodiscard]] Eigen::Vector3d tilt_axis(Eigen::Index joint, int which) const;
   /// Directions along which JointAdjustment::along_m (0), shift_1_m (1) and shift_2_m (2) move; as tilt_axis.
   [[nodiscard]] Eigen::Vector3d shift_axis(Eigen::Index joint, int which) const;
-  [[nodiscard]] std::size_t link_count() const { return link_count_; }
 
  private:
   [[nodiscard]] bool moves(Eigen::Index joint, std::size_t link) const;

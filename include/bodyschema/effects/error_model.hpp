@@ -52,6 +52,7 @@ class ErrorModel {
   [[nodiscard]] Effect& operator[](std::size_t i) { return *effects_[i]; }
   /// The effect of that name and target, or null.
   [[nodiscard]] Effect* find(const std::string& name, const EffectTarget& target);
+  [[nodiscard]] const Effect* find(const std::string& name, const EffectTarget& target) const;
   /// Adds the effect (parameters zero) unless it is there already; throws as make_effect.
   Effect& add(const std::string& name, const EffectTarget& target);
   void add(std::unique_ptr<Effect> effect);
@@ -66,9 +67,8 @@ class ErrorModel {
 
   void forget();
   void observe(const JointSample& sample);
-  /// The sum of all effects on one exposure. `include_offsets` false leaves the joint_offset
-  /// effects out, for an estimator whose particles carry the offsets themselves.
-  void corrections(const Instant& at, Corrections& out, bool include_offsets = true) const;
+  /// The sum of all effects on one exposure.
+  void corrections(const Instant& at, Corrections& out) const;
 
   /// The rig with what does not depend on time put right: intrinsics, distortion.
   [[nodiscard]] StereoRig corrected(const StereoRig& rig) const;

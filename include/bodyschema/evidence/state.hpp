@@ -51,6 +51,8 @@ class State {
   [[nodiscard]] const ErrorModel& model() const { return model_; }
   [[nodiscard]] ErrorModel& model() { return model_; }
   [[nodiscard]] const std::vector<StateParameter>& parameters() const { return parameters_; }
+  /// Where the model holds them, in this order.
+  [[nodiscard]] std::vector<ParameterRef> refs() const;
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(parameters_.size()); }
   /// How many are offsets of the arm's joints; these come first.
   [[nodiscard]] Eigen::Index joints() const { return joints_; }

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "bodyschema/evidence/posture_memory.hpp"
+#include "frame_model.hpp"
+#include "stalled_encoders.hpp"
+
+namespace bodyschema {
+
+/// The robot as it is known from frame to frame: what postures taught of its state, fused, and where joints were last
+/// that may be anywhere. One thread.
+struct FusedState {
+  /// @param least_postures  of fewer it is not to be relied on
+  FusedState(const State& state, MemoryLayout layout, const MemoryOptions& options, std::size_t least_postures);
+
+  /// Too few postures for what is remembered to be relied on.
+  [[nodiscard]] bool young() const { return memory.postures() < least_postures; }
+  /// Joints that may be anywhere, or of which nothing is known any more, where they were last; the rest fused.
+  [[nodiscard]] Eigen::VectorXd where_it_was() const;
+  /// What postures disagree by, times what is claimed of them: no estimate is better than the postures that it is made
+  /// of.
+  [[nodiscard]] double disagreement() const;
+
+  void begin_frame() { resumed_now_.clear(); }
+  /// The encoders of a frame: readings that stood while their joints may have moved are believed again where they move.
+  void read(const Eigen::VectorXd& reading_rad, double time_s);
+  /// Joints that may be anywhere are where this frame shows them.
+  void see_loose_joints();
+  /// Nothing that was learned holds.
+  void forget();
+
+  PostureMemory memory;
+  StalledEncoders stalled;
+  Eigen::VectorXd x;                           ///< fused over postures
+  MemoryEstimate in_frame;                     ///< the same with the last frame's own error
+  std::optional<PostureMemory> alternative{};  ///< the memory that the last change of mind cost ...
+  double alternative_s = 0.0;                  ///< ... when it did
+  std::size_t least_postures;
+
+ private:
+  void believe_again(const StalledEncoders::Resumed& resumed, double time_s);
+
+  Eigen::VectorXd prior_mean_;
+  Eigen::Index joints_;
+  std::vector<Eigen::Index> resumed_now_;  ///< joints whose stall ended with this frame
+};
+
+}  // namespace bodyschema

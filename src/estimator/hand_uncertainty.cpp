@@ -1,0 +1,59 @@
+#include "hand_uncertainty.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace bodyschema {
+
+double HandUncertainty::sd_m() const {
+  return std::sqrt(std::max(0.0, covariance_m2.trace()));
+}
+
+double HandUncertainty::tolerated_sd_m() const {
+  return std::sqrt(std::max(0.0, (covariance_m2 - own_m2).trace()));
+}
+
+double HandUncertainty::described_sd_m(const State& state) const {
+  double square = 0.0;
+  for (Eigen::Index k = state.joints(); k < state.size(); ++k) {
+    const auto& p = state.parameters()[static_cast<std::size_t>(k)];
+    if (state.model()[p.ref.effect].name() == "head_offset") continue;
+    square += (J.col(k) * p.prior_sd).squaredNorm();
+  }
+  return std::sqrt(square);
+}
+
+HandUncertainty hand_uncertainty(FrameModel& model, const Exposure& exposure, const FusedState& known,
+                                 const Eigen::MatrixXd& shape) {
+  HandUncertainty result;
+  result.J = model.hand_jacobian(exposure, known.in_frame.x);
+  const Eigen::MatrixXd& J = result.J;
+  const auto n = model.state().size();
+  result.own_m2 = known.disagreement() * J.leftCols(n) * known.in_frame.own * J.leftCols(n).transpose();
+  result.own_m2 += J.leftCols(n) * shape * J.leftCols(n).transpose();
+  result.covariance_m2 = result.own_m2;
+  if (J.cols() == n) return result;
+  const Eigen::MatrixXd T =
+      (J.leftCols(n) * known.in_frame.sensitivity + J.rightCols(J.cols() - n)) * known.memory.layout().considered_root;
+  result.covariance_m2 += T * T.transpose();
+  return result;
+}
+
+Eigen::MatrixXd shape_covariance(const PostureMemory& memory, const OutlineFitter& fitter) {
+  const Eigen::Index n = memory.layout().estimated();
+  if (memory.empty()) return Eigen::MatrixXd::Zero(n, n);
+  const auto& own = memory.estimate().own;
+  const Eigen::VectorXd prior = memory.layout().prior_sd.array().square().inverse();
+  const double told = static_cast<double>(n) - own.diagonal().dot(prior);
+  const double share = fitter.shape_variance_share(told);
+  if (share <= 0.0) return Eigen::MatrixXd::Zero(n, n);
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(n, n);
+  Eigen::MatrixXd precision = own.ldlt().solve(identity);
+  precision.diagonal() -= prior;
+  precision /= share * static_cast<double>(memory.postures());
+  precision.diagonal() += prior;
+  return precision.ldlt().solve(identity);
+}
+
+}  // namespace bodyschema

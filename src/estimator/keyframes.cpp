@@ -1,0 +1,36 @@
+#include "keyframes.hpp"
+
+#include <algorithm>
+
+namespace bodyschema {
+
+void Keyframes::keep(const Frame& frame, std::uint64_t block, const PostureMemory& memory) {
+  const auto kept = memory.blocks();
+  std::erase_if(frames_,
+                [&](const auto& item) { return std::find(kept.begin(), kept.end(), item.first) == kept.end(); });
+  auto& keyframe = frames_[block];
+  keyframe.frame = frame;
+  keyframe.pictures.resize(frame.seen.size());
+  for (std::size_t c = 0; c < frame.seen.size(); ++c) {
+    if (frame.seen[c] == nullptr) continue;
+    auto& picture = keyframe.pictures[c];
+    picture.mask = frame.seen[c]->mask;
+    picture.valid = frame.seen[c]->valid;
+    picture.coverage = frame.seen[c]->coverage;
+    keyframe.frame.seen[c] = &picture;
+  }
+}
+
+void Keyframes::look_again(PostureMemory& memory, OutlineFitter& fitter) const {
+  constexpr int kAtOnce = 2;
+  for (int i = 0; i < kAtOnce; ++i) {
+    const auto stale = memory.most_stale();
+    const auto keyframe = stale ? frames_.find(stale->block) : frames_.end();
+    if (keyframe == frames_.end()) return;
+    const auto first = fitter.about(keyframe->second.frame, stale->x);
+    if (!first) return;
+    memory.relinearise(stale->block, *first, stale->x);
+  }
+}
+
+}  // namespace bodyschema
