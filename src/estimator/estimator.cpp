@@ -924,7 +924,7 @@ struct Estimator::Impl {
   }
   /// What outlines that are wrong alike in all postures do to the state: as if one average posture alone were known,
   /// for the others err with it. No more than what was believed before any.
-  [[nodiscard]] Eigen::MatrixXd shape_covariance() const {
+  [[nodiscard]] Eigen::MatrixXd shape_covariance() {
     if (particles_only() || memory.empty()) return Eigen::MatrixXd::Zero(state.size(), state.size());
     const auto& own = memory.estimate().own;
     const Eigen::VectorXd prior = memory.layout().prior_sd.array().square().inverse();

@@ -195,8 +195,8 @@ void OutlineFitter::learn_shape(const OutlineFit& fit) {
   }
 }
 
-double OutlineFitter::shape_variance_share(double fitted) const {
-  return shape_.variance_px2(options_.noise.floor_px, fitted) / noise_.front().variance_px2();
+double OutlineFitter::shape_variance_share(double fitted) {
+  return shape_.lasting_variance_px2(options_.noise.floor_px, fitted) / noise_.front().variance_px2();
 }
 
 }  // namespace bodyschema

@@ -84,7 +84,7 @@ class OutlineFitter {
   [[nodiscard]] bool knows_shape() const { return shape_.known(); }
   /// ... its variance, over that of what differs from posture to posture: a frame's quadratic divided by it says what
   /// the frame would tell if nothing else erred.
-  [[nodiscard]] double shape_variance_share(double fitted) const;
+  [[nodiscard]] double shape_variance_share(double fitted);
   [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
   void forget() {
     noise_.assign(noise_.size(), OutlineNoise(options_.noise));
