@@ -401,7 +401,7 @@ struct Estimator::Impl {
   }
   /// How the frame agrees with the memory that its fit was held by.
   void judge(const OutlineFit& fit) {
-    near = fitter.lies_near(fit.evidence);
+    near = fitter.lies_near(frame, fit.evidence);
     // Few postures say little, of a step as of all else.
     const auto standing = young() ? std::vector<Eigen::Index>() : stalled.standing_while_others_move();
     const auto agreement = memory.agreement(fit.quadratic, standing);
@@ -426,7 +426,7 @@ struct Estimator::Impl {
 
   void learn(const OutlineFit& fit) {
     doubted_since_s = -1.0;
-    if (!fitter.fits(fit.evidence)) {  // too little of the hand to say much
+    if (!fitter.fits(frame, fit.evidence)) {  // too little of the hand to say much
       settle_on(fit);
       return;
     }
@@ -434,7 +434,7 @@ struct Estimator::Impl {
     if (const auto block =
             memory.add(now_s, posture_of(frame.exposures[0].at.encoder, model.roles()), fit.seen.quadratic, fit.x)) {
       fitter.learn_shape(fit);
-      keep_frame(*block);
+      keep_frame(*block, fit);
     }
     look_again();
     settle_on(fit);
@@ -472,12 +472,13 @@ struct Estimator::Impl {
   }
 
   /// The first frame of every posture is kept, to be looked at again where the estimate has moved on.
-  void keep_frame(std::uint64_t block) {
+  void keep_frame(std::uint64_t block, const OutlineFit& fit) {
     const auto kept = memory.blocks();
     std::erase_if(keyframes,
                   [&](const auto& item) { return std::find(kept.begin(), kept.end(), item.first) == kept.end(); });
     auto& keyframe = keyframes[block];
     keyframe.frame = frame;
+    keyframe.frame.shown = fitter.pictures_show(frame, fit.evidence);
     keyframe.pictures.resize(frame.seen.size());
     for (std::size_t c = 0; c < frame.seen.size(); ++c) {
       if (frame.seen[c] == nullptr) continue;
@@ -506,7 +507,7 @@ struct Estimator::Impl {
   void settle_on(const OutlineFit& fit) {
     state = memory.empty() ? fit.x : where_it_was(memory);
     const PostureMemory held = contradicted || memory.empty() ? memory.beliefs() : memory;
-    if (fitter.lies_near(fit.evidence)) {
+    if (fitter.lies_near(frame, fit.evidence)) {
       in_frame = held.in_posture(contradicted ? fit.quadratic : fit.seen.quadratic);
     } else {  // an arm that is not where outlines are has nothing to learn from how these run
       in_frame = held.in_posture();
@@ -514,7 +515,7 @@ struct Estimator::Impl {
     }
     see_loose_joints();
     rms_px = fit.seen.evidence.rms_px();
-    near = fitter.fits(fit.evidence);
+    near = fitter.fits(frame, fit.evidence);
     hidden = occlusion.hidden(fit.seen.evidence);
     best_likelihood = hammoude_likelihood(scorer.distance(in_frame.x));
     current = EstimatorState::kConverging;
@@ -657,7 +658,7 @@ struct Estimator::Impl {
     usual_sum = 1.0;
     innovation = {};
     verdict = FrameVerdict::kContradicts;
-    if (fitter.fits(better.fit.evidence)) {
+    if (fitter.fits(frame, better.fit.evidence)) {
       learn(better.fit);
     } else {
       settle_on(better.fit);
@@ -678,7 +679,10 @@ struct Estimator::Impl {
   void find_anew() {
     if (!lost) {
       lost.emplace();
+      lost->by_pictures = true;
       lost->starts = starts_from(filter.states(), distance, state, 3);
+      // What was found last, and not believed, may be right: masks that are made near another arm would lose it again.
+      if (found_in_doubt) lost->starts.back() = state;
     }
     if (!fitter.go_on(frame, memory, *lost)) {
       doubt(state);
@@ -687,7 +691,8 @@ struct Estimator::Impl {
     }
     OutlineFit fit = fitter.found(frame, memory, *lost);
     lost.reset();
-    if (fitter.fits(fit.evidence)) {
+    found_in_doubt = false;
+    if (fitter.is_shown(frame, fit)) {
       learn(fit);
       return;
     }
@@ -697,6 +702,7 @@ struct Estimator::Impl {
       current = EstimatorState::kConverging;
       return;
     }
+    found_in_doubt = true;
     settle_on(fit);
   }
 
@@ -964,6 +970,7 @@ struct Estimator::Impl {
     occlusion.forget();
     keyframes.clear();
     alternative.reset();
+    found_in_doubt = false;
     state = model.state().prior_mean();
     stalled = StalledEncoders(joints);
     memory.loosen({});
@@ -1021,6 +1028,7 @@ struct Estimator::Impl {
   };
   std::optional<EyeSearch> eyes;          ///< goes on with the next frame
   std::optional<bool> found_swapped;      ///< by the last search for whose pictures these are
+  bool found_in_doubt = false;            ///< the state is what a search found last, and nothing was learned from
   std::optional<StartSearch> lost;        ///< for an arm of which nothing is known; goes on with the next frame
   std::optional<ExplanationRound> round;  ///< goes on with the next frame
   double round_since_s = 0.0;
