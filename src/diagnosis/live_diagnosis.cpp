@@ -35,7 +35,7 @@ constexpr double kPicturePeriod_s = 0.5;  // from one frame that is looked at to
 constexpr double kWindow_s = 90.0;        // older pictures are forgotten
 constexpr double kAnswer_s = 3.0;         // what a look found is said this much later, when it is surely known
 /// In how many looks together anything may be named in a robot without a fault, ever: every look has its share.
-constexpr double kLevel = 0.01;
+constexpr double kLiveLevel = 0.01;
 
 /// What a look works on.
 struct Batch {
@@ -109,7 +109,7 @@ class Window {
     // A share of what may be wrong for every look, all of them together (Lan and DeMets 1983): of the k-th 6 / (pi
     // k)^2.
     const double k = static_cast<double>(++looks_);
-    diagnosis_.level = kLevel * 6.0 / (kPi * kPi * k * k);
+    diagnosis_.level = kLiveLevel * 6.0 / (kPi * kPi * k * k);
     const auto report = diagnosis::look(fit_, state_, at_, noise_, tolerances_, diagnosis_, changes_);
     found.blocks = report.blocks;
     found.z_threshold = report.z_threshold;

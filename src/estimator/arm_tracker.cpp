@@ -65,7 +65,10 @@ void ArmTracker::read_encoders(const Frame& frame) {
 void ArmTracker::find(const Frame& frame, FrameOutcome& outcome) {
   if (!lost_) {
     lost_.emplace();
+    lost_->by_pictures = true;
     lost_->starts = particles_.nearest(known_.x, 3);
+    // What was found last, and not believed, may be right: masks that are made near another arm would lose it again.
+    if (found_in_doubt_) lost_->starts.back() = known_.x;
   }
   if (!fitter_.go_on(frame, known_.memory, *lost_)) {
     doubt(known_.x, outcome);
@@ -74,14 +77,16 @@ void ArmTracker::find(const Frame& frame, FrameOutcome& outcome) {
   }
   OutlineFit fit = fitter_.found(frame, known_.memory, *lost_);
   lost_.reset();
-  if (fitter_.fits(fit.evidence)) {
+  found_in_doubt_ = false;
+  if (fitter_.is_shown(frame, fit)) {
     learn(frame, fit, outcome);
   } else if (strayed(fit.x)) {
     begin_again();
     doubt(known_.x, outcome);
     outcome.state = EstimatorState::kConverging;
   } else {
-    settle_on(fit, outcome);
+    found_in_doubt_ = true;
+    settle_on(frame, fit, outcome);
   }
 }
 
@@ -96,8 +101,8 @@ OutlineFit ArmTracker::measure(const Frame& frame) {
   return fitter_.follow(frame, known_.memory, known_.where_it_was());
 }
 
-void ArmTracker::gate(const OutlineFit& fit, FrameOutcome& outcome) {
-  outcome.near = fitter_.lies_near(fit.evidence);
+void ArmTracker::gate(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome) {
+  outcome.near = fitter_.lies_near(frame, fit.evidence);
   // Few postures say little, of a step as of all else.
   const auto standing = known_.young() ? std::vector<Eigen::Index>() : known_.stalled.standing_while_others_move();
   const auto judgement = gate_.judge(known_.memory, fit.quadratic, outcome.near, standing);
@@ -114,26 +119,26 @@ void ArmTracker::remember(const Frame& frame, const OutlineFit& fit, FrameOutcom
 
 void ArmTracker::learn(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome) {
   doubted_since_s_ = -1.0;
-  if (!fitter_.fits(fit.evidence)) {  // too little of the hand to say much
-    settle_on(fit, outcome);
+  if (!fitter_.fits(frame, fit.evidence)) {  // too little of the hand to say much
+    settle_on(frame, fit, outcome);
     return;
   }
   fitter_.learn_noise(fit);
   const Eigen::VectorXd posture = posture_of(frame.exposures[0].at.encoder, model_.roles());
   if (const auto block = known_.memory.add(frame.time_s, posture, fit.seen.quadratic, fit.x)) {
     fitter_.learn_shape(fit);
-    keyframes_.keep(frame, *block, known_.memory);
+    keyframes_.keep(frame, *block, known_.memory, fitter_.pictures_show(frame, fit.evidence));
   }
   keyframes_.look_again(known_.memory, fitter_);
-  settle_on(fit, outcome);
+  settle_on(frame, fit, outcome);
   if (!known_.young()) occlusion_.learn(frame, known_.in_frame.x, hand_sd_m_);
 }
 
 /// The frame and what is known of it, as it is reported.
-void ArmTracker::settle_on(const OutlineFit& fit, FrameOutcome& outcome) {
+void ArmTracker::settle_on(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome) {
   known_.x = known_.memory.empty() ? fit.x : known_.where_it_was();
   const PostureMemory held = outcome.contradicted || known_.memory.empty() ? known_.memory.beliefs() : known_.memory;
-  if (fitter_.lies_near(fit.evidence)) {
+  if (fitter_.lies_near(frame, fit.evidence)) {
     known_.in_frame = held.in_posture(outcome.contradicted ? fit.quadratic : fit.seen.quadratic);
   } else {  // an arm that is not where outlines are has nothing to learn from how these run
     known_.in_frame = held.in_posture();
@@ -141,7 +146,7 @@ void ArmTracker::settle_on(const OutlineFit& fit, FrameOutcome& outcome) {
   }
   known_.see_loose_joints();
   outcome.rms_px = fit.seen.evidence.rms_px();
-  outcome.near = fitter_.fits(fit.evidence);
+  outcome.near = fitter_.fits(frame, fit.evidence);
   outcome.hidden = occlusion_.hidden(fit.seen.evidence);
   outcome.best_likelihood = hammoude_likelihood(scorer_.distance(known_.in_frame.x));
   outcome.state = EstimatorState::kConverging;
@@ -216,10 +221,10 @@ void ArmTracker::take(const Frame& frame, Explanation better, FrameOutcome& outc
   gate_.forget_usual();
   outcome.innovation = {};
   outcome.verdict = FrameVerdict::kContradicts;
-  if (fitter_.fits(better.fit.evidence)) {
+  if (fitter_.fits(frame, better.fit.evidence)) {
     learn(frame, better.fit, outcome);
   } else {
-    settle_on(better.fit, outcome);
+    settle_on(frame, better.fit, outcome);
   }
 }
 
@@ -257,7 +262,7 @@ bool ArmTracker::take_for_hidden(const OutlineFit& fit, FrameOutcome& outcome) {
 void ArmTracker::stay(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome) {
   if (doubted_since_s_ < 0.0) doubted_since_s_ = frame.time_s;
   outcome.contradicted = true;
-  settle_on(fit, outcome);
+  settle_on(frame, fit, outcome);
   known_.x = known_.where_it_was();
   if (frame.time_s - doubted_since_s_ <= limits::kPatience_s) return;
   outcome.verdict = FrameVerdict::kContradicts;
@@ -297,6 +302,7 @@ void ArmTracker::begin_anew() {
 /// Nothing that was learned holds.
 void ArmTracker::begin_again() {
   begin_anew();
+  found_in_doubt_ = false;
   known_.forget();
   particles_.restart();
   occlusion_.forget();

@@ -39,7 +39,7 @@ class ArmTracker {
   /// The frame's outline, looked for where the arm was.
   OutlineFit measure(const Frame& frame);
   /// How that agrees with what is known.
-  void gate(const OutlineFit& fit, FrameOutcome& outcome);
+  void gate(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome);
   /// Tries what may have happened where the frame contradicts what is known, or that is so young that it may be wrong.
   void explain(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome);
   /// Takes a frame that agrees into the memory.
@@ -54,7 +54,7 @@ class ArmTracker {
 
  private:
   void learn(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome);
-  void settle_on(const OutlineFit& fit, FrameOutcome& outcome);
+  void settle_on(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome);
   void doubt(const Eigen::VectorXd& x, FrameOutcome& outcome);
   bool take_for_hidden(const OutlineFit& fit, FrameOutcome& outcome);
   void take(const Frame& frame, Explanation better, FrameOutcome& outcome);
@@ -77,7 +77,8 @@ class ArmTracker {
   std::optional<StartSearch> lost_;        ///< for an arm of which nothing is known; goes on with the next frame
   std::optional<ExplanationRound> round_;  ///< goes on with the next frame
   double round_since_s_ = 0.0;
-  bool unexplained_ = false;  ///< the pictures before, by all that was tried
+  bool found_in_doubt_ = false;  ///< the state is what a search found last, and nothing was learned from it
+  bool unexplained_ = false;     ///< the pictures before, by all that was tried
   double doubted_since_s_ = -1.0;
   double hand_sd_m_ = 1.0;  ///< before any frame: not at all
 };

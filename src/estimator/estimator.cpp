@@ -80,7 +80,7 @@ struct Estimator::Impl {
         tracker.find(frame, outcome);
       } else {
         const OutlineFit fit = tracker.measure(frame);
-        tracker.gate(fit, outcome);
+        tracker.gate(frame, fit, outcome);
         if (outcome.verdict == FrameVerdict::kAgrees && !known.young()) {
           tracker.remember(frame, fit, outcome);
         } else {

@@ -25,10 +25,11 @@ PostureMemory known_under(const Hypothesis& hypothesis, const PostureMemory& kno
 
 /// Whether a hypothesis explains a picture, and better than the memory does by more than `least`.
 /// @param gain  by how much: chi-square, what free parameters cost counted in
-bool explains(const Hypothesis& hypothesis, bool anew, const OutlineFit& fit, const OutlineFit& held, double least,
-              OutlineFitter& fitter, double& gain) {
+bool explains(const Hypothesis& hypothesis, bool anew, const Frame& frame, const OutlineFit& fit,
+              const OutlineFit& held, double least, OutlineFitter& fitter, double& gain) {
   // An arm that is somewhere else altogether shows so in its whole silhouette, not only in how an outline runs.
-  if (anew && !fitter.clearly_nearer(fit, held)) return false;
+  const bool shown = anew && fitter.only_first_shown(frame, fit, held);
+  if (anew && !shown && (fitter.only_first_shown(frame, held, fit) || !fitter.clearly_nearer(fit, held))) return false;
   // Something may hide the robot: no change explains that which leaves as much of it hidden.
   if (!hypothesis.by_silhouette &&
       fit.seen.evidence.odd_share() > limits::kLeastExplained * held.seen.evidence.odd_share() + limits::kFewOdd) {
@@ -37,8 +38,8 @@ bool explains(const Hypothesis& hypothesis, bool anew, const OutlineFit& fit, co
   const double freed = static_cast<double>(hypothesis.released.size());
   const double bound = static_cast<double>(hypothesis.known_instead);
   gain = held.misfit - fit.misfit - limits::kPerParameter * (freed - bound);
-  const bool silhouettes_say_so = hypothesis.by_silhouette && !fitter.fits(held.evidence);
-  return silhouettes_say_so || (fitter.fits(fit.evidence) && gain > least);
+  const bool silhouettes_say_so = hypothesis.by_silhouette && (shown || !fitter.fits(frame, held.evidence));
+  return silhouettes_say_so || (fitter.fits(frame, fit.evidence) && gain > least);
 }
 
 }  // namespace
@@ -52,6 +53,7 @@ bool go_on(ExplanationRound& round, const PostureMemory& known, const OutlineFit
     OutlineFit fit;
     if (hypothesis.starts.size() > 1) {
       if (round.search.starts.empty()) round.search.starts = hypothesis.starts;
+      round.search.by_pictures = is_anew(hypothesis, known);
       if (!fitter.go_on(frame, memory, round.search, room)) return false;
       fit = fitter.found(frame, memory, round.search);
     } else if (!hypothesis.starts.empty()) {
@@ -62,7 +64,7 @@ bool go_on(ExplanationRound& round, const PostureMemory& known, const OutlineFit
     }
     double gain = 0.0;
     const double least = round.best ? round.gain : limits::kClearlyBetter;
-    if (!explains(hypothesis, is_anew(hypothesis, known), fit, held, least, fitter, gain)) continue;
+    if (!explains(hypothesis, is_anew(hypothesis, known), frame, fit, held, least, fitter, gain)) continue;
     round.gain = gain;
     round.best = Explanation{hypothesis, std::move(memory), std::move(fit)};
     best_is_of_frame = true;
@@ -73,7 +75,7 @@ bool go_on(ExplanationRound& round, const PostureMemory& known, const OutlineFit
   best.fit = best.hypothesis.starts.empty() ? fitter.follow(frame, best.memory, best.memory.estimate().x)
                                             : fitter.follow_from(frame, best.fit.x, best.memory);
   double gain = 0.0;
-  if (!explains(best.hypothesis, is_anew(best.hypothesis, known), best.fit, held, limits::kClearlyBetter, fitter,
+  if (!explains(best.hypothesis, is_anew(best.hypothesis, known), frame, best.fit, held, limits::kClearlyBetter, fitter,
                 gain)) {
     round.best.reset();
   }

@@ -34,6 +34,7 @@ struct Frame {
   std::vector<Exposure> exposures;             ///< per camera; where one saw nothing, another's
   std::vector<const CameraObservation*> seen;  ///< per camera; null: nothing. Not owned
   std::vector<BinaryMask> covered;             ///< per camera: where a held thing may be; empty: nowhere
+  bool shown = false;                          ///< pictures showed the robot's outline where their masks are kept alone
   [[nodiscard]] bool exposed() const;          ///< whether any camera saw anything
 };
 

@@ -40,7 +40,7 @@ HandUncertainty hand_uncertainty(FrameModel& model, const Exposure& exposure, co
   return result;
 }
 
-Eigen::MatrixXd shape_covariance(const PostureMemory& memory, const OutlineFitter& fitter) {
+Eigen::MatrixXd shape_covariance(const PostureMemory& memory, OutlineFitter& fitter) {
   const Eigen::Index n = memory.layout().estimated();
   if (memory.empty()) return Eigen::MatrixXd::Zero(n, n);
   const auto& own = memory.estimate().own;

@@ -4,12 +4,13 @@
 
 namespace bodyschema {
 
-void Keyframes::keep(const Frame& frame, std::uint64_t block, const PostureMemory& memory) {
+void Keyframes::keep(const Frame& frame, std::uint64_t block, const PostureMemory& memory, bool shown) {
   const auto kept = memory.blocks();
   std::erase_if(frames_,
                 [&](const auto& item) { return std::find(kept.begin(), kept.end(), item.first) == kept.end(); });
   auto& keyframe = frames_[block];
   keyframe.frame = frame;
+  keyframe.frame.shown = shown;
   keyframe.pictures.resize(frame.seen.size());
   for (std::size_t c = 0; c < frame.seen.size(); ++c) {
     if (frame.seen[c] == nullptr) continue;

@@ -14,7 +14,8 @@ namespace bodyschema {
 class Keyframes {
  public:
   /// Keeps a frame that began a block; those whose blocks are gone go.
-  void keep(const Frame& frame, std::uint64_t block, const PostureMemory& memory);
+  /// @param shown  whether its pictures, which are not kept, showed the robot's outline
+  void keep(const Frame& frame, std::uint64_t block, const PostureMemory& memory, bool shown);
   /// Linearises anew what was linearised far from where the estimate is by now, a little in every frame.
   void look_again(PostureMemory& memory, OutlineFitter& fitter) const;
   void forget() { frames_.clear(); }

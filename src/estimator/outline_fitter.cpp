@@ -5,6 +5,7 @@
 
 #include "limits.hpp"
 #include "occlusion.hpp"
+#include "shown_steps.hpp"
 
 namespace bodyschema {
 namespace {
@@ -13,6 +14,11 @@ constexpr double kNear_px[] = {8.0, 5.0};
 constexpr double kWide_px[] = {30.0, 20.0, 14.0, 10.0, 7.0, 5.0};
 /// Each step looks once, the last look may be two.
 constexpr int kMostRendersOfStart = static_cast<int>(std::size(kWide_px)) + limits::kMostSteps + 2;
+
+bool pictures(const Frame& frame) {
+  return std::any_of(frame.seen.begin(), frame.seen.end(),
+                     [](const auto* seen) { return seen != nullptr && !seen->image.empty(); });
+}
 
 }  // namespace
 
@@ -128,7 +134,8 @@ bool OutlineFitter::go_on(const Frame& frame, const PostureMemory& memory, Start
   for (; search.next < search.starts.size(); ++search.next) {
     if (!may_follow(room)) return false;
     OutlineFit fit = follow_from(frame, search.starts[search.next], memory);
-    const double distance = scorer_.distance(fit.x);
+    const double distance = search.by_pictures && pictures(frame) ? 1.0 - shown_share(frame, fit.evidence).value_or(0.0)
+                                                                  : scorer_.distance(fit.x);
     if (distance >= search.least) continue;
     search.least = distance;
     search.best = fit.x;
@@ -146,7 +153,7 @@ std::optional<Quadratic> OutlineFitter::about(const Frame& frame, const Eigen::V
   OutlineFit fit;
   fit.x = x;
   look_twice(frame, kNear_px[std::size(kNear_px) - 1], fit);
-  if (!fits(fit.evidence)) return std::nullopt;
+  if (!fits(frame, fit.evidence)) return std::nullopt;
   return std::move(fit.seen.quadratic);
 }
 
@@ -160,12 +167,26 @@ bool OutlineFitter::rest_fits(const OutlineFit::Seen& seen) const {
   return left >= limits::kFewestPoints && evidence.rms_px() < limits::kNear_px;
 }
 
-bool OutlineFitter::lies_near(const FrameEvidence& evidence) const {
-  return evidence.matched_share() > limits::kLeastMatched && evidence.rms_px() < limits::kNear_px;
+bool OutlineFitter::lies_near(const Frame& frame, const FrameEvidence& evidence) const {
+  if (evidence.rms_px() >= limits::kNear_px) return false;
+  return evidence.matched_share() > limits::kLeastMatched || (evidence.matched > 0.0 && pictures_show(frame, evidence));
 }
 
-bool OutlineFitter::fits(const FrameEvidence& evidence) const {
-  return evidence.matched >= limits::kFewestPoints && lies_near(evidence);
+bool OutlineFitter::pictures_show(const Frame& frame, const FrameEvidence& evidence) const {
+  return pictures(frame) ? shown_share(frame, evidence).value_or(0.0) > limits::kLeastMatched : frame.shown;
+}
+
+bool OutlineFitter::fits(const Frame& frame, const FrameEvidence& evidence) const {
+  return evidence.matched >= limits::kFewestPoints && lies_near(frame, evidence);
+}
+
+bool OutlineFitter::is_shown(const Frame& frame, const OutlineFit& fit) const {
+  if (!fits(frame, fit.evidence)) return false;
+  return !pictures(frame) || pictures_show(frame, fit.evidence);
+}
+
+bool OutlineFitter::only_first_shown(const Frame& frame, const OutlineFit& fit, const OutlineFit& other) const {
+  return pictures(frame) && is_shown(frame, fit) && !pictures_show(frame, other.evidence);
 }
 
 std::vector<OutlinePoint> OutlineFitter::shown(const OutlineFit& fit, std::size_t camera) const {
@@ -195,8 +216,8 @@ void OutlineFitter::learn_shape(const OutlineFit& fit) {
   }
 }
 
-double OutlineFitter::shape_variance_share(double fitted) const {
-  return shape_.variance_px2(options_.noise.floor_px, fitted) / noise_.front().variance_px2();
+double OutlineFitter::shape_variance_share(double fitted) {
+  return shape_.lasting_variance_px2(options_.noise.floor_px, fitted) / noise_.front().variance_px2();
 }
 
 }  // namespace bodyschema

@@ -33,7 +33,9 @@ struct OutlineFit {
 struct StartSearch {
   std::vector<Eigen::VectorXd> starts;
   std::size_t next = 0;           ///< of these to be followed
-  double least = 2.0;             ///< Hammoude distance of the best, in the picture in which it was found
+  bool by_pictures = false;       ///< by how much of the outline pictures show, where there are pictures
+  double least = 2.0;             ///< Hammoude distance of the best, in the picture in which it was found; or 1 less
+                                  ///< what pictures show of it
   Eigen::VectorXd best;           ///< empty: none yet
   std::optional<OutlineFit> fit;  ///< of the best; nothing: it was found in an earlier picture
 };
@@ -55,8 +57,8 @@ class OutlineFitter {
   void begin_frame() { searched_renders_ = 0; }
   /// Whether one more start may be followed in this frame, and leaves room for `more` of them.
   [[nodiscard]] bool may_follow(int more = 0) const;
-  /// Follows starts as far as the frame allows and judges them by how their silhouettes fit; `scorer` must have the
-  /// same frame.
+  /// Follows starts as far as the frame allows and judges them by how their silhouettes fit, or as the search says;
+  /// `scorer` must have the same frame.
   /// @param room  as in may_follow
   /// @return whether all of them have been followed
   bool go_on(const Frame& frame, const PostureMemory& memory, StartSearch& search, int room = 0);
@@ -67,11 +69,18 @@ class OutlineFitter {
 
   /// Whether a fit's silhouettes lie clearly nearer to the masks than another's; `scorer` must have the frame.
   [[nodiscard]] bool clearly_nearer(const OutlineFit& fit, const OutlineFit& other);
-  /// Whether what the pictures show of the predicted outline was found, and near enough; of a hand at the edge of the
-  /// picture that may be too little to learn from.
-  [[nodiscard]] bool lies_near(const FrameEvidence& evidence) const;
+  /// Whether what the pictures show of the predicted outline was found, in the masks or in the pictures themselves, and
+  /// near enough; of a hand at the edge of the picture that may be too little to learn from.
+  [[nodiscard]] bool lies_near(const Frame& frame, const FrameEvidence& evidence) const;
   /// The same of enough outline to be learned from.
-  [[nodiscard]] bool fits(const FrameEvidence& evidence) const;
+  [[nodiscard]] bool fits(const Frame& frame, const FrameEvidence& evidence) const;
+  /// Whether a fit may be believed of which nothing was known before: where there are pictures these must show it, for
+  /// masks repeat what was predicted.
+  [[nodiscard]] bool is_shown(const Frame& frame, const OutlineFit& fit) const;
+  /// Whether pictures show this outline; without any, whether they did.
+  [[nodiscard]] bool pictures_show(const Frame& frame, const FrameEvidence& evidence) const;
+  /// Whether pictures show a fit's outline, and not the other's.
+  [[nodiscard]] bool only_first_shown(const Frame& frame, const OutlineFit& fit, const OutlineFit& other) const;
   /// Whether what is left of an outline without odd pieces is enough to be learned from, and lies near.
   [[nodiscard]] bool rest_fits(const OutlineFit::Seen& seen) const;
   /// From now on parts that no joint moves against the cameras count as one posture of so many: what they say, and what
@@ -84,7 +93,7 @@ class OutlineFitter {
   [[nodiscard]] bool knows_shape() const { return shape_.known(); }
   /// ... its variance, over that of what differs from posture to posture: a frame's quadratic divided by it says what
   /// the frame would tell if nothing else erred.
-  [[nodiscard]] double shape_variance_share(double fitted) const;
+  [[nodiscard]] double shape_variance_share(double fitted);
   [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
   void forget() {
     noise_.assign(noise_.size(), OutlineNoise(options_.noise));

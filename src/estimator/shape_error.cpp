@@ -33,11 +33,22 @@ void ShapeError::add(std::span<const OutlinePoint> points, std::size_t camera, d
     known.sum += residual;
     known.square += residual * residual;
   }
+  asked_ = false;
 }
 
 bool ShapeError::known() const {
   return std::any_of(parts_.begin(), parts_.end(),
                      [](const auto& item) { return item.second.seen >= limits::kPosturesOfShape; });
+}
+
+double ShapeError::lasting_variance_px2(double floor_px, double fitted) {
+  const double now = variance_px2(floor_px, fitted);
+  if (!asked_ && known()) {
+    asked_ = true;
+    postures_ = 1.0 + postures_ * std::exp(-1.0 / limits::kRecentPostures);
+    recent_px2_ += (now - recent_px2_) / postures_;
+  }
+  return std::max(now, recent_px2_);
 }
 
 double ShapeError::variance_px2(double floor_px, double fitted) const {

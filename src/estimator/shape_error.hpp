@@ -29,9 +29,12 @@ class ShapeError {
   /// @param floor_px  how near pictures can place outlines
   /// @param fitted  parameters that all postures together told
   [[nodiscard]] double variance_px2(double floor_px, double fitted) const;
+  /// The same, but no smaller than its mean over recent postures: to be asked after each. Shapes stay as they are, but
+  /// what few parts show of them comes and goes with every posture.
+  [[nodiscard]] double lasting_variance_px2(double floor_px, double fitted);
   /// Whether enough postures were seen to tell.
   [[nodiscard]] bool known() const;
-  void forget() { parts_.clear(); }
+  void forget() { *this = {}; }
 
  private:
   struct Part {
@@ -39,6 +42,8 @@ class ShapeError {
     double postures = 0.0, weight = 0.0, sum = 0.0, square = 0.0;  ///< of mean residuals; fading
   };
   std::map<std::pair<std::size_t, std::size_t>, Part> parts_;  ///< by camera and part
+  bool asked_ = false;                                         ///< since the last posture
+  double postures_ = 0.0, recent_px2_ = 0.0;                   ///< fading; the variance's mean over these
 };
 
 }  // namespace bodyschema
