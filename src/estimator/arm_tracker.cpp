@@ -78,7 +78,7 @@ void ArmTracker::find(const Frame& frame, FrameOutcome& outcome) {
   OutlineFit fit = fitter_.found(frame, known_.memory, *lost_);
   lost_.reset();
   found_in_doubt_ = false;
-  if (fitter_.is_shown(frame, fit)) {
+  if (fitter_.fits(frame, fit.evidence)) {
     learn(frame, fit, outcome);
   } else if (strayed(fit.x)) {
     begin_again();

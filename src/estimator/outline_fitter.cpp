@@ -134,8 +134,8 @@ bool OutlineFitter::go_on(const Frame& frame, const PostureMemory& memory, Start
   for (; search.next < search.starts.size(); ++search.next) {
     if (!may_follow(room)) return false;
     OutlineFit fit = follow_from(frame, search.starts[search.next], memory);
-    const double distance = search.by_pictures && pictures(frame) ? 1.0 - shown_share(frame, fit.evidence).value_or(0.0)
-                                                                  : scorer_.distance(fit.x);
+    double distance = scorer_.distance(fit.x);
+    if (search.by_pictures && pictures(frame) && !pictures_show(frame, fit.evidence)) distance += 1.0;
     if (distance >= search.least) continue;
     search.least = distance;
     search.best = fit.x;
@@ -180,13 +180,9 @@ bool OutlineFitter::fits(const Frame& frame, const FrameEvidence& evidence) cons
   return evidence.matched >= limits::kFewestPoints && lies_near(frame, evidence);
 }
 
-bool OutlineFitter::is_shown(const Frame& frame, const OutlineFit& fit) const {
-  if (!fits(frame, fit.evidence)) return false;
-  return !pictures(frame) || pictures_show(frame, fit.evidence);
-}
-
 bool OutlineFitter::only_first_shown(const Frame& frame, const OutlineFit& fit, const OutlineFit& other) const {
-  return pictures(frame) && is_shown(frame, fit) && !pictures_show(frame, other.evidence);
+  return pictures(frame) && fits(frame, fit.evidence) && pictures_show(frame, fit.evidence) &&
+         !pictures_show(frame, other.evidence);
 }
 
 std::vector<OutlinePoint> OutlineFitter::shown(const OutlineFit& fit, std::size_t camera) const {

@@ -33,9 +33,9 @@ struct OutlineFit {
 struct StartSearch {
   std::vector<Eigen::VectorXd> starts;
   std::size_t next = 0;           ///< of these to be followed
-  bool by_pictures = false;       ///< by how much of the outline pictures show, where there are pictures
-  double least = 2.0;             ///< Hammoude distance of the best, in the picture in which it was found; or 1 less
-                                  ///< what pictures show of it
+  bool by_pictures = false;       ///< one that pictures show, where there are pictures, before all that they do not
+  double least = 3.0;             ///< Hammoude distance of the best, in the picture in which it was found; 1 more where
+                                  ///< pictures were asked and do not show it
   Eigen::VectorXd best;           ///< empty: none yet
   std::optional<OutlineFit> fit;  ///< of the best; nothing: it was found in an earlier picture
 };
@@ -74,9 +74,6 @@ class OutlineFitter {
   [[nodiscard]] bool lies_near(const Frame& frame, const FrameEvidence& evidence) const;
   /// The same of enough outline to be learned from.
   [[nodiscard]] bool fits(const Frame& frame, const FrameEvidence& evidence) const;
-  /// Whether a fit may be believed of which nothing was known before: where there are pictures these must show it, for
-  /// masks repeat what was predicted.
-  [[nodiscard]] bool is_shown(const Frame& frame, const OutlineFit& fit) const;
   /// Whether pictures show this outline; without any, whether they did.
   [[nodiscard]] bool pictures_show(const Frame& frame, const FrameEvidence& evidence) const;
   /// Whether pictures show a fit's outline, and not the other's.
