@@ -621,10 +621,11 @@ TEST_F(EstimatorOnOwnRobot, WhatMasksLackIsBelievedWhereThePicturesShowIt) {
   EXPECT_GT(postures[1], 0u);
 }
 
-/// Masks repeat what was predicted where colours do not tell: an arm that fits them, but that no picture shows, was
-/// believed.
-TEST_F(EstimatorOnOwnRobot, WhatOnlyMasksShowIsNotBelieved) {
+/// Masks of others may be right where pictures show nothing, and a model may be a pixel off all along: pictures have no
+/// veto. With one, a log of another version's robot taught nothing.
+TEST_F(EstimatorOnOwnRobot, WhatOnlyMasksShowIsLearnedAsWell) {
   Estimator estimator = make_estimator();
+  std::size_t postures = 0;
   for (int frame = 0; frame < 10; ++frame) {
     Observation seen = this->seen(*reach_, frame, 20.0);
     for (auto& camera : seen.cameras) {
@@ -632,8 +633,9 @@ TEST_F(EstimatorOnOwnRobot, WhatOnlyMasksShowIsNotBelieved) {
       std::mt19937_64 random(static_cast<std::uint64_t>(frame));
       for (auto& level : camera->image.data) level = static_cast<std::uint8_t>(random() % 200);
     }
-    EXPECT_EQ(estimator.step(seen).postures, 0u) << frame;
+    postures = estimator.step(seen).postures;
   }
+  EXPECT_GT(postures, 0u);
 }
 
 // Frames of one eye say nothing about which is which: the other camera may come later.
