@@ -22,6 +22,6 @@ namespace bodyschema {
 /// @param told  positions of parameters of one kind that pictures tell
 /// @param prior_directions  that the claim counts as
 Eigen::VectorXd section_spread(const std::vector<Eigen::VectorXd>& without, const Eigen::VectorXd& sd,
-                               std::span<const Eigen::Index> told = {}, double prior_directions = 8.0);
+                               std::span<const Eigen::Index> told = {}, double prior_directions = 0.0);
 
 }  // namespace bodyschema

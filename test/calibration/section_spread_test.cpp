@@ -59,6 +59,7 @@ TEST(SectionSpread, EachParameterForItself) {
 /// Sections that are told apart by several parameters at once: `kTold` of them, each with its own values.
 constexpr int kTold = 5;
 const std::vector<Eigen::Index> kAllTold = {0, 1, 2, 3, 4};
+constexpr double kClaimCountsAs = 8.0;  // directions
 
 std::vector<Eigen::VectorXd> left_out_of_all(std::mt19937& random, double spread) {
   std::vector<Eigen::VectorXd> without(kSections, Eigen::VectorXd::Zero(kTold));
@@ -78,8 +79,8 @@ TEST(SectionSpread, ParametersThatAreToldAreLookedAtTogether) {
   for (int i = 0; i < kTrials; ++i) {
     const auto without = left_out_of_all(random, 2.0);
     alone += section_spread(without, claimed)[0] > 1.0 ? 1.0 / kTrials : 0.0;
-    together += section_spread(without, claimed, kAllTold)[0] > 1.3 ? 1.0 / kTrials : 0.0;
-    healthy += section_spread(left_out_of_all(random, 1.0), claimed, kAllTold)[0] / kTrials;
+    together += section_spread(without, claimed, kAllTold, kClaimCountsAs)[0] > 1.3 ? 1.0 / kTrials : 0.0;
+    healthy += section_spread(left_out_of_all(random, 1.0), claimed, kAllTold, kClaimCountsAs)[0] / kTrials;
   }
   EXPECT_LT(alone, 0.6);
   EXPECT_GT(together, 0.9);
