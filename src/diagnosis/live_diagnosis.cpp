@@ -1,7 +1,6 @@
 #include "bodyschema/diagnosis/live_diagnosis.hpp"
 
 #include <spdlog/spdlog.h>
-#include <sys/resource.h>
 #include <time.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "bodyschema/core/background_worker.hpp"
+#include "bodyschema/core/thread_priority.hpp"
 #include "bodyschema/diagnosis/diagnoser.hpp"
 #include "bodyschema/evidence/log_fit.hpp"
 #include "limits.hpp"
@@ -345,7 +345,7 @@ struct LiveDiagnosis::Impl {
     look_utime = now;
     waiting.x = x;
     looking = worker.begin([this, batch = std::exchange(waiting, {})] {
-      setpriority(PRIO_PROCESS, 0, kNice);
+      give_way(kNice);
       const double begin_s = thread_time_s();
       auto found = window.look(batch);
       used_s = used_s + thread_time_s() - begin_s;

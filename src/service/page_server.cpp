@@ -4,7 +4,6 @@
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/eventfd.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -17,6 +16,7 @@
 
 #include "bodyschema/core/clock.hpp"
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/thread_priority.hpp"
 
 namespace bodyschema {
 namespace {
@@ -141,7 +141,7 @@ PageServer::~PageServer() {
 }
 
 void PageServer::serve() {
-  setpriority(PRIO_PROCESS, 0, kNice);  // of this thread: pictures must not take time from the estimator
+  give_way(kNice);  // pictures must not take time from the estimator
   std::vector<pollfd> polled;
   while (true) {
     const std::int64_t now = monotonic_us();

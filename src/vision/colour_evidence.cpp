@@ -436,11 +436,14 @@ void ColourEvidence::learn(const Image& image, float share, RobotLooks& looks) {
   std::vector<float>& seen = robot_.all;
   seen.assign(RobotLooks::kCells, 0.0f);
   float count = 0.0f;
-  for_each_in(predicted_, [&](int u, int v) {
-    if (distance_[index(u, v)] < kClear_px) return;
-    seen[RobotLooks::cell(image.pixel(u, v), image.channels)] += 1.0f;
-    count += 1.0f;
-  });
+  const int every = sample_step();
+  for (int v = box_.v0; v <= box_.v1; v += every) {
+    for (int u = box_.u0; u <= box_.u1; u += every) {
+      if (!predicted_.at(u, v) || distance_[index(u, v)] < kClear_px) continue;
+      seen[RobotLooks::cell(image.pixel(u, v), image.channels)] += 1.0f;
+      count += 1.0f;
+    }
+  }
   if (count < 100.0f) return;
   const bool first = !looks.known() || looks.channels != image.channels;
   if (first) looks.share.assign(RobotLooks::kCells, 0.0f);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -45,6 +46,9 @@ class ColourEvidence {
   /// @param share  of the new ones in `looks`
   void learn(const Image& image, float share, RobotLooks& looks);
 
+  /// Larger pictures have more pixels than statistics need: every so many along each axis are as many as in one of
+  /// 320x240.
+  [[nodiscard]] int sample_step() const { return std::max(1, static_cast<int>(std::lround(unit_))); }
   /// Where is looked.
   [[nodiscard]] const PixelBox& box() const { return box_; }
   /// Calls function(u, v) for pixels outside of the prediction whose distance from its outline lies between these,

@@ -24,16 +24,13 @@ std::array<float, 3> parts(const std::uint8_t* pixel) {
   return {brightness, 0.564f * (blue - brightness), 0.713f * (red - brightness)};
 }
 
-struct Bend {
-  float brightness = 0.0f, colour = 0.0f;
-};
+}  // namespace
 
-/// Sums of second differences over so many pixels.
-Bend bend_over(const Image& image, int distance, int every) {
+ColourResolution::Bend ColourResolution::bend_over(const Image& image, int distance, int every, int quarter) {
   Bend sum;
   const std::ptrdiff_t along_u = static_cast<std::ptrdiff_t>(distance) * image.channels,
                        along_v = along_u * image.width;
-  for (int v = distance; v + distance < image.height; v += every) {
+  for (int v = distance + quarter * every; v + distance < image.height; v += kQuarters * every) {
     for (int u = distance; u + distance < image.width; u += every) {
       const std::uint8_t* pixel = image.pixel(u, v);
       const auto here = parts(pixel);
@@ -50,12 +47,22 @@ Bend bend_over(const Image& image, int distance, int every) {
   return sum;
 }
 
-}  // namespace
-
-bool colours_bleed(const Image& image, int every) {
+bool ColourResolution::bleeds(const Image& image, int every) {
   constexpr int kNear_px = 1, kFar_px = 4;
   if (image.channels != 3) return false;
-  const Bend near = bend_over(image, kNear_px, every), far = bend_over(image, kFar_px, every);
+  const bool first = image.width != width_ || image.height != height_;
+  width_ = image.width, height_ = image.height;
+  for (int quarter = 0; quarter < kQuarters; ++quarter) {
+    if (!first && quarter != next_) continue;
+    of_[static_cast<std::size_t>(quarter)] = {bend_over(image, kNear_px, every, quarter),
+                                              bend_over(image, kFar_px, every, quarter)};
+  }
+  next_ = (next_ + 1) % kQuarters;
+  Bend near, far;
+  for (const auto& quarter : of_) {
+    near.brightness += quarter.near.brightness, near.colour += quarter.near.colour;
+    far.brightness += quarter.far.brightness, far.colour += quarter.far.colour;
+  }
   return far.colour > kLeast && near.colour * far.brightness < kLower * far.colour * near.brightness;
 }
 

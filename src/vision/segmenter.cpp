@@ -24,8 +24,10 @@
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define BODYSCHEMA_WIDE_VECTORS __attribute__((target_clones("avx2", "default")))
+#define BODYSCHEMA_PART_OF_ITS_CALLER __attribute__((always_inline))
 #else
 #define BODYSCHEMA_WIDE_VECTORS
+#define BODYSCHEMA_PART_OF_ITS_CALLER
 #endif
 
 namespace bodyschema {
@@ -153,7 +155,8 @@ struct Segmenter::Impl {
   }
   [[nodiscard]] const BackgroundModel& background() const;
   /// @param variance  of the background, times what the model says
-  void detect(const Image& image, const BackgroundModel& model, float variance, const PixelBox& box);
+  void detect(const Image& image, const BackgroundModel& model, float variance, const PixelBox& box,
+              const BinaryMask* asked);
   void detect_hard(const Image& image, const BackgroundModel& model);
   /// Refines `detected` and `sure` to coverage and cleans up.
   void refine(const Image& image, const BackgroundModel& model, BinaryMask& mask, BinaryMask& valid,
@@ -204,7 +207,8 @@ struct Segmenter::Impl {
   Image relit;                                   // auto: the last picture in the light of the learned background
   std::array<float, 3> light{1.0f, 1.0f, 1.0f};  // auto: gain of this picture, by channel
   float edge_variance = 1.0f;                    // auto: beside the robot, times that of still areas
-  bool bleeds = false;                           // auto: colour of the last picture, over outlines
+  ColourResolution resolution;                   // auto
+  bool bleeds = false;                           // auto: colour of the last pictures, over outlines
   bool turned = false;                           // auto: the camera, since the background was learned
   int misfits = 0;                               // auto: pictures in a row that the background does not fit
   std::vector<float> ratios;                     // auto: of squared differences to their variances
@@ -249,17 +253,33 @@ const BackgroundModel& Segmenter::Impl::background() const {
   return learned.model();
 }
 
-/// Within whole words of the box. `sure`: the pixel itself differs from the background. `detected`: the mean of its 3x3
-/// square does, which sees a third of that contrast; it reaches one pixel farther out.
+/// Calls function(begin, end) for each run of a row's words that are wanted, as pixels of the row.
+template <class Wanted, class Function>
+BODYSCHEMA_PART_OF_ITS_CALLER inline void for_each_run(int first_word, int last_word, int width, const Wanted& wanted,
+                                                       const Function& function) {
+  for (int w = first_word; w <= last_word;) {
+    if (!wanted(w)) {
+      ++w;
+      continue;
+    }
+    const int first = w;
+    while (w <= last_word && wanted(w)) ++w;
+    function(64 * first, std::min(64 * w, width));
+  }
+}
+
+/// Within whole words of the box, where `asked` is set in these; null: in all. `sure`: the pixel itself differs from
+/// the background. `detected`: the mean of its 3x3 square does, which sees a third of that contrast; it reaches one
+/// pixel farther out.
 BODYSCHEMA_WIDE_VECTORS
-void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model, float variance, const PixelBox& box) {
+void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model, float variance, const PixelBox& box,
+                             const BinaryMask* asked) {
   const auto n = static_cast<std::size_t>(channels);
-  const int begin = box.u0 & ~63, end = std::min((box.u1 | 63) + 1, width);
-  const auto w = static_cast<std::size_t>(end - begin);
-  const std::size_t row_size = w * n;
+  const int first_word = box.u0 >> 6, last_word = box.u1 >> 6;
+  const std::size_t row_size = static_cast<std::size_t>(width) * n;
   // Plain differences with one pixel more on both sides; their squares; three rows of
   // differences summed over three columns; the score of each pixel.
-  rows.resize((row_size + 2 * n) + row_size + 3 * row_size + w);
+  rows.resize((row_size + 2 * n) + row_size + 3 * row_size + static_cast<std::size_t>(width));
   float* plain = rows.data() + n;
   float* squares = plain + row_size + n;
   float* summed = squares + row_size;
@@ -270,8 +290,14 @@ void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model, f
   const auto at = [&](int u, int v) {
     return static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
   };
+  const auto is_asked = [&](int w, int v) {
+    return v >= box.v0 && v <= box.v1 && (asked == nullptr || asked->row(v)[w] != 0);
+  };
+  // The lambdas are part of this function, or they would be compiled without its wide vectors.
   // The sum of nine has nine times the variance of one pixel, 81 times its square.
-  const auto pack = [&](int v, float variances, float limit, std::uint64_t* out) {
+  const auto pack = [&](int begin, int end, int v, float variances, float limit,
+                        BinaryMask& out) BODYSCHEMA_PART_OF_ITS_CALLER {
+    const auto w = static_cast<std::size_t>(end - begin);
     if (n == 3) {
       for (std::size_t u = 0; u < w; ++u) {
         score[u] = squares[3 * u] + squares[3 * u + 1] + squares[3 * u + 2];
@@ -282,41 +308,52 @@ void Segmenter::Impl::detect(const Image& image, const BackgroundModel& model, f
     const float* precision = model.precision.data() + at(begin, v);
     const float least_sigma = variances * sigma * sigma;
     std::uint8_t* hit = hits.data();
-    std::fill_n(hit, hits.size(), std::uint8_t{0});
+    std::fill_n(hit, (w + 63) / 64 * 64, std::uint8_t{0});
     for (std::size_t u = 0; u < w; ++u) {
       hit[u] = static_cast<std::uint8_t>((score[u] * (precision[u] / variance) > least_sigma) & (score[u] > limit));
     }
-    pack_bits(hit, w, out + begin / 64);
+    pack_bits(hit, w, out.row(v) + begin / 64);
   };
-  const auto subtract = [&](int u, int v, float* out) {
+  const auto subtract = [&](int u, int v, float* out) BODYSCHEMA_PART_OF_ITS_CALLER {
     const std::uint8_t* in = image.pixel(u, v);
     const float* mean = model.mean.data() + at(u, v) * n;
     for (std::size_t c = 0; c < n; ++c) out[c] = static_cast<float>(in[c]) - mean[c];
   };
+  const auto sums_of = [&](int v, int begin) {
+    return summed + static_cast<std::size_t>(v % 3) * row_size + static_cast<std::size_t>(begin) * n;
+  };
   for (int v = std::max(box.v0 - 1, 0); v <= box.v1 + 1; ++v) {
     if (v < height) {
-      const std::uint8_t* in = image.pixel(begin, v);
-      const float* mean = model.mean.data() + at(begin, v) * n;
-      for (std::size_t i = 0; i < row_size; ++i) plain[i] = static_cast<float>(in[i]) - mean[i];
-      subtract(std::max(begin - 1, 0), v, plain - n);
-      subtract(std::min(end, width - 1), v, plain + row_size);
-      float* out = summed + static_cast<std::size_t>(v % 3) * row_size;
-      const float* before = plain - n;
-      const float* after = plain + n;
-      for (std::size_t i = 0; i < row_size; ++i) out[i] = before[i] + plain[i] + after[i];
-      for (std::size_t i = 0; i < row_size; ++i) squares[i] = plain[i] * plain[i];
-      if (v >= box.v0 && v <= box.v1) pack(v, 1.0f, levels * levels, sure.row(v));
+      const auto needed = [&](int w) { return is_asked(w, v - 1) || is_asked(w, v) || is_asked(w, v + 1); };
+      for_each_run(first_word, last_word, width, needed, [&](int begin, int end) BODYSCHEMA_PART_OF_ITS_CALLER {
+        const std::size_t size = static_cast<std::size_t>(end - begin) * n;
+        const std::uint8_t* in = image.pixel(begin, v);
+        const float* mean = model.mean.data() + at(begin, v) * n;
+        for (std::size_t i = 0; i < size; ++i) plain[i] = static_cast<float>(in[i]) - mean[i];
+        subtract(std::max(begin - 1, 0), v, plain - n);
+        subtract(std::min(end, width - 1), v, plain + size);
+        float* out = sums_of(v, begin);
+        const float* before = plain - n;
+        const float* after = plain + n;
+        for (std::size_t i = 0; i < size; ++i) out[i] = before[i] + plain[i] + after[i];
+        for (std::size_t i = 0; i < size; ++i) squares[i] = plain[i] * plain[i];
+        if (v >= box.v0 && v <= box.v1) pack(begin, end, v, 1.0f, levels * levels, sure);
+      });
     }
     const int here = v - 1;
     if (here < box.v0) continue;
-    const float* a = summed + static_cast<std::size_t>(std::max(here - 1, 0) % 3) * row_size;
-    const float* b = summed + static_cast<std::size_t>(here % 3) * row_size;
-    const float* c = summed + static_cast<std::size_t>(std::min(here + 1, height - 1) % 3) * row_size;
-    for (std::size_t i = 0; i < row_size; ++i) {
-      const float sum = a[i] + b[i] + c[i];
-      squares[i] = sum * sum;
-    }
-    pack(here, 9.0f, 81.0f * levels * levels, detected.row(here));
+    const auto judged = [&](int w) { return is_asked(w, here); };
+    for_each_run(first_word, last_word, width, judged, [&](int begin, int end) BODYSCHEMA_PART_OF_ITS_CALLER {
+      const std::size_t size = static_cast<std::size_t>(end - begin) * n;
+      const float* a = sums_of(std::max(here - 1, 0), begin);
+      const float* b = sums_of(here, begin);
+      const float* c = sums_of(std::min(here + 1, height - 1), begin);
+      for (std::size_t i = 0; i < size; ++i) {
+        const float sum = a[i] + b[i] + c[i];
+        squares[i] = sum * sum;
+      }
+      pack(begin, end, here, 9.0f, 81.0f * levels * levels, detected);
+    });
   }
 }
 
@@ -376,11 +413,12 @@ void Segmenter::Impl::refine(const Image& image, const BackgroundModel& model, B
   }
   components.remove_small(mask, setup.min_component_px);
   components.fill_small_holes(mask, setup.max_hole_px);
-  // What the clean-up changed, it changed wholly.
+  // What the clean-up changed, it changed wholly; where nothing was detected there was nothing to be changed.
   const auto w = static_cast<std::size_t>(width);
   std::vector<std::uint64_t>& covered = words;
   covered.resize((w + 63) / 64);
-  for (int v = 0; v < height; ++v) {
+  const PixelBox cleaned = bounding_box(detected).grown(1, width, height);
+  for (int v = cleaned.v0; v <= cleaned.v1; ++v) {
     std::uint8_t* row = coverage.data() + static_cast<std::size_t>(v) * w;
     for (std::size_t u = 0; u < w; ++u) hits[u] = static_cast<std::uint8_t>(row[u] >> 7);
     pack_bits(hits.data(), w, covered.data());
@@ -541,7 +579,7 @@ void Segmenter::Impl::compare(const Image& image, const BackgroundModel& model, 
     }
     return;
   }
-  detect(image, model, 1.0f, everything());
+  detect(image, model, 1.0f, everything(), nullptr);
   components.remove_small(detected, setup.min_component_px);
   components.fill_small_holes(detected, setup.max_hole_px);
   intersect(sure, detected);
@@ -673,7 +711,9 @@ void Segmenter::Impl::measure_edge_noise(const Image& image) {
   const auto n = static_cast<std::size_t>(channels);
   const auto unit = static_cast<float>(unit_of(width, height));
   ratios.clear();
+  const int every = evidence.sample_step();
   evidence.for_each_outside(kBesideFrom_px * unit, kBesideTo_px * unit, [&](int u, int v) {
+    if (u % every != 0 || v % every != 0) return;
     const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
     if (model.precision[i] <= 0.0f) return;
     float square = 0.0f;
@@ -757,7 +797,7 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
     beside = *predicted.silhouette;
     morphology.dilate(beside, static_cast<int>(std::ceil(reach_px)));
   }
-  bleeds = colours_bleed(image, light_grid());
+  bleeds = resolution.bleeds(image, light_grid());
   const Image& seen = in_known_light(image);
   const bool holds = background_holds(seen);
   if (predicted.silhouette == nullptr) {
@@ -780,7 +820,8 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
   known.fill(false);
   if (holds && !evidence.box().empty()) {
     mark_valid(learned.model(), known, evidence.box());
-    detect(seen, learned.model(), edge_variance, evidence.box());
+    // Only beside the prediction, where alone it is asked for.
+    detect(seen, learned.model(), edge_variance, evidence.box(), everywhere ? nullptr : &beside);
     components.remove_small(detected, setup.min_component_px);
     components.fill_small_holes(detected, setup.max_hole_px);
     intersect(sure, detected);
