@@ -126,7 +126,7 @@ void ArmTracker::learn(const Frame& frame, const OutlineFit& fit, FrameOutcome& 
   fitter_.learn_noise(fit);
   const Eigen::VectorXd posture = posture_of(frame.exposures[0].at.encoder, model_.roles());
   if (const auto block = known_.memory.add(frame.time_s, posture, fit.seen.quadratic, fit.x)) {
-    fitter_.learn_shape(fit);
+    fitter_.learn_shape(fit, known_.memory.told());
     keyframes_.keep(frame, *block, known_.memory, fitter_.pictures_show(frame, fit.evidence));
   }
   keyframes_.look_again(known_.memory, fitter_);
@@ -137,7 +137,9 @@ void ArmTracker::learn(const Frame& frame, const OutlineFit& fit, FrameOutcome& 
 /// The frame and what is known of it, as it is reported.
 void ArmTracker::settle_on(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome) {
   known_.x = known_.memory.empty() ? fit.x : known_.where_it_was();
-  const PostureMemory held = outcome.contradicted || known_.memory.empty() ? known_.memory.beliefs() : known_.memory;
+  std::optional<PostureMemory> beliefs;
+  if (outcome.contradicted || known_.memory.empty()) beliefs = known_.memory.beliefs();
+  const PostureMemory& held = beliefs ? *beliefs : known_.memory;
   if (fitter_.lies_near(frame, fit.evidence)) {
     known_.in_frame = held.in_posture(outcome.contradicted ? fit.quadratic : fit.seen.quadratic);
   } else {  // an arm that is not where outlines are has nothing to learn from how these run

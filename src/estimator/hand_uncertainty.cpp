@@ -40,13 +40,12 @@ HandUncertainty hand_uncertainty(FrameModel& model, const Exposure& exposure, co
   return result;
 }
 
-Eigen::MatrixXd shape_covariance(const PostureMemory& memory, OutlineFitter& fitter) {
+Eigen::MatrixXd shape_covariance(const PostureMemory& memory, const OutlineFitter& fitter) {
   const Eigen::Index n = memory.layout().estimated();
   if (memory.empty()) return Eigen::MatrixXd::Zero(n, n);
   const auto& own = memory.estimate().own;
   const Eigen::VectorXd prior = memory.layout().prior_sd.array().square().inverse();
-  const double told = static_cast<double>(n) - own.diagonal().dot(prior);
-  const double share = fitter.shape_variance_share(told);
+  const double share = fitter.shape_variance_share(memory.told());
   if (share <= 0.0) return Eigen::MatrixXd::Zero(n, n);
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(n, n);
   Eigen::MatrixXd precision = own.ldlt().solve(identity);

@@ -28,6 +28,6 @@ HandUncertainty hand_uncertainty(FrameModel& model, const Exposure& exposure, co
 
 /// What outlines that are wrong alike in all postures do to the state: as if one average posture alone were known,
 /// for the others err with it. No more than what was believed before any.
-Eigen::MatrixXd shape_covariance(const PostureMemory& memory, OutlineFitter& fitter);
+Eigen::MatrixXd shape_covariance(const PostureMemory& memory, const OutlineFitter& fitter);
 
 }  // namespace bodyschema

@@ -56,6 +56,8 @@ inline constexpr double kFewestOfPart = 4.0;
 inline constexpr int kPosturesOfShape = 3;
 /// Statistical. Postures after which one has faded to 1/e: the estimate that left its residuals is no longer held.
 inline constexpr double kRecentPostures = 12.0;
+/// Numerical. Of one posture: what has faded to less is as if it had not been seen.
+inline constexpr double kForgotten = 1e-3;
 
 /// Physical. Share of what parts get wrong that no fit takes up: parameters turn and shift a limb, which moves its two
 /// flanks against each other; to the outside of both at once, as a wrong shape does, few do.

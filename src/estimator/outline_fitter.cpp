@@ -206,13 +206,14 @@ void OutlineFitter::learn_noise(const OutlineFit& fit) {
   }
 }
 
-void OutlineFitter::learn_shape(const OutlineFit& fit) {
+void OutlineFitter::learn_shape(const OutlineFit& fit, double fitted) {
   for (std::size_t c = 0; c < noise_.size(); ++c) {
     if (fit.evidence.cameras[c].weight > 0.0) shape_.add(shown(fit, c), c, model_.picture_unit_px(c));
   }
+  shape_.end_posture(options_.noise.floor_px, fitted);
 }
 
-double OutlineFitter::shape_variance_share(double fitted) {
+double OutlineFitter::shape_variance_share(double fitted) const {
   return shape_.lasting_variance_px2(options_.noise.floor_px, fitted) / noise_.front().variance_px2();
 }
 

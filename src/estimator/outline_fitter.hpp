@@ -86,11 +86,12 @@ class OutlineFitter {
   /// Measures the outlines' noise on what a good fit leaves.
   void learn_noise(const OutlineFit& fit);
   /// Measures what outlines get wrong alike in all postures on what the fit of a new one leaves.
-  void learn_shape(const OutlineFit& fit);
+  /// @param fitted  parameters that all postures together tell
+  void learn_shape(const OutlineFit& fit, double fitted);
   [[nodiscard]] bool knows_shape() const { return shape_.known(); }
   /// ... its variance, over that of what differs from posture to posture: a frame's quadratic divided by it says what
   /// the frame would tell if nothing else erred.
-  [[nodiscard]] double shape_variance_share(double fitted);
+  [[nodiscard]] double shape_variance_share(double fitted) const;
   [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
   void forget() {
     noise_.assign(noise_.size(), OutlineNoise(options_.noise));

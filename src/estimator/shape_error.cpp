@@ -20,20 +20,23 @@ void ShapeError::add(std::span<const OutlinePoint> points, std::size_t camera, d
     mean.sum += point.weight * point.residual_px / unit_px;
     mean.points += 1.0;
   }
+  // What earlier postures left was left by an earlier estimate: of parts, too, that this one does not show.
+  const double kept = std::exp(-1.0 / limits::kRecentPostures);
+  for (auto& [place, known] : parts_) {
+    if (place.first != camera) continue;
+    for (double* sum : {&known.postures, &known.weight, &known.sum, &known.square}) *sum *= kept;
+  }
+  std::erase_if(parts_, [](const auto& item) { return item.second.postures < limits::kForgotten; });
   for (const auto& [part, mean] : means) {
     if (mean.points < limits::kFewestOfPart || mean.weight <= 0.0) continue;
     auto& known = parts_[{camera, part}];
     const double residual = mean.sum / mean.weight;
-    // What earlier postures left was left by an earlier estimate.
-    const double kept = std::exp(-1.0 / limits::kRecentPostures);
-    for (double* sum : {&known.postures, &known.weight, &known.sum, &known.square}) *sum *= kept;
     ++known.seen;
     known.postures += 1.0;
     known.weight += mean.weight;
     known.sum += residual;
     known.square += residual * residual;
   }
-  asked_ = false;
 }
 
 bool ShapeError::known() const {
@@ -41,14 +44,14 @@ bool ShapeError::known() const {
                      [](const auto& item) { return item.second.seen >= limits::kPosturesOfShape; });
 }
 
-double ShapeError::lasting_variance_px2(double floor_px, double fitted) {
-  const double now = variance_px2(floor_px, fitted);
-  if (!asked_ && known()) {
-    asked_ = true;
-    postures_ = 1.0 + postures_ * std::exp(-1.0 / limits::kRecentPostures);
-    recent_px2_ += (now - recent_px2_) / postures_;
-  }
-  return std::max(now, recent_px2_);
+void ShapeError::end_posture(double floor_px, double fitted) {
+  if (!known()) return;
+  postures_ = 1.0 + postures_ * std::exp(-1.0 / limits::kRecentPostures);
+  recent_px2_ += (variance_px2(floor_px, fitted) - recent_px2_) / postures_;
+}
+
+double ShapeError::lasting_variance_px2(double floor_px, double fitted) const {
+  return std::max(variance_px2(floor_px, fitted), recent_px2_);
 }
 
 double ShapeError::variance_px2(double floor_px, double fitted) const {

@@ -24,14 +24,16 @@ class ShapeError {
  public:
   /// Adds one posture's picture.
   void add(std::span<const OutlinePoint> points, std::size_t camera, double unit_px);
+  /// All pictures of a posture were added. Parameters as of `variance_px2`.
+  void end_posture(double floor_px, double fitted);
   /// Variance beyond what pictures can place outlines to anyway, times how many points of a part err as one by it: what
   /// an evidence's A is to be divided by where nothing else errs. px^2.
   /// @param floor_px  how near pictures can place outlines
   /// @param fitted  parameters that all postures together told
   [[nodiscard]] double variance_px2(double floor_px, double fitted) const;
-  /// The same, but no smaller than its mean over recent postures: to be asked after each. Shapes stay as they are, but
-  /// what few parts show of them comes and goes with every posture.
-  [[nodiscard]] double lasting_variance_px2(double floor_px, double fitted);
+  /// The same, but no smaller than its mean over recent postures. Shapes stay as they are, but what few parts show of
+  /// them comes and goes with every posture.
+  [[nodiscard]] double lasting_variance_px2(double floor_px, double fitted) const;
   /// Whether enough postures were seen to tell.
   [[nodiscard]] bool known() const;
   void forget() { *this = {}; }
@@ -42,7 +44,6 @@ class ShapeError {
     double postures = 0.0, weight = 0.0, sum = 0.0, square = 0.0;  ///< of mean residuals; fading
   };
   std::map<std::pair<std::size_t, std::size_t>, Part> parts_;  ///< by camera and part
-  bool asked_ = false;                                         ///< since the last posture
   double postures_ = 0.0, recent_px2_ = 0.0;                   ///< fading; the variance's mean over these
 };
 

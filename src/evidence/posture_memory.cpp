@@ -123,6 +123,11 @@ MemoryEstimate PostureMemory::in_posture() const {
   return result;
 }
 
+double PostureMemory::told() const {
+  return static_cast<double>(layout_.estimated()) -
+         estimate().own.diagonal().cwiseQuotient(layout_.prior_sd.cwiseAbs2()).sum();
+}
+
 MemoryEstimate PostureMemory::in_posture(const Quadratic& frame) const {
   const auto n = layout_.estimated(), m = layout_.considered_root.rows();
   const MemoryEstimate before = in_posture();

@@ -104,6 +104,9 @@ class PostureMemory {
   [[nodiscard]] std::span<const Eigen::Index> loose() const { return loose_; }
 
   [[nodiscard]] const MemoryEstimate& estimate() const;
+  /// How many of the estimated parameters pictures tell: each counts by how much of its prior's say they have taken
+  /// over.
+  [[nodiscard]] double told() const;
   /// The estimate of one frame: the fused one with that posture's own error, seen by the frame's pictures.
   [[nodiscard]] MemoryEstimate in_posture(const Quadratic& frame) const;
   /// The same of a frame without evidence.
