@@ -236,7 +236,7 @@ class Scene:
     # -- robot
 
     def build(self, link, parent, xyz, R, joint):
-        body = parent.add_body(name=link, pos=xyz, quat=quaternion(R))
+        body = parent.add_body(name="link " + link, pos=xyz, quat=quaternion(R))
         body.mass, body.inertia, body.explicitinertial = 1.0, [0.01] * 3, True
         self.bodies[link] = body
         if joint is not None and joint.get("type") in ("revolute", "continuous"):
@@ -405,7 +405,7 @@ class Scene:
         mujoco.mj_kinematics(self.model, self.data)
 
     def pose(self, link):
-        body = self.data.body(link)
+        body = self.data.body("link " + link)
         X = np.eye(4)
         X[:3, :3], X[:3, 3] = body.xmat.reshape(3, 3), body.xpos
         return X
