@@ -40,7 +40,7 @@ import yaml
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 PICTURES_HZ, ENCODERS_HZ = 10, 100
-FINER = 2  # samples per pixel along each axis
+FINER = 3  # samples per pixel along each axis
 FIRST_COUNTED = 45  # frames; time to converge
 START_US = 1_700_000_000_000_000
 DEG = math.pi / 180
@@ -219,8 +219,8 @@ class Scene:
         visual = self.spec.visual
         visual.map.znear, visual.map.zfar = 0.01, 12.0
         visual.map.shadowclip, visual.map.shadowscale = 1.5, 0.9
-        visual.quality.shadowsize, visual.quality.offsamples = 4096, 4
-        visual.global_.offwidth, visual.global_.offheight = 1280, 960
+        visual.quality.shadowsize, visual.quality.offsamples = 2048, 0
+        visual.global_.offwidth, visual.global_.offheight = 2048, 1536
         self.bodies = {}
         self.points = []  # of the arm: (link, points in its frame)
         self.build(self.urdf.root, self.spec.worldbody, np.zeros(3), np.eye(3), None)
@@ -447,7 +447,7 @@ class Lens:
         if not k1:
             return
         width, height = self.size
-        f, fine = camera["fx"], FINER * 2
+        f, fine = camera["fx"], FINER
         v, u = np.mgrid[0:height * fine, 0:width * fine].astype(np.float64)
         x = ((u + 0.5) / fine - 0.5 - camera["cx"]) / f
         y = ((v + 0.5) / fine - 0.5 - camera["cy"]) / f
