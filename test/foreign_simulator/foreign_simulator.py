@@ -532,7 +532,7 @@ class Motion:
         sys.exit("no posture in view was found")
 
     def with_head(self, angles):
-        """Neck turned so that the hand is in the middle, by up to 18 deg."""
+        """Neck turned so that the hand is in the middle, as far as it goes."""
         if not self.follows:
             return angles
         angles = dict(angles)
@@ -541,9 +541,9 @@ class Motion:
             x, y, z = self.scene.in_camera("left", self.scene.own["hand_link"])
             if z < 0.05:
                 break
-            for name, error, sign in (("neck_yaw", math.atan2(x, z), -1), ("neck_pitch", math.atan2(y, z), -1)):
+            for name, error, reach in (("neck_yaw", math.atan2(x, z), 35 * DEG), ("neck_pitch", math.atan2(y, z), 18 * DEG)):
                 was = self.rest.get(name, 0.0)
-                angles[name] = min(was + 18 * DEG, max(was - 18 * DEG, angles.get(name, 0.0) + sign * 0.8 * error))
+                angles[name] = min(was + reach, max(was - reach, angles.get(name, 0.0) - 0.8 * error))
         return angles
 
     def at(self, t):
