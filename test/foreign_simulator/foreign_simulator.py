@@ -5,7 +5,7 @@ Kinematics, drawing, light, noise, lens and motion are MuJoCo's or this file's; 
 bodyschema-sim, so that what the product gets right before both is not what one simulator happens to draw.
 
 usage: foreign_simulator.py play ROBOT CONDITION SEED FOLDER       a log with its truth, and a picture of it
-       foreign_simulator.py check ROBOT FOLDER                     the arm's outline against the product's own
+       foreign_simulator.py check ROBOT FOLDER                     kinematics and outlines against the product's own
        foreign_simulator.py table FOLDER [--robots ...] [--conditions ...] [--seeds ...] [--set KEY=VALUE ...]
 ROBOT is a folder of config/ (icub_right, icub_v2_5), CONDITION one of CONDITIONS below, or a FAULT.
 
@@ -682,7 +682,8 @@ class Player:
         self.held = add_box(bare, self.motion) if self.condition.get("box") else None
         self.build(robot, table_z)
         self.random = np.random.default_rng(seed * 15485863 + 3)
-        self.offsets = {j: self.random.uniform(-5, 5) for j in self.scene.own["estimated_joints"]}
+        largest = 0 if self.condition.get("exact") else 5
+        self.offsets = {j: self.random.uniform(-largest, largest) for j in self.scene.own["estimated_joints"]}
         gain = self.condition.get("gain", 1)
         self.gains = {"r_elbow": gain, "r_shoulder_roll": 1.0}
         self.lenses = {name: Lens(k, self.scene.wide(k), self.condition.get("k1", 0))
@@ -716,8 +717,8 @@ class Player:
         values = []
         for name in names:
             value = true.get(name, 0.0) * self.gains.get(name, 1.0) + self.offsets.get(name, 0.0) * DEG
-            value += self.random.normal(0, 0.02 * DEG)
-            values.append(round(value / step) * step)
+            noisy = value + self.random.normal(0, 0.02 * DEG)
+            values.append(value if self.condition.get("exact") else round(noisy / step) * step)
         return names, values
 
     def light(self, t):
@@ -832,7 +833,7 @@ def score(robot, estimates, truth):
 
 def replay(program, robot, condition, folder, settings):
     command = [program, "replay", folder / "log.lcmlog", "--config", SOURCE / "config" / robot / "estimator.yaml",
-               "--out", folder / "replay", "--overlays", "2", "--set", "vision.method=auto"]
+               "--out", folder / "replay", "--overlays", "2", "--truth", folder / "truth.json", "--set", "vision.method=auto"]
     lens = "unknown" if condition.get("k1") else "[0, 0, 0, 0, 0]"
     for camera in ("left", "right"):  # what a laboratory knows of its cameras, as in `evaluate everyday`
         command += ["--set", f"cameras.{camera}.distortion={lens}", "--set", f"cameras.{camera}.readout_ms=unknown"]
@@ -863,16 +864,15 @@ def table(arguments):
 
 
 def check(arguments):
-    """Draws a few postures in MuJoCo as masks and in the product as outlines of the true joints; see the README."""
-    player = Player(arguments.robot, {**PLAIN, "seconds": 10}, 1)
-    out = arguments.folder
-    out.mkdir(parents=True, exist_ok=True)
-    for k, t in enumerate(np.linspace(0, 9, 6)):
-        player.place(t)
-        mujoco.mj_forward(player.scene.model, player.scene.data)
-        for camera in player.scene.cameras:
-            cv2.imwrite(str(out / f"mask_{camera}_{k}.png"), player.scene.draw(camera, True).astype(np.uint8) * 255)
-    return 0
+    """Whether both mean the same by joints, cameras and meshes: encoders without any error, believed to have none."""
+    folder = arguments.folder / f"exact-{arguments.robot}"
+    Player(arguments.robot, {**PLAIN, "seconds": 6, "exact": True}, 1).play(folder)
+    estimates = replay(arguments.program, arguments.robot, {}, folder, ["filter.initial_sd_deg=0.001"])
+    errors = json.loads((folder / "replay/summary.json").read_text())["errors"]
+    apart = max(e["final_on_all_frames"]["position_mm"]["before"] for e in errors.values())
+    outline = np.median([json.loads(line)["contour_rms_px"] for line in estimates.read_text().splitlines()])
+    print(f"{arguments.robot}: the hand in the cameras' frames is {apart:.6f} mm apart, outlines {outline:.3f} px (rms)")
+    return 0 if apart < 1e-3 and outline < 0.3 else 1
 
 
 def main():
@@ -887,6 +887,7 @@ def main():
     outline = commands.add_parser("check")
     outline.add_argument("robot")
     outline.add_argument("folder", type=pathlib.Path)
+    outline.add_argument("--program", default=str(SOURCE / "build/release/bin/bodyschema"))
     rows = commands.add_parser("table")
     rows.add_argument("folder", type=pathlib.Path)
     rows.add_argument("--robots", nargs="+", default=["icub_right", "icub_v2_5"])
