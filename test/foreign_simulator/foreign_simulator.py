@@ -45,7 +45,7 @@ FIRST_COUNTED = 45  # frames; time to converge
 START_US = 1_700_000_000_000_000
 DEG = math.pi / 180
 
-PLAIN = {"room": "wall", "head": "still", "looks": "grey", "seconds": 30}
+PLAIN = {"room": "wall", "wall": [0.36, 0.50, 0.44], "head": "still", "looks": "grey", "seconds": 30}
 CONDITIONS = {
     "plain": {},
     "room": {"room": "kitchen"},
@@ -56,6 +56,8 @@ CONDITIONS = {
     "object": {"room": "kitchen", "box": True},
     "person": {"room": "kitchen", "person": True},
     "second_arm": {"room": "kitchen", "second_arm": True},
+    "pale": {"looks": "covers", "wall": [0.8, 0.8, 0.78]},  # white on white
+    "dim": {"room": "kitchen", "light": 0.3, "noise": 2.0},
     "lens": {"k1": -0.3},
     "jpeg": {"room": "kitchen", "jpeg": 70},
     "all": {"room": "kitchen", "head": "gaze", "looks": "covers", "drift": 0.2, "flicker": 0.02, "box": True,
@@ -184,8 +186,8 @@ def cloth(random, size=512):
     return (0.85 - 0.45 * check * np.array([0.2, 0.8, 0.9])) * (0.93 + 0.14 * smooth_noise(random, size, 256))
 
 
-def plaster(random, size=512):
-    return (np.array([0.36, 0.50, 0.44]) * (0.94 + 0.08 * smooth_noise(random, size, 5))
+def plaster(random, colour, size=512):
+    return (np.array(colour) * (0.94 + 0.08 * smooth_noise(random, size, 5))
             * (0.985 + 0.03 * smooth_noise(random, size, 160)))
 
 
@@ -342,7 +344,7 @@ class Scene:
         spec, world = self.spec, self.spec.worldbody
         cube = mujoco.mjtTexture.mjTEXTURE_CUBE
         if not kitchen:
-            add_texture(spec, "plaster", plaster(self.random))
+            add_texture(spec, "plaster", plaster(self.random, self.condition["wall"]))
             world.add_geom(type=plane, size=[4, 4, 0.1], pos=[-1.2, 0, 0], quat=quaternion(rotation([0, 90 * DEG, 0])),
                            material="plaster", contype=0, conaffinity=0)
             world.add_geom(type=plane, size=[4, 4, 0.1], pos=[0, 0, table_z - 0.4], material="plaster", contype=0,
@@ -541,7 +543,8 @@ class Motion:
             x, y, z = self.scene.in_camera("left", self.scene.own["hand_link"])
             if z < 0.05:
                 break
-            for name, error, reach in (("neck_yaw", math.atan2(x, z), 35 * DEG), ("neck_pitch", math.atan2(y, z), 18 * DEG)):
+            for name, error, reach in (("neck_yaw", math.atan2(x, z), 35 * DEG),
+                                       ("neck_pitch", math.atan2(y, z), 18 * DEG)):
                 was = self.rest.get(name, 0.0)
                 angles[name] = min(was + reach, max(was - reach, angles.get(name, 0.0) - 0.8 * error))
         return angles
@@ -596,7 +599,8 @@ def person_parts(body, colour=(0.84, 0.62, 0.5)):
     """A forearm with sleeve and a hand with fingers, reaching along the body's x."""
     capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
     looks = dict(contype=0, conaffinity=0)
-    body.add_geom(type=capsule, size=[0.042, 0, 0], fromto=[-0.9, 0, 0, -0.28, 0, 0], rgba=[0.15, 0.25, 0.5, 1], **looks)
+    body.add_geom(type=capsule, size=[0.042, 0, 0], fromto=[-0.9, 0, 0, -0.28, 0, 0], rgba=[0.15, 0.25, 0.5, 1],
+                  **looks)
     body.add_geom(type=capsule, size=[0.03, 0, 0], fromto=[-0.28, 0, 0, -0.05, 0, 0], rgba=[*colour, 1], **looks)
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_ELLIPSOID, size=[0.05, 0.04, 0.018], rgba=[*colour, 1], **looks)
     for k in range(4):
@@ -625,7 +629,8 @@ def person_pose(scene, motion, t, seed):
 
 def second_arm_pose(scene, t):
     """The robot's other arm works on its own side: grey, and moved slowly through the view's edge."""
-    at = np.array([-0.42 + 0.05 * math.sin(0.9 * t), -0.16 + 0.09 * math.sin(0.55 * t), 0.07 + 0.05 * math.sin(0.7 * t)])
+    at = np.array([-0.42 + 0.05 * math.sin(0.9 * t), -0.16 + 0.09 * math.sin(0.55 * t),
+                   0.07 + 0.05 * math.sin(0.7 * t)])
     R = rotation([0.4 * math.sin(0.6 * t), -0.25, math.pi - 0.6 + 0.25 * math.sin(0.8 * t)])
     return at, quaternion(R)
 
@@ -724,7 +729,7 @@ class Player:
     def light(self, t):
         """Drifts over the log, redder as it grows, and flickers from picture to picture."""
         drift, flicker = self.condition.get("drift", 0), self.condition.get("flicker", 0)
-        gain = (1 + drift * t / self.seconds) * (1 + self.random.normal(0, flicker) if flicker else 1)
+        gain = self.condition.get("light", 1) * (1 + drift * t / self.seconds) * (1 + self.random.normal(0, flicker) if flicker else 1)
         return gain * np.array([1 + 0.25 * drift * t / self.seconds, 1, 1 - 0.25 * drift * t / self.seconds])
 
     def picture(self, camera, t):
@@ -736,7 +741,7 @@ class Player:
         picture = self.lenses[camera](self.scene.draw(camera))
         picture = cv2.GaussianBlur(picture, (0, 0), 0.45)
         # Shot noise and read noise: bright pixels are noisier.
-        sd = np.sqrt(1.2**2 + 0.03 * picture)
+        sd = self.condition.get("noise", 1) * np.sqrt(1.2**2 + 0.03 * picture)
         picture = picture + sd * self.random.normal(0, 1, picture.shape)
         return np.clip(np.round(picture), 0, 255).astype(np.uint8)
 
@@ -833,7 +838,8 @@ def score(robot, estimates, truth):
 
 def replay(program, robot, condition, folder, settings):
     command = [program, "replay", folder / "log.lcmlog", "--config", SOURCE / "config" / robot / "estimator.yaml",
-               "--out", folder / "replay", "--overlays", "2", "--truth", folder / "truth.json", "--set", "vision.method=auto"]
+               "--out", folder / "replay", "--overlays", "2", "--truth", folder / "truth.json",
+               "--set", "vision.method=auto"]
     lens = "unknown" if condition.get("k1") else "[0, 0, 0, 0, 0]"
     for camera in ("left", "right"):  # what a laboratory knows of its cameras, as in `evaluate everyday`
         command += ["--set", f"cameras.{camera}.distortion={lens}", "--set", f"cameras.{camera}.readout_ms=unknown"]
@@ -844,7 +850,8 @@ def replay(program, robot, condition, folder, settings):
 
 
 def table(arguments):
-    print(f"{'log':<28} {'hand, mm':>9} {'converged':>10} {'wrong':>7} {'first':>6} {'hand/sd':>8} {'offset/sd':>9}  states")
+    print(f"{'log':<28} {'hand, mm':>9} {'converged':>10} {'wrong':>7} {'first':>6} {'hand/sd':>8} {'offset/sd':>9}"
+          "  states besides")
     wrong = 0
     for name in arguments.conditions:
         for robot in arguments.robots:
