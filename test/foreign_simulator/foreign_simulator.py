@@ -6,6 +6,7 @@ bodyschema-sim, so that what the product gets right before both is not what one 
 
 usage: foreign_simulator.py play ROBOT CONDITION SEED FOLDER       a log with its truth, and a picture of it
        foreign_simulator.py check ROBOT FOLDER                     kinematics and outlines against the product's own
+       foreign_simulator.py diagnose FOLDER [--robots ...] [--faults ...] [--seeds ...]
        foreign_simulator.py table FOLDER [--robots ...] [--conditions ...] [--seeds ...] [--set KEY=VALUE ...]
 ROBOT is a folder of config/ (icub_right, icub_v2_5), CONDITION one of CONDITIONS below, or a FAULT.
 
@@ -42,6 +43,7 @@ SOURCE = pathlib.Path(__file__).resolve().parents[2]
 PICTURES_HZ, ENCODERS_HZ = 10, 100
 FINER = 3  # samples per pixel along each axis
 FIRST_COUNTED = 45  # frames; time to converge
+DIGITS = "r_(hand_)?(thumb|index|middle|ring|little)"
 START_US = 1_700_000_000_000_000
 DEG = math.pi / 180
 
@@ -251,8 +253,11 @@ class Scene:
                 self.add_visual(link, k, visual, body)
         for child in self.urdf.children.get(link, []):
             child_xyz, child_R = origin_of(child)
-            child_xyz = self.moved_joint(child.get("name"), child_xyz)
+            child_xyz = self.moved_joint(child.get("name"), child_xyz) * self.hand_scale(link)
             self.build(child.find("child").get("link"), body, child_xyz, child_R, child)
+
+    def hand_scale(self, link):
+        return self.condition.get("hand_scale", 1) if link.startswith("r_hand") or re.match(DIGITS, link) else 1
 
     def moved_joint(self, joint, xyz):
         """A forearm that is longer than the model says: the wrist's first joint sits further from the elbow."""
@@ -269,14 +274,10 @@ class Scene:
         vertices, faces = self.urdf.mesh(element)
         xyz, R = origin_of(visual)
         vertices = vertices @ R.T + xyz
-        hand = self.own["hand_link"]
-        if self.condition.get("hand_scale", 1) != 1 and (link == "r_hand" or link == hand):
-            centre = vertices.mean(axis=0)
-            vertices = centre + (vertices - centre) * self.condition["hand_scale"]
+        vertices = vertices * self.hand_scale(link)
         if self.condition.get("forearm_mm", 0) and link == "r_forearm":
-            normals = trimesh.Trimesh(vertices, faces, process=True).vertex_normals
-            if len(normals) == len(vertices):
-                vertices = vertices + normals * self.condition["forearm_mm"] * 1e-3
+            normals = trimesh.Trimesh(vertices, faces, process=False).vertex_normals
+            vertices = vertices + normals * self.condition["forearm_mm"] * 1e-3
         name = f"{link}_{k}"
         mesh = self.spec.add_mesh(name=name)
         mesh.uservert, mesh.userface = vertices.ravel().tolist(), faces.ravel().tolist()
@@ -290,7 +291,7 @@ class Scene:
         looks = self.condition["looks"]
         self.material("matt", 0.15, 0.2)
         self.material("gloss", 0.9, 0.8)
-        digits = re.search(r"thumb|index|middle|ring|little", link) is not None
+        digits = re.search(DIGITS, link) is not None
         if looks == "covers":  # white glossy shells, black joints and fingers
             dark = digits or "wrist" in link or "elbow" in link
             return ([0.09, 0.09, 0.1, 1] if dark else [0.93, 0.93, 0.9, 1]), "gloss"
@@ -305,12 +306,12 @@ class Scene:
 
     def add_cameras(self):
         turn = np.diag([1.0, -1.0, -1.0])  # MuJoCo looks along -z with y up, OpenCV along z with y down
-        wrong = rotation([0, self.condition.get("camera_deg", 0) * DEG, 0])
         for name, camera in self.cameras.items():
             f = camera["fx"]
             width, height = self.wide(camera)
             assert camera["fy"] == f and camera["cx"] == (camera["width"] - 1) / 2
-            added = self.bodies[camera["link"]].add_camera(name=name, quat=quaternion(wrong @ turn))
+            turned = self.condition.get("camera_deg", 0) * DEG if name == "left" else 0
+            added = self.bodies[camera["link"]].add_camera(name=name, quat=quaternion(rotation([0, turned, 0]) @ turn))
             added.fovy = 2 * math.degrees(math.atan(height / 2 / f))
 
     def wide(self, camera):
@@ -870,6 +871,24 @@ def table(arguments):
     return 1 if wrong else 0
 
 
+def diagnose(arguments):
+    """Plays each fault for a minute and prints what `bodyschema diagnose` names."""
+    for robot in arguments.robots:
+        for name in arguments.faults:
+            for seed in arguments.seeds:
+                folder = arguments.folder / f"{name}-{robot}-{seed}"
+                if not (folder / "log.lcmlog").exists():
+                    subprocess.run([sys.executable, __file__, "play", robot, name, str(seed), str(arguments.folder),
+                                    "--seconds", "60"], check=True)
+                out = folder / "diagnosis"
+                command = [arguments.program, "diagnose", folder / "log.lcmlog", "--out", out, "--config",
+                           SOURCE / "config" / robot / "estimator.yaml", "--set", "vision.method=auto"]
+                done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
+                lines = [line for line in done.stdout.splitlines() if line and not line.startswith(("report", "next"))]
+                print(f"{folder.name}: " + " | ".join(lines or done.stderr.splitlines()[-1:]), flush=True)
+    return 0
+
+
 def check(arguments):
     """Whether both mean the same by joints, cameras and meshes: encoders without any error, believed to have none."""
     folder = arguments.folder / f"exact-{arguments.robot}"
@@ -902,13 +921,19 @@ def main():
     rows.add_argument("--seeds", nargs="+", type=int, default=[1, 2])
     rows.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE")
     rows.add_argument("--program", default=str(SOURCE / "build/release/bin/bodyschema"))
+    causes = commands.add_parser("diagnose")
+    causes.add_argument("folder", type=pathlib.Path)
+    causes.add_argument("--robots", nargs="+", default=["icub_right", "icub_v2_5"])
+    causes.add_argument("--faults", nargs="+", default=list(FAULTS))
+    causes.add_argument("--seeds", nargs="+", type=int, default=[1])
+    causes.add_argument("--program", default=str(SOURCE / "build/release/bin/bodyschema"))
     arguments = parser.parse_args()
     if arguments.command == "play":
         condition = {**CONDITIONS, **FAULTS}[arguments.condition]
         player = Player(arguments.robot, {**condition, "seconds": arguments.seconds}, arguments.seed)
         player.play(arguments.folder / f"{arguments.condition}-{arguments.robot}-{arguments.seed}")
         return 0
-    return table(arguments) if arguments.command == "table" else check(arguments)
+    return {"table": table, "diagnose": diagnose, "check": check}[arguments.command](arguments)
 
 
 if __name__ == "__main__":
