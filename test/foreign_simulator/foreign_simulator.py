@@ -59,6 +59,8 @@ CONDITIONS = {
     "person": {"room": "kitchen", "person": True},
     "second_arm": {"room": "kitchen", "second_arm": True},
     "pale": {"looks": "covers", "wall": [0.8, 0.8, 0.78]},  # white on white
+    "white": {"looks": "white", "wall": [0.8, 0.8, 0.78]},
+    "grey": {"wall": [0.45, 0.45, 0.46]},
     "dim": {"room": "kitchen", "light": 0.3, "noise": 2.0},
     "lens": {"k1": -0.3},
     "jpeg": {"room": "kitchen", "jpeg": 70},
@@ -295,6 +297,8 @@ class Scene:
         if looks == "covers":  # white glossy shells, black joints and fingers
             dark = digits or "wrist" in link or "elbow" in link
             return ([0.09, 0.09, 0.1, 1] if dark else [0.93, 0.93, 0.9, 1]), "gloss"
+        if looks == "white":
+            return [0.93, 0.93, 0.9, 1], "gloss"
         if looks == "skin":
             return ([0.86, 0.62, 0.5, 1] if digits or "hand" in link else [0.78, 0.74, 0.7, 1]), "matt"
         shade = 0.35 + 0.4 * ((sum(map(ord, link)) * 37 % 100) / 100)
