@@ -16,7 +16,8 @@ hand's error (in the left camera's frame) over converged frames (over the last f
 is `converged`, and how many of these are wrong: the hand off by more than 3 published standard deviations and 2 mm,
 or an offset by more than 5. Wrong by the rules of `bodyschema evaluate everyday`; exit status 1 where any is.
 
-Needs Python with mujoco, lcm, numpy, opencv-python-headless, trimesh, pycollada, pyyaml, and lcm-gen.
+Needs Python with mujoco, lcm, numpy, opencv-python-headless, trimesh, pycollada, pyyaml (BODYSCHEMA_MUJOCO: the virtual
+environment that has them; without it, exit status 77), and lcm-gen.
 MUJOCO_GL=osmesa or egl chooses what draws; a log of 30 s takes about a minute on one core.
 """
 import argparse
@@ -31,13 +32,23 @@ import tempfile
 import xml.etree.ElementTree as ElementTree
 
 os.environ.setdefault("MUJOCO_GL", "osmesa")
-
-import cv2
-import lcm
-import mujoco
-import numpy as np
-import trimesh
-import yaml
+SKIPPED = 77
+environment = pathlib.Path(os.environ.get("BODYSCHEMA_MUJOCO", sys.prefix))
+if environment.resolve() != pathlib.Path(sys.prefix).resolve():
+    python = str(environment / "bin/python3")
+    os.execv(python, [python, *sys.argv])
+try:
+    import collada  # noqa: F401, what trimesh reads .dae with
+    import cv2
+    import lcm
+    import mujoco
+    import numpy as np
+    import trimesh
+    import yaml
+except ImportError as missing:
+    print(f"skipped: {missing}; pip install mujoco lcm numpy opencv-python-headless trimesh pycollada pyyaml, and set "
+          "BODYSCHEMA_MUJOCO to the environment it is in")
+    sys.exit(SKIPPED)
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 PICTURES_HZ, ENCODERS_HZ = 10, 100
