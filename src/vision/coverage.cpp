@@ -330,12 +330,10 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
     }
     float change = 0.0f;
     float contrast = 0.0f;
-    float along = 0.0f;
     for (std::size_t c = 0; c < channels; ++c) {
       const float f = near[c] - background.mean[i * channels + c];
       change += step[c] * step[c];
       contrast += f * f;
-      along += step[c] * f;
     }
     // A change as large as the contrast is a border between parts, not shading.
     const float most = 0.5f * std::sqrt(contrast);
@@ -344,7 +342,7 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
       pixel.robot[c] = std::clamp(near[c] + scale * step[c], 0.0f, 255.0f);
     }
     pixel.robot_known = true;
-    pixel.fades = along < -0.5f * contrast || fades_unseen(near, background, i, clipped_);
+    pixel.fades = fades_unseen(near, background, i, clipped_);
   }
 }
 
