@@ -21,8 +21,8 @@ namespace bodyschema {
 /// follows that law and colour is read deeper inside, and both say by their variances; one round more, since the pixels
 /// that differ reach further out.
 ///
-/// Of an overexposed F no shading is seen, which may bring it to B before the outline is reached: where B is such a shade,
-/// pixels are uncertain.
+/// Of an overexposed F no shading is seen, which may bring it to B before the outline is reached: where B is such a
+/// shade, pixels are uncertain.
 class CoverageEstimator {
  public:
   /// @param detected  pixels where a robot may be: all of it and at most ~2 px around it
