@@ -12,6 +12,10 @@ constexpr double kShortestStep_s = 0.010;
 /// Readings this close are the same: a joint at rest.
 constexpr double kStill_rad = 2e-4;
 constexpr Microseconds kRestless = 100'000;
+// Velocities that nobody publishes are slopes over so long, for encoders' steps, which would be fast motion between
+// neighbours; what moved by no more than some steps of them stands.
+constexpr Microseconds kSlope = 100'000;
+constexpr double kMoved_rad = 5e-3;
 }  // namespace
 
 JointHistory::JointHistory(std::vector<std::string> joint_names, const std::map<std::string, double>& fixed_rad,
@@ -78,6 +82,7 @@ JointHistory::Arrival JointHistory::add(const JointStateMessage& message) {
   if (message.utime <= last) return message.utime == last ? Arrival::kDuplicate : Arrival::kOlder;
   for (std::size_t i = 0; i < mapping_.size(); ++i) {
     if (mapping_[i] < 0) continue;
+    velocities_published_ = velocities_published_ || message.velocity_rad_s[i] != 0.0f;
     rings_[static_cast<std::size_t>(mapping_[i])].push(
         {message.utime, static_cast<double>(message.position_rad[i]), static_cast<double>(message.velocity_rad_s[i])});
   }
@@ -101,6 +106,19 @@ bool JointHistory::is_restless(const Ring& ring, std::size_t last, Microseconds 
     if (too_far(way_rad, before, after)) (way_rad > 0.0 ? to : fro) = true;
   }
   return to && fro;
+}
+
+/// Over the readings up to sample `last`; 0 where they are silent or jump meanwhile.
+double JointHistory::slope(const Ring& ring, std::size_t last) const {
+  std::size_t first = last;
+  while (first > 0 && ring.at(last).utime - ring.at(first).utime < kSlope) {
+    const Sample &before = ring.at(first - 1), &after = ring.at(first);
+    if (after.utime - before.utime > options_.max_gap || too_far(after.q - before.q, before, after)) return 0.0;
+    --first;
+  }
+  const double moved = ring.at(last).q - ring.at(first).q;
+  if (std::abs(moved) <= kMoved_rad) return 0.0;
+  return moved / seconds(ring.at(last).utime - ring.at(first).utime);
 }
 
 JointHistory::Verdict JointHistory::interpolate(const Ring& ring, Microseconds utime, double& q, double& qdot) const {
@@ -130,6 +148,8 @@ JointHistory::Verdict JointHistory::interpolate(const Ring& ring, Microseconds u
   }
   if (options_.velocity_from_differences) {
     qdot = gap || jump || step_s == 0.0 ? 0.0 : (after.q - before.q) / step_s;
+  } else if (!velocities_published_) {
+    qdot = slope(ring, low);
   }
   return Verdict::kReady;
 }
@@ -175,6 +195,7 @@ JointHistory::Answer JointHistory::interpolate(Microseconds utime, JointSample& 
 void JointHistory::clear() {
   for (Ring& ring : rings_) ring.count = ring.first = 0;
   newest_ = -1;
+  velocities_published_ = false;
 }
 
 Microseconds JointHistory::newest(Eigen::Index joint) const {

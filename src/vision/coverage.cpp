@@ -36,6 +36,9 @@ float gain(float depth, float far) {
 
 // How far beyond the outline pixels can differ from the background by their blur, px.
 constexpr float kRoughMargin = 0.9f;
+// A place is overexposed from so many standard deviations of the noise below the brightest level on. Light from all
+// around leaves it no darker than this share in its own shade, and tints that by no more than a quarter of the change.
+constexpr float kOverexposedSigma = 2.0f, kDarkestShade = 0.5f, kTint = 0.25f;
 // The smoothed coverage has no direction where it is flatter than this, per px.
 constexpr float kLeastSlope = 0.1f;
 // Robot colour is read where the smoothed coverage is at least this. Less would mix background in;
@@ -97,6 +100,27 @@ float share_by_brightness(const std::array<float, 3>& seen, const std::array<flo
     contrast += colour * colour / kColourVariance;
   }
   return contrast > 1e-6f ? along / contrast : 0.0f;
+}
+
+/// Whether the background may be what shading makes of an overexposed robot, of whose shading nothing is seen.
+/// @param robot  its colour just inside the outline
+/// @param clipped  the level that no channel exceeds
+bool fades_unseen(const std::array<float, 3>& robot, const BackgroundModel& background, std::size_t pixel,
+                  const std::array<float, 3>& clipped) {
+  const auto channels = static_cast<std::size_t>(background.channels);
+  const float* behind = background.mean.data() + pixel * channels;
+  bool overexposed = false;
+  float square = 0.0f, product = 0.0f, along = 0.0f, contrast = 0.0f;
+  for (std::size_t c = 0; c < channels; ++c) {
+    const float f = robot[c] - behind[c];
+    overexposed = overexposed || robot[c] > clipped[c] - kOverexposedSigma * background.noise_sd;
+    square += robot[c] * robot[c];
+    product += robot[c] * behind[c];
+    along += robot[c] * f;
+    contrast += f * f;
+  }
+  return overexposed && along > 0.0f && product > kDarkestShade * square &&
+         along * along > (1.0f - kTint * kTint) * square * contrast;
 }
 
 template <typename Function>
@@ -318,13 +342,16 @@ void CoverageEstimator::look_inside(const Image& image, const BackgroundModel& b
       pixel.robot[c] = std::clamp(near[c] + scale * step[c], 0.0f, 255.0f);
     }
     pixel.robot_known = true;
+    pixel.fades = fades_unseen(near, background, i, clipped_);
   }
 }
 
 void CoverageEstimator::estimate(const Image& image, const BackgroundModel& background, const BinaryMask& detected,
-                                 const BinaryMask& sure, float least_contrast_sigma, bool sharp_colours,
-                                 BinaryMask& mask, BinaryMask& uncertain, std::vector<std::uint8_t>& coverage) {
+                                 const BinaryMask& sure, const std::array<float, 3>& clipped,
+                                 float least_contrast_sigma, bool sharp_colours, BinaryMask& mask,
+                                 BinaryMask& uncertain, std::vector<std::uint8_t>& coverage) {
   const auto pixels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  clipped_ = clipped;
   coverage.assign(pixels, 0);
   mask.fill(false);
   uncertain.fill(false);
@@ -344,7 +371,7 @@ void CoverageEstimator::estimate(const Image& image, const BackgroundModel& back
   mask = inner_;
   for (const auto& pixel : band_) {
     float share = pixel.share;
-    if (pixel.robot_known && !pixel.contrast) {
+    if (pixel.robot_known && (!pixel.contrast || pixel.fades)) {
       uncertain.set(pixel.u, pixel.v);
       share = sure.at(pixel.u, pixel.v) ? 1.0f : 0.0f;
     }

@@ -20,10 +20,14 @@ namespace bodyschema {
 /// turn is where a is one half: two rounds, from the outline of the pixels that differ. Where colours bleed, brightness
 /// follows that law and colour is read deeper inside, and both say by their variances; one round more, since the pixels
 /// that differ reach further out.
+///
+/// Of an overexposed F no shading is seen, which may bring it to B before the outline is reached: where B is such a
+/// shade, pixels are uncertain.
 class CoverageEstimator {
  public:
   /// @param detected  pixels where a robot may be: all of it and at most ~2 px around it
   /// @param sure      pixels that differ from the background by themselves
+  /// @param clipped   the level that no channel exceeds: 255, of another light that times a gain
   /// @param least_contrast_sigma  below this difference of F and B a pixel is uncertain
   /// @param sharp_colours  a colour beside the outline that is no mixture of F and B is another part of the robot; not
   ///   so where compression lets colours bleed
@@ -31,8 +35,8 @@ class CoverageEstimator {
   /// @param uncertain out: pixels of the outline that cannot be judged
   /// @param coverage  out: 0 to 255, row order
   void estimate(const Image& image, const BackgroundModel& background, const BinaryMask& detected,
-                const BinaryMask& sure, float least_contrast_sigma, bool sharp_colours, BinaryMask& mask,
-                BinaryMask& uncertain, std::vector<std::uint8_t>& coverage);
+                const BinaryMask& sure, const std::array<float, 3>& clipped, float least_contrast_sigma,
+                bool sharp_colours, BinaryMask& mask, BinaryMask& uncertain, std::vector<std::uint8_t>& coverage);
 
  private:
   struct BandPixel {
@@ -45,6 +49,7 @@ class CoverageEstimator {
     float slope_v = 0.0f;
     bool robot_known = false;  ///< F has been found; only pixels near the outline need it
     bool contrast = false;     ///< F and B differ enough
+    bool fades = false;        ///< towards the outline F may become what B is: that may lie further out
   };
   void collect_band(const Image& image, const BinaryMask& detected, const BinaryMask& sure);
   void smooth();
@@ -54,6 +59,7 @@ class CoverageEstimator {
   void average_nearby(const Image& image, const BinaryMask& sure, BandPixel& pixel) const;
   void project(const Image& image, const BackgroundModel& background, float least_contrast_sigma, bool sharp_colours);
 
+  std::array<float, 3> clipped_{};
   PixelBox box_;
   int stride_ = 0;  ///< of the window, which has one pixel of padding
   MaskMorphology morphology_;

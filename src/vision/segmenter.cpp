@@ -402,7 +402,9 @@ void Segmenter::Impl::refine(const Image& image, const BackgroundModel& model, B
   // Beside a background that nobody knows, its own variety counts as noise: half as much contrast puts outlines half a
   // pixel off at most.
   const double least = (setup.method == SegmentationMethod::kAuto ? 0.5 : 1.0) * setup.least_contrast_sigma;
-  coverage_estimator.estimate(image, model, detected, sure, static_cast<float>(least),
+  constexpr float kBrightest = 255.0f;
+  const std::array<float, 3> clipped = {kBrightest / light[0], kBrightest / light[1], kBrightest / light[2]};
+  coverage_estimator.estimate(image, model, detected, sure, clipped, static_cast<float>(least),
                               !bleeds && edge_variance < kCompressed, mask, uncertain, coverage);
   if (setup.method == SegmentationMethod::kStatistics) {
     soften(mask, coverage);

@@ -99,7 +99,7 @@ TEST_F(SynchroniserTest, InterpolatesEncodersToEachPicturesStamp) {
   EXPECT_NEAR(cameras[0]->joints.q[0], 0.033, 1e-8);
   EXPECT_NEAR(cameras[0]->joints.q[1], -0.0165, 1e-8);
   EXPECT_NEAR(cameras[1]->joints.q[0], 0.045, 1e-8);
-  EXPECT_EQ(cameras[0]->joints.qdot[0], 0.0);  // as published
+  EXPECT_NEAR(cameras[0]->joints.qdot[0], 1.0, 1e-4);  // nobody publishes any
 }
 
 TEST_F(SynchroniserTest, VelocityIsPublishedOrFromDifferences) {
@@ -114,6 +114,28 @@ TEST_F(SynchroniserTest, VelocityIsPublishedOrFromDifferences) {
     ASSERT_TRUE(arrived);
     EXPECT_NEAR(arrived->observation.cameras[0]->joints.qdot[0], differences ? 1.0 : 5.0, 1e-6);
   }
+}
+
+TEST_F(SynchroniserTest, VelocitiesThatNobodyPublishesAreSlopesOfTheReadings) {
+  make(1, {});
+  constexpr float kStep = 0.0015F;  // of an encoder of 12 bits
+  const auto read = [&](int k, float velocity) {
+    sync_->add(
+        joints(10 * k * kMs, {{"arm", 0.01F * static_cast<float>(k)}, {"neck", k % 2 == 0 ? 0.0F : kStep}}, velocity));
+  };
+  for (int k = 0; k <= 20; ++k) read(k, 0.0F);
+  picture(0, 195 * kMs);
+  const auto moving = sync_->next();
+  ASSERT_TRUE(moving);
+  EXPECT_NEAR(moving->observation.cameras[0]->joints.qdot[0], 1.0, 1e-4);
+  EXPECT_EQ(moving->observation.cameras[0]->joints.qdot[1], 0.0);
+  // Who publishes some means the zeros, too.
+  read(21, 1.0F);
+  for (int k = 22; k <= 24; ++k) read(k, 0.0F);
+  picture(0, 235 * kMs);
+  const auto published = sync_->next();
+  ASSERT_TRUE(published);
+  EXPECT_EQ(published->observation.cameras[0]->joints.qdot[0], 0.0);
 }
 
 TEST_F(SynchroniserTest, WaitsForTheEncoderAfterThePicture) {

@@ -137,6 +137,16 @@ if(Python3_FOUND AND BODYSCHEMA_PROGRAMS)
     endforeach()
   endif()
 
+  # Skipped where PyPI's mujoco is not installed: BODYSCHEMA_MUJOCO names its environment.
+  if(TARGET lcmtypes_python)
+    add_test(NAME foreign_simulator.check
+      COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/foreign_simulator/foreign_simulator.py
+        check icub_right ${PROJECT_BINARY_DIR}/test-foreign-simulator --program $<TARGET_FILE:bodyschema>)
+    bodyschema_patient(timeout 120)
+    set_tests_properties(foreign_simulator.check PROPERTIES LABELS integration TIMEOUT ${timeout}
+      SKIP_RETURN_CODE 77 ENVIRONMENT PYTHONDONTWRITEBYTECODE=1)
+  endif()
+
   # Skipped where snakemake is not installed.
   add_test(NAME fleet.workflow
     COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/test/fleet/workflow.py

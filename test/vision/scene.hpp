@@ -42,6 +42,7 @@ struct Scene {
   double robot[3] = {200, 190, 180};  ///< robot colour, levels
   double ambient = 1.0;               ///< 1: flat; less: Lambert, lit from the lamp
   double lamp[3] = {0, 0, 1};         ///< unit vector towards it: right, down, to the camera
+  double rounding_px = 0;             ///< flat but for a rim as wide as this; 0: round all through
   double blur_px = 0.4;
   double noise_levels = 2.5;
   int channels = 3;
@@ -88,6 +89,7 @@ struct Scene {
     }
     double facing = lamp[2];
     if (top != nullptr) {
+      if (rounding_px > 0) depth = std::max(0.0, 1.0 + top->distance(u, v) / rounding_px);
       constexpr double kStep = 1e-3;  // the slope of the distance is the normal's direction
       const double nu = (top->distance(u + kStep, v) - top->distance(u - kStep, v)) / (2 * kStep);
       const double nv = (top->distance(u, v + kStep) - top->distance(u, v - kStep)) / (2 * kStep);

@@ -21,8 +21,8 @@ struct JointHistoryOptions {
   /// the noise of closely spaced samples) are a jump, across which nothing is interpolated either; after
   /// one to and one fro nothing is for 100 ms.
   double max_speed_rad_s = 20.0;
-  /// Where joint velocities come from: the messages, or the slope between the two neighbours, for
-  /// publishers that leave velocities at zero.
+  /// Where joint velocities come from: the messages, or the slope between the two neighbours. As long as no message has
+  /// a velocity other than zero, they are the slope over the last 100 ms.
   bool velocity_from_differences = false;
   /// Joints that move nothing that is seen or sees: whatever their readings do, they stand in nobody's way.
   std::set<std::string> idle_joints;
@@ -89,6 +89,7 @@ class JointHistory {
   Verdict interpolate(const Ring& ring, Microseconds utime, double& q, double& qdot) const;
   [[nodiscard]] bool may_hold(const Ring& ring, Verdict verdict, Microseconds utime) const;
   [[nodiscard]] bool too_far(double way_rad, const Sample& before, const Sample& after) const;
+  [[nodiscard]] double slope(const Ring& ring, std::size_t last) const;
   [[nodiscard]] bool is_restless(const Ring& ring, std::size_t last, Microseconds utime) const;
 
   std::vector<std::string> names_;
@@ -96,6 +97,7 @@ class JointHistory {
   JointHistoryOptions options_;
   std::vector<Ring> rings_;
   Microseconds newest_ = -1;
+  bool velocities_published_ = false;  ///< one that is not zero, by any joint
   /// Index of each name of the last message (-1: not ours), kept while the names stay the same.
   std::vector<std::string> mapped_names_;
   std::vector<Eigen::Index> mapping_;
