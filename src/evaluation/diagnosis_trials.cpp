@@ -82,11 +82,11 @@ class TrialRobot {
       : setup_(RobotSetup::from(simulated.section("robot"))), rig_(StereoRig::from(simulated.section("cameras"))),
         robot_(load_robot(setup_, rig_)), roles_(JointRoles::of(robot_, setup_, rig_)),
         settings_(simulator::SimulatorSettings::from(simulated.section("simulator"))),
-        pictures_{std::move(diagnosed), settings_, kPictures, false}, of_masks_{std::move(of_masks), settings_, kMasks,
-                                                                                true},
+        pictures_{std::move(diagnosed), settings_, kPictures, false}, of_masks_{std::move(of_masks), settings_,
+                                                                                masks ? kMasks : kSizing, true},
         kind_(masks ? of_masks_ : pictures_) {
     pictures_.settings.camera_rate_hz = kPictures.rate_hz;
-    of_masks_.settings.camera_rate_hz = kMasks.rate_hz;
+    of_masks_.settings.camera_rate_hz = of_masks_.size.rate_hz;
     constexpr double kOutline_px = 0.3;
     of_masks_.settings.outline_noise.sd_px = kOutline_px;
     of_masks_.settings.background_frames = of_masks_.settings.entry_frames = 0;

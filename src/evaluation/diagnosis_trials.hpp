@@ -17,6 +17,8 @@ struct LogSize {
   double seconds, rate_hz;
 };
 inline constexpr LogSize kPictures = {60.0, 10.0}, kMasks = {40.0, 5.0};
+/// On which a fault is scaled before it is hidden in pictures; what it is worth is measured on these again.
+inline constexpr LogSize kSizing = {40.0, 2.5};
 /// A cause of this size is one that a user wants to know; those at the limit have a quarter to a half of it.
 inline constexpr double kMatters_mm = 2.0, kMatters_px = 1.0;
 
