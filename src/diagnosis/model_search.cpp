@@ -101,6 +101,10 @@ void ModelSearch::measure_noise() {
 }
 
 double ModelSearch::fit(State& state, double from_px) {
+  return fit(state, from_px, raster_);
+}
+
+double ModelSearch::fit(State& state, double from_px, std::span<const std::size_t> pictures) {
   double variance = 0.0;
   for (const auto& noise : noise_) variance += noise.variance_px2() / static_cast<double>(noise_.size());
   return fit_.fit(state,
@@ -110,22 +114,25 @@ double ModelSearch::fit(State& state, double from_px) {
                    .robust_px = search().robust_px,
                    .spacing_px = options_.spacing_px,
                    .variance_px2 = variance},
-                  raster_);
+                  pictures);
 }
 
 void ModelSearch::start() {
   auto starts = options_.starts;
   starts.insert(starts.begin(), state_.x());
   std::optional<State> best;
+  // The way from afar needs no more postures than tell the way; where it ends all have their say.
+  const auto some = raster_of(fit_.log(), std::min(options_.most_pictures, limits::kPicturesFromAfar));
   for (const auto& x : starts) {
     State state(fit_.log().roles(), beliefs_);
     state.set(x);
-    const double cost = fit(state, limits::kFrom_px);
+    const double cost = fit(state, limits::kFrom_px, some);
     if (best && cost >= cost_) continue;
     cost_ = cost;
     best = std::move(state);
   }
   state_ = std::move(*best);
+  if (some.size() < raster_.size()) fit(state_, 0.0);
   measure_noise();
   cost_ = fit(state_, 0.0);
   measure_noise();

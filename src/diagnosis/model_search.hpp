@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -97,6 +98,7 @@ class ModelSearch {
   /// About the present model, all pictures; not anew while that stays what it is.
   std::shared_ptr<const LinearLog> linearised(std::span<const std::uint32_t> coordinates);
   double fit(State& state, double from_px);
+  double fit(State& state, double from_px, std::span<const std::size_t> pictures);
   void measure_noise();
 
   LogFit& fit_;
