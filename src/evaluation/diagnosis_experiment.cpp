@@ -113,14 +113,6 @@ double noise_of(const std::vector<Record>& outcomes, bool official) {
   return quantile(noise.empty() ? any : noise, kMedian);
 }
 
-void add_time(ExperimentContext& context, const std::vector<double>& took_s) {
-  if (took_s.empty()) return;
-  const double all_s = std::accumulate(took_s.begin(), took_s.end(), 0.0);
-  context.summary["seconds_a_log"] = all_s / static_cast<double>(took_s.size());
-  context.table += fmt::format("\n{} logs, {:.1f} s of processor time each on average\n", took_s.size(),
-                               all_s / static_cast<double>(took_s.size()));
-}
-
 }  // namespace
 
 void run_diagnosis(ExperimentContext& context) {
@@ -179,7 +171,11 @@ void run_diagnosis(ExperimentContext& context) {
     context.table += fmt::format("{:<44} {:>6.2f}\n", widths, inside(widths));
     context.summary["reliability"].push_back({{"widths", widths}, {"holds", inside(widths)}});
   }
-  add_time(context, took_s);
+  if (took_s.empty()) return;
+  const double all_s = std::accumulate(took_s.begin(), took_s.end(), 0.0);
+  context.summary["seconds_a_log"] = all_s / static_cast<double>(took_s.size());
+  context.table += fmt::format("\n{} logs, {:.1f} s of processor time each on average\n", took_s.size(),
+                               all_s / static_cast<double>(took_s.size()));
 }
 
 }  // namespace bodyschema
