@@ -39,6 +39,13 @@ void add_evaluate(CLI::App& app) {
   command->add_flag(
       "--masks", a->options.masks,
       "diagnosis: logs of masks with noisy outlines, 40 s at 5 Hz, instead of pictures; five times as fast");
+  command
+      ->add_option("--minutes", a->options.minutes,
+                   "diagnosis: begin no further log after so many, and sum up what is done; 0: run all")
+      ->check(number_in(0, 100000));
+  command->add_flag("--resume", a->options.resume,
+                    "diagnosis: keep the logs that trials.jsonl in --out has of the same seed, as after a run that was "
+                    "stopped");
   command->add_option("--rows", a->options.rows, "Of `everyday`, `honesty` and `real`, these rows only");
   command->add_option("--seconds", a->options.everyday_s, "Of `everyday`, length of a log, s")
       ->capture_default_str()

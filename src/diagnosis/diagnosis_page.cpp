@@ -7,6 +7,7 @@
 #include <numeric>
 #include <spdlog/fmt/fmt.h>
 
+#include "bodyschema/core/rounded.hpp"
 #include "residual_curve.hpp"
 
 namespace bodyschema {
@@ -117,7 +118,12 @@ class Page {
 
   static std::string interval(const DiagnosedParameter& p) {
     if (!std::isfinite(p.ci95[0]) || !std::isfinite(p.ci95[1])) return "not known";
-    return fmt::format("{:.3g} to {:.3g}", p.ci95[0], p.ci95[1]);
+    const auto told = rounded(p.estimate, p.ci95[0], p.ci95[1]);
+    return told.low + " to " + told.high;
+  }
+
+  static std::string size(const DiagnosedParameter& p) {
+    return std::isfinite(p.ci95[0]) ? rounded(p.estimate, p.ci95[0], p.ci95[1]).value : roughly(p.estimate);
   }
 
   void causes() {
@@ -136,7 +142,7 @@ class Page {
         const auto& p = cause.parameters[i];
         const auto when = p.when(d_.begin_utime);
         rows.push_back({i == 0 ? name : "", p.parameter + (when.empty() ? "" : ", " + when),
-                        fmt::format("{:.3g}{}", p.estimate, p.unit == "1" ? "" : " " + p.unit), interval(p),
+                        size(p) + (p.unit == "1" ? "" : " " + p.unit), interval(p),
                         i == 0 ? fmt::format("{:.1f}", cause.z) : "",
                         i == 0 ? fmt::format("{:.1f} %", 100 * cause.heldout_gain) : ""});
       }

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "bodyschema/core/order_statistics.hpp"
+#include "bodyschema/core/rounded.hpp"
 #include "bodyschema/core/write_file.hpp"
 #include "bodyschema/evidence/distributions.hpp"
 #include "bodyschema/report/report.hpp"
@@ -45,8 +46,9 @@ const DiagnosedCause* said_of(const DiagnosisReport& report, const CauseName& na
 std::string text_of(const DiagnosedCause& cause) {
   std::string text;
   for (const auto& p : cause.parameters) {
-    text += fmt::format("{}{} {:.3g} {} ({:.3g} to {:.3g})", text.empty() ? "" : ", ", p.parameter, p.estimate, p.unit,
-                        p.ci95[0], p.ci95[1]);
+    const auto told = rounded(p.estimate, p.ci95[0], p.ci95[1]);
+    text += fmt::format("{}{} {} {} ({} to {})", text.empty() ? "" : ", ", p.parameter, told.value, p.unit, told.low,
+                        told.high);
   }
   return text;
 }

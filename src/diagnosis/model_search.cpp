@@ -50,6 +50,20 @@ std::optional<LostPart> lost_part(const LinearLog& at) {
   return part;
 }
 
+/// Whether two models say the same of every picture.
+bool are_same(const ErrorModel& a, const ErrorModel& b) {
+  if (a.size() != b.size()) return false;
+  for (std::size_t e = 0; e < a.size(); ++e) {
+    if (a[e].name() != b[e].name() || a[e].target() != b[e].target()) return false;
+    const auto own = a[e].parameters(), other = b[e].parameters();
+    if (!std::equal(own.begin(), own.end(), other.begin(), other.end(),
+                    [](const auto& p, const auto& q) { return p.value == q.value; })) {
+      return false;
+    }
+  }
+  return true;
+}
+
 /// Every n-th observation, so that at most so many pictures are looked at.
 std::vector<std::size_t> raster_of(const PictureLog& log, std::size_t most) {
   const auto pictures = log.pictures();
@@ -87,6 +101,10 @@ void ModelSearch::measure_noise() {
 }
 
 double ModelSearch::fit(State& state, double from_px) {
+  return fit(state, from_px, raster_);
+}
+
+double ModelSearch::fit(State& state, double from_px, std::span<const std::size_t> pictures) {
   double variance = 0.0;
   for (const auto& noise : noise_) variance += noise.variance_px2() / static_cast<double>(noise_.size());
   return fit_.fit(state,
@@ -96,22 +114,25 @@ double ModelSearch::fit(State& state, double from_px) {
                    .robust_px = search().robust_px,
                    .spacing_px = options_.spacing_px,
                    .variance_px2 = variance},
-                  raster_);
+                  pictures);
 }
 
 void ModelSearch::start() {
   auto starts = options_.starts;
   starts.insert(starts.begin(), state_.x());
   std::optional<State> best;
+  // The way from afar needs no more postures than tell the way; where it ends all have their say.
+  const auto some = raster_of(fit_.log(), std::min(options_.most_pictures, limits::kPicturesFromAfar));
   for (const auto& x : starts) {
     State state(fit_.log().roles(), beliefs_);
     state.set(x);
-    const double cost = fit(state, limits::kFrom_px);
+    const double cost = fit(state, limits::kFrom_px, some);
     if (best && cost >= cost_) continue;
     cost_ = cost;
     best = std::move(state);
   }
   state_ = std::move(*best);
+  if (some.size() < raster_.size()) fit(state_, 0.0);
   measure_noise();
   cost_ = fit(state_, 0.0);
   measure_noise();
@@ -223,11 +244,21 @@ std::vector<Eigen::Index> ModelSearch::columns_of(std::size_t cause) const {
   return list;
 }
 
+std::shared_ptr<const LinearLog> ModelSearch::linearised(std::span<const std::uint32_t> coordinates) {
+  const auto how = search();
+  const auto& model = state_.model();
+  if (!last_ || !are_same(last_->model, model) || last_->robust_px != how.robust_px) {
+    last_.reset();  // before the next one needs room
+    last_.emplace(
+        Linearised{model, how.robust_px, std::make_shared<const LinearLog>(fit_.linearise(model, coordinates, how))});
+  }
+  return last_->at;
+}
+
 LogAbout ModelSearch::about(double block_s) {
   std::vector<std::uint32_t> all(static_cast<std::size_t>(fit_.coordinates().size()));
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint32_t>(i);
-  LogAbout log(state_,
-               given_ ? given_ : std::make_shared<const LinearLog>(fit_.linearise(state_.model(), all, search())));
+  LogAbout log(state_, given_ ? given_ : linearised(all));
   log.base = fit_.directions(log.at, state_.model(), state_.refs());
   add_causes(log);
   add_considered(log);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -94,7 +95,10 @@ class ModelSearch {
   void add_causes(LogAbout& log) const;
   void add_considered(LogAbout& log) const;
   void group_blocks(LogAbout& log) const;
+  /// About the present model, all pictures; not anew while that stays what it is.
+  std::shared_ptr<const LinearLog> linearised(std::span<const std::uint32_t> coordinates);
   double fit(State& state, double from_px);
+  double fit(State& state, double from_px, std::span<const std::size_t> pictures);
   void measure_noise();
 
   LogFit& fit_;
@@ -106,6 +110,12 @@ class ModelSearch {
   std::vector<FoundCause> causes_;
   std::vector<OutlineNoise> noise_;
   double cost_ = 0.0;
+  struct Linearised {
+    ErrorModel model;
+    double robust_px = 0.0;
+    std::shared_ptr<const LinearLog> at;
+  };
+  std::optional<Linearised> last_;
 };
 
 }  // namespace bodyschema::diagnosis

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "bodyschema/core/rounded.hpp"
 #include "limits.hpp"
 
 namespace bodyschema::diagnosis {
@@ -18,10 +19,11 @@ namespace {
 std::string amount_text(const DiagnosedParameter& p) {
   const std::string unit = p.unit == "1" ? "" : p.unit == "%" ? " %" : " " + p.unit;
   double low = p.ci95[0], high = p.ci95[1];
-  if (!std::isfinite(low)) return fmt::format("roughly {:.3g}{}", std::abs(p.estimate), unit);
+  if (!std::isfinite(low)) return "roughly " + roughly(std::abs(p.estimate)) + unit;
   if (p.estimate < 0.0) std::tie(low, high) = std::pair(-high, -low);
-  if (low < 0.0) return fmt::format("{:.3g}{} (at most {:.3g})", std::abs(p.estimate), unit, high);
-  return fmt::format("{:.3g}{} ({:.3g} to {:.3g})", std::abs(p.estimate), unit, low, high);
+  const auto told = rounded(std::abs(p.estimate), low, high);
+  if (low < 0.0) return fmt::format("{}{} (at most {})", told.value, unit, told.high);
+  return fmt::format("{}{} ({} to {})", told.value, unit, told.low, told.high);
 }
 
 std::string capitalised(std::string text) {

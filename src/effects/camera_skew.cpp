@@ -3,8 +3,8 @@
 
 namespace bodyschema::effects {
 
-/// The right picture is taken later than the left one although their stamps agree; second order in time
-/// as latency is.
+/// The right picture is taken later than the left one although their stamps agree; along the arm's path, as latency
+/// is.
 EffectKind camera_skew() {
   return {
       .name = "camera_skew",
@@ -13,8 +13,7 @@ EffectKind camera_skew() {
           "camera_skew", {in_ms("skew", 20.0)},
           [](Parameters p, const Instant& at, Corrections& c) {
             if (at.camera != 1) return;
-            c.dq.noalias() += p[0].value * at.qdot;
-            c.dq.noalias() += 0.5 * p[0].value * p[0].value * at.qddot;
+            at.add_motion(p[0].value, c.dq);
           },
           Follows::kMotion),
       .sentence = in_words(

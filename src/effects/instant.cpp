@@ -1,6 +1,31 @@
 #include "bodyschema/effects/instant.hpp"
 
+#include <algorithm>
+#include <cmath>
+
+#include "bodyschema/observation/joint_motion.hpp"
+
 namespace bodyschema {
+
+void Instant::add_motion(double after_s, Eigen::VectorXd& dq) const {
+  if (after_s == 0.0) return;
+  const double place = after_s / kPathStep_s + static_cast<double>(kPathSteps);
+  const bool within = path.cols() == 2 * kPathSteps + 1 && place >= 0.0 && place <= 2.0 * kPathSteps;
+  // The cubic through four points of the path.
+  const auto first =
+      std::clamp<Eigen::Index>(static_cast<Eigen::Index>(std::floor(within ? place : 0.0)) - 1, 0, 2 * kPathSteps - 3);
+  const double t = place - static_cast<double>(first);
+  const double weight[] = {-(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0, t * (t - 2.0) * (t - 3.0) / 2.0,
+                           -t * (t - 1.0) * (t - 3.0) / 2.0, t * (t - 1.0) * (t - 2.0) / 6.0};
+  for (Eigen::Index j = 0; j < dq.size(); ++j) {
+    double moved = std::nan("");
+    if (within && j < path.rows()) {
+      moved = 0.0;
+      for (Eigen::Index k = 0; k < 4; ++k) moved += weight[k] * path(j, first + k);
+    }
+    dq[j] += std::isfinite(moved) ? moved : after_s * qdot[j] + 0.5 * after_s * after_s * qddot[j];
+  }
+}
 
 InstantBuilder::InstantBuilder(std::shared_ptr<const RobotModel> model, const std::string& hand_link,
                                const Eigen::Vector3d& gravity_W)

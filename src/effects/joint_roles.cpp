@@ -129,8 +129,12 @@ class ArmAnatomy {
       if (length < kApart_m) continue;
       const Eigen::Vector3d direction = along / length;
       const auto& name = info(joint).parent_link;
-      const bool listed = std::any_of(list.begin(), list.end(), [&](const ArmLink& l) { return l.joint == before; });
+      // A short step aside to the joint that turns a link is no length of that link: what lies aside is its axis.
+      const bool listed = std::any_of(list.begin(), list.end(), [&](const ArmLink& l) {
+        return l.joint == before && l.per_metre.along_m > kAbout;
+      });
       if (!listed && joint_before(before) >= 0 && direction.dot(corrected_.shift_axis(before, 0)) > kAbout) {
+        std::erase_if(list, [&](const ArmLink& l) { return l.joint == before; });
         list.push_back({name, before, length, {.along_m = 1.0}, true});
       }
       JointAdjustment step;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
-#include "bodyschema/core/write_file.hpp"
 #include "diagnosis_trials.hpp"
 
 /// How often the diagnosis is right, on logs of rendered pictures in which the simulator's physics hides faults. Faults
@@ -24,21 +24,12 @@ struct Sizes {
   int right_sign = 0;
 };
 
-void add_size(const Outcome& o, Sizes& sizes) {
-  if (!is_named(o)) return;
-  for (std::size_t f = 0; f < o.faults.size(); ++f) {
-    const auto& fault = o.faults[f];
-    for (const auto& cause : o.report.causes) {
-      const auto& answers = o.answers[f];
-      const bool right = std::find(answers.begin(), answers.end(), cause.cause) != answers.end();
-      // Millimetres of a cover are not the pixels of its outline.
-      if (!right || cause.cause.name != fault.name || cause.parameters.size() != 1 || fault.value() == 0.0) continue;
-      const auto& p = cause.parameters.front();
-      const double off = std::abs(p.estimate - fault.value());
-      sizes.error.push_back(off / std::abs(fault.value()));
-      sizes.ratio.push_back(off / std::max(1e-12, 0.5 * (p.ci95[1] - p.ci95[0])));
-      sizes.right_sign += p.estimate * fault.value() > 0.0;
-    }
+void add_size(const Record& o, Sizes& sizes) {
+  for (const auto& size : o.sizes) {
+    const double off = std::abs(size.estimate - size.truth);
+    sizes.error.push_back(off / std::abs(size.truth));
+    sizes.ratio.push_back(off / std::max(1e-12, 0.5 * size.width));
+    sizes.right_sign += size.estimate * size.truth > 0.0;
   }
 }
 
@@ -73,26 +64,36 @@ class Table {
   ExperimentContext& context_;
 };
 
+/// The first of its faults.
+bool in_class(const Record& o) {
+  return o.found.at(0);
+}
+bool first_right(const Record& o) {
+  return o.first;
+}
+bool any_wrong(const Record& o) {
+  return o.wrong;
+}
+
 template <class Test>
-double rate(const std::vector<const Outcome*>& outcomes, Test test) {
+double rate(const std::vector<const Record*>& outcomes, Test test) {
   if (outcomes.empty()) return std::nan("");
-  const auto hits = std::count_if(outcomes.begin(), outcomes.end(), [&](const Outcome* o) { return test(*o); });
+  const auto hits = std::count_if(outcomes.begin(), outcomes.end(), [&](const Record* o) { return test(*o); });
   return static_cast<double>(hits) / static_cast<double>(outcomes.size());
 }
 
-void add_curve(ExperimentContext& context, const std::vector<const Outcome*>& single) {
+void add_curve(ExperimentContext& context, const std::vector<const Record*>& single) {
   // By the larger of mm at the hand over 2 mm and px of outline over 1 px.
   constexpr std::array<double, 7> kEdges = {0.0, 0.125, 0.25, 0.5, 1.0, 2.0, 1e9};
   context.table += fmt::format("\n{:<44} {:>6} {:>9} {:>9} {:>9}\n", "size, of what matters (2 mm or 1 px)", "logs",
                                "first", "in class", "wrong");
   for (std::size_t i = 0; i + 1 < kEdges.size(); ++i) {
-    std::vector<const Outcome*> in;
+    std::vector<const Record*> in;
     for (const auto* o : single) {
       if (o->size() >= kEdges[i] && o->size() < kEdges[i + 1]) in.push_back(o);
     }
     if (in.empty()) continue;
-    const double first = rate(in, is_first), off = rate(in, is_wrong);
-    const double named = rate(in, [](const Outcome& o) { return is_found(o, 0); });
+    const double first = rate(in, first_right), off = rate(in, any_wrong), named = rate(in, in_class);
     const auto label =
         kEdges[i + 1] < 1e8 ? fmt::format("{} to {}", kEdges[i], kEdges[i + 1]) : fmt::format("{} and more", kEdges[i]);
     context.table += fmt::format("{:<44} {:>6} {:>9.2f} {:>9.2f} {:>9.2f}\n", label, in.size(), first, named, off);
@@ -101,35 +102,8 @@ void add_curve(ExperimentContext& context, const std::vector<const Outcome*>& si
   }
 }
 
-bool names_a_large_gain(const Outcome& o) {
-  constexpr double kLarge = 0.05;
-  return is_named(o) && std::any_of(o.report.causes.begin(), o.report.causes.end(),
-                                    [](const DiagnosedCause& c) { return c.heldout_gain > kLarge; });
-}
-
-Json json_of(const Outcome& o) {
-  Json faults = Json::array(), answer = Json::array();
-  for (const auto& fault : o.faults) faults.push_back(fault.text());
-  for (const auto& c : o.report.causes) {
-    Json names = Json::array();
-    for (const auto& name : c.same) names.push_back(name.text());
-    answer.push_back({{"sentence", c.sentence}, {"class", names}, {"z", c.z}, {"gain", c.heldout_gain}});
-  }
-  return {{"row", kNames[o.row]},
-          {"seed", o.seed},
-          {"robot", o.official ? "official iCub" : "own"},
-          {"faults", faults},
-          {"verdict", o.report.verdict},
-          {"sentence", o.report.sentence},
-          {"answer", answer},
-          {"size_mm", o.size_mm},
-          {"size_px", o.size_px},
-          {"left_mm", o.left_mm},
-          {"left_px", o.report.after.rms_px}};
-}
-
 /// What healthy logs of one of the robots leave, px: median.
-double noise_of(const std::vector<Outcome>& outcomes, bool official) {
+double noise_of(const std::vector<Record>& outcomes, bool official) {
   std::vector<double> noise, any;
   for (const auto& o : outcomes) {
     if (o.row != kNull) continue;
@@ -142,41 +116,41 @@ double noise_of(const std::vector<Outcome>& outcomes, bool official) {
 }  // namespace
 
 void run_diagnosis(ExperimentContext& context) {
-  auto outcomes = run(context);
+  std::vector<Record> outcomes;
+  for (const auto& line : run(context)) outcomes.push_back(record_of(line));
   const std::array<double, 2> noise_px = {noise_of(outcomes, false), noise_of(outcomes, true)};
-  std::array<std::vector<const Outcome*>, kRows> rows;
-  std::vector<const Outcome*> single, limit;
+  std::array<std::vector<const Record*>, kRows> rows;
+  std::vector<const Record*> single, limit;
   Sizes sizes;
-  std::vector<double> gain;
-  std::string lines;
+  std::vector<double> gain, took_s;
   for (auto& o : outcomes) {
     const double noise = noise_px[o.official];
     o.size_px = std::sqrt(std::max(0.0, o.size_px * o.size_px - noise * noise));
     rows[o.row].push_back(&o);
-    lines += json_of(o).dump() + '\n';
+    took_s.push_back(o.seconds);
     if (o.row == kSingle && o.size() >= 1.0) single.push_back(&o);
     if (o.row == kSingle && o.size() >= 0.25 && o.size() < 0.5) limit.push_back(&o);
     if (o.row == kSingle || o.row == kTwo) add_size(o, sizes);
     if (o.row == kSingle && o.size() >= 1.0 && o.size_mm > 0.0) gain.push_back(o.size_mm / std::max(1e-6, o.left_mm));
   }
-  replace_file(context.options.out / "trials.jsonl", lines);
 
   Table table(context);
-  const auto found = [](const Outcome& o) { return is_found(o, 0); };
-  table.add("null", "false_alarm_rate", rows[kNull].size(), rate(rows[kNull], is_named), 0.04, true);
+  table.add("null", "false_alarm_rate", rows[kNull].size(), rate(rows[kNull], [](const Record& o) { return o.named; }),
+            0.04, true);
   // Small errors of nine kinds at once: none of them stands for the rest.
-  table.add("background", "named_large_rate", rows[kBackground].size(), rate(rows[kBackground], names_a_large_gain),
-            0.05, true);
-  table.add("single", "in_class_rate", single.size(), rate(single, found), 0.95, false);
-  table.add("single", "first_rate", single.size(), rate(single, is_first), 0.88, false);
-  table.add("single", "wrong_rate", single.size(), rate(single, is_wrong), 0.02, true);
-  table.add("limit", "wrong_rate", limit.size(), rate(limit, is_wrong), 0.05, true);
+  table.add("background", "named_large_rate", rows[kBackground].size(),
+            rate(rows[kBackground], [](const Record& o) { return o.large_gain; }), 0.05, true);
+  table.add("single", "in_class_rate", single.size(), rate(single, in_class), 0.95, false);
+  table.add("single", "first_rate", single.size(), rate(single, first_right), 0.88, false);
+  table.add("single", "wrong_rate", single.size(), rate(single, any_wrong), 0.02, true);
+  table.add("limit", "wrong_rate", limit.size(), rate(limit, any_wrong), 0.05, true);
   table.add("two", "both_rate", rows[kTwo].size(),
-            rate(rows[kTwo], [](const Outcome& o) { return is_found(o, 0) && is_found(o, 1); }), 0.88, false);
-  table.add("outside", "unexplained_rate", rows[kOutside].size(), rate(rows[kOutside], is_not_explained_away), 0.90,
-            false);
+            rate(rows[kTwo], [](const Record& o) { return o.found.at(0) && o.found.at(1); }), 0.88, false);
+  table.add("two", "wrong_rate", rows[kTwo].size(), rate(rows[kTwo], any_wrong), 0.02, true);
+  table.add("outside", "unexplained_rate", rows[kOutside].size(),
+            rate(rows[kOutside], [](const Record& o) { return o.not_explained_away; }), 0.90, false);
   table.add("outside", "none_rate", rows[kOutside].size(),
-            rate(rows[kOutside], [](const Outcome& o) { return o.report.verdict == "none"; }), 0.0, true);
+            rate(rows[kOutside], [](const Record& o) { return o.verdict == "none"; }), 0.0, true);
   const auto inside = [&](double widths) {
     if (sizes.ratio.empty()) return std::nan("");
     return static_cast<double>(
@@ -197,6 +171,11 @@ void run_diagnosis(ExperimentContext& context) {
     context.table += fmt::format("{:<44} {:>6.2f}\n", widths, inside(widths));
     context.summary["reliability"].push_back({{"widths", widths}, {"holds", inside(widths)}});
   }
+  if (took_s.empty()) return;
+  const double all_s = std::accumulate(took_s.begin(), took_s.end(), 0.0);
+  context.summary["seconds_a_log"] = all_s / static_cast<double>(took_s.size());
+  context.table += fmt::format("\n{} logs, {:.1f} s of processor time each on average\n", took_s.size(),
+                               all_s / static_cast<double>(took_s.size()));
 }
 
 }  // namespace bodyschema

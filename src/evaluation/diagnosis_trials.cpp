@@ -1,11 +1,14 @@
 #include "diagnosis_trials.hpp"
 
 #include <spdlog/fmt/fmt.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
+#include <fstream>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -14,6 +17,7 @@
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
+#include "bodyschema/core/write_file.hpp"
 #include "bodyschema/diagnosis/log_diagnosis.hpp"
 #include "bodyschema/simulator/random.hpp"
 #include "bodyschema/simulator/recording.hpp"
@@ -37,6 +41,7 @@ constexpr std::array<Drawn, 9> kCoversAndCameras = {{{"mesh_scale:part=hand", 2.
                                                      {"held:thing=bottle", 0.0},
                                                      {"held:thing=box", 0.0}}};
 constexpr double kShareOfCoversAndCameras = 0.25;
+constexpr const char* kRefused = "refused";
 
 std::string argument(const FaultSpec& fault, const char* key) {
   const auto at = fault.arguments.find(key);
@@ -45,6 +50,13 @@ std::string argument(const FaultSpec& fault, const char* key) {
 
 bool among(const RightAnswers& answers, const CauseName& cause) {
   return std::find(answers.begin(), answers.end(), cause) != answers.end();
+}
+
+/// Of this thread, s: other logs run beside it.
+double processor_s() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 bool is_held(const FaultSpec& fault) {
@@ -70,11 +82,11 @@ class TrialRobot {
       : setup_(RobotSetup::from(simulated.section("robot"))), rig_(StereoRig::from(simulated.section("cameras"))),
         robot_(load_robot(setup_, rig_)), roles_(JointRoles::of(robot_, setup_, rig_)),
         settings_(simulator::SimulatorSettings::from(simulated.section("simulator"))),
-        pictures_{std::move(diagnosed), settings_, kPictures, false}, of_masks_{std::move(of_masks), settings_, kMasks,
-                                                                                true},
+        pictures_{std::move(diagnosed), settings_, kPictures, false}, of_masks_{std::move(of_masks), settings_,
+                                                                                masks ? kMasks : kSizing, true},
         kind_(masks ? of_masks_ : pictures_) {
     pictures_.settings.camera_rate_hz = kPictures.rate_hz;
-    of_masks_.settings.camera_rate_hz = kMasks.rate_hz;
+    of_masks_.settings.camera_rate_hz = of_masks_.size.rate_hz;
     constexpr double kOutline_px = 0.3;
     of_masks_.settings.outline_noise.sd_px = kOutline_px;
     of_masks_.settings.background_frames = of_masks_.settings.entry_frames = 0;
@@ -167,8 +179,9 @@ class TrialRobot {
       plan.faults = {fault};
       Outcome seen = outcome_of(of_masks_, plan, true);
       const auto beyond = [](double all, double noise) { return std::sqrt(std::max(0.0, all * all - noise * noise)); };
-      const double size = std::max(beyond(seen.size_mm, healthy.size_mm) / kMatters_mm,
-                                   beyond(seen.size_px, healthy.size_px) / kMatters_px);
+      double size = std::max(beyond(seen.size_mm, healthy.size_mm) / kMatters_mm,
+                             beyond(seen.size_px, healthy.size_px) / kMatters_px);
+      if (seen.report.verdict == kRefused) size = 2.0 * wanted;  // too gross for any answer
       const double factor = std::min(wanted / std::max(size, wanted / kMost), kMost * begin / std::abs(fault.value()));
       if (factor < kNear && factor > 1.0 / kNear) break;
       FaultSpec scaled = fault;
@@ -219,7 +232,9 @@ Outcome TrialRobot::outcome_of(const Kind& kind, simulator::SimulationPlan plan,
   const auto file = fs::temp_directory_path() / fmt::format("bodyschema_{}_diagnosis_{}.log", getpid(), number++);
   plan.seconds = kind.size.seconds;
   if (kind.masks) plan.output = simulator::Output::kSilhouettes;
+  const double begin_s = processor_s();
   const auto truth = simulate(kind, {robot_, setup_, rig_, kind.settings, plan}, file);
+  const double simulated_s = processor_s();
   LogDiagnosisOptions options;
   options.log = file;
   options.picture_rate_hz = kind.size.rate_hz;
@@ -227,7 +242,14 @@ Outcome TrialRobot::outcome_of(const Kind& kind, simulator::SimulationPlan plan,
   options.quiet = true;
   options.fit_only = fit_only;
   Outcome outcome;
-  outcome.report = diagnose_log(kind.configuration, options);
+  try {
+    outcome.report = diagnose_log(kind.configuration, options);
+  } catch (const DataError& e) {
+    outcome.report.verdict = kRefused;  // an answer as well
+    outcome.report.sentence = e.what();
+  }
+  outcome.simulation_s = simulated_s - begin_s;
+  outcome.diagnosis_s = processor_s() - simulated_s;
   std::error_code error;
   fs::remove(file, error);
   outcome.size_mm = hand_error_mm(outcome.report, truth, &ResidualSample::before);
@@ -242,8 +264,11 @@ Outcome TrialRobot::run(Row row, std::uint64_t seed) const {
   plan.motion = simulator::Motion::kBabble;
   simulator::Random random(seed, "offsets");
   for (const auto& joint : setup_.estimated_joints) plan.offsets_deg[joint] = random.uniform(-7.0, 7.0);
+  const double begin_s = processor_s();
   plan.faults = draw(row, plan);
+  const double sizing_s = processor_s() - begin_s;
   Outcome outcome = outcome_of(kind_, plan, false);
+  outcome.sizing_s = sizing_s;
   outcome.row = row;
   outcome.seed = seed;
   outcome.faults = plan.faults;
@@ -279,8 +304,7 @@ std::vector<Drawn> covers_and_cameras(bool masks) {
   return shown;
 }
 
-double Outcome::size() const {
-  const bool held = std::any_of(faults.begin(), faults.end(), is_held);
+double Record::size() const {
   // No outline of the model shows a thing that is held: it is as large as it is.
   return held ? 1e3 : std::max(size_mm / kMatters_mm, size_px / kMatters_px);
 }
@@ -320,55 +344,218 @@ bool is_not_explained_away(const Outcome& o) {
   });
 }
 
-std::vector<Outcome> run(ExperimentContext& context) {
-  const auto estimator = context.recorded / "icub_right" / "estimator.yaml";
-  const TrialRobot own(context.simulated, Configuration::load(estimator),
-                       Configuration::load(estimator, with_masks({})), context.options.masks);
-  const auto official = official_robot(context);
-  constexpr long kEveryFourth = 4;
-  struct Job {
-    Row row;
-    std::uint64_t seed;
-    const TrialRobot* robot;
-  };
-  std::vector<Job> jobs;
-  for (int row = 0; row < kRows; ++row) {
-    const auto count =
-        std::max(1L, std::lround(kLogsOf60[static_cast<std::size_t>(row)] * context.options.trials / 60.0));
-    for (long i = 0; i < count; ++i) {
-      const bool other = official && i % kEveryFourth == kEveryFourth - 1;
-      jobs.push_back({static_cast<Row>(row),
-                      context.options.seed + 1000u * static_cast<std::uint64_t>(row) + static_cast<std::uint64_t>(i),
-                      other ? &*official : &own});
+namespace {
+
+bool names_a_large_gain(const Outcome& o) {
+  constexpr double kLarge = 0.05;
+  return is_named(o) && std::any_of(o.report.causes.begin(), o.report.causes.end(),
+                                    [](const DiagnosedCause& c) { return c.heldout_gain > kLarge; });
+}
+
+Json sizes_of(const Outcome& o) {
+  Json sizes = Json::array();
+  if (!is_named(o)) return sizes;
+  for (std::size_t f = 0; f < o.faults.size(); ++f) {
+    const auto& fault = o.faults[f];
+    for (const auto& cause : o.report.causes) {
+      // Millimetres of a cover are not the pixels of its outline.
+      if (!among(o.answers[f], cause.cause) || cause.cause.name != fault.name) continue;
+      if (cause.parameters.size() != 1 || fault.value() == 0.0) continue;
+      const auto& p = cause.parameters.front();
+      sizes.push_back({{"estimate", p.estimate}, {"width", p.ci95[1] - p.ci95[0]}, {"truth", fault.value()}});
     }
   }
-  std::vector<Outcome> outcomes(jobs.size());
+  return sizes;
+}
+
+struct Job {
+  Row row;
+  std::uint64_t seed;
+  bool official;
+  double turn;  ///< when it is run: rows take turns, so that of each as large a share is done
+};
+
+/// What tells a log from others, in its line.
+Json key_of(Row row, std::uint64_t seed, bool official, bool masks) {
+  return {{"row", kNames[row]},
+          {"seed", seed},
+          {"robot", official ? "official iCub" : "own"},
+          {"pictures", masks ? "masks" : "rendered"}};
+}
+
+std::vector<Job> jobs_of(const EvaluationOptions& options, bool has_official) {
+  constexpr long kEveryFourth = 4;
+  std::vector<Job> jobs;
+  for (int row = 0; row < kRows; ++row) {
+    const auto count = std::max(1L, std::lround(kLogsOf60[static_cast<std::size_t>(row)] * options.trials / 60.0));
+    for (long i = 0; i < count; ++i) {
+      jobs.push_back({static_cast<Row>(row),
+                      options.seed + 1000u * static_cast<std::uint64_t>(row) + static_cast<std::uint64_t>(i),
+                      has_official && i % kEveryFourth == kEveryFourth - 1,
+                      (static_cast<double>(i) + 0.5) / static_cast<double>(count)});
+    }
+  }
+  std::stable_sort(jobs.begin(), jobs.end(), [](const Job& a, const Job& b) { return a.turn < b.turn; });
+  return jobs;
+}
+
+/// Lines of a run before; the last one may be cut short.
+std::vector<Json> lines_of(const fs::path& file) {
+  std::vector<Json> lines;
+  std::ifstream in(file);
+  for (std::string text; std::getline(in, text);) {
+    auto line = Json::parse(text, nullptr, false);
+    if (line.is_object()) lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
+/// Lines in their jobs' places, written as they come.
+class Lines {
+ public:
+  Lines(const std::vector<Job>& jobs, const EvaluationOptions& options)
+      : file_(options.out / "trials.jsonl"), lines_(jobs.size()) {
+    std::vector<Json> before;
+    if (options.resume) before = lines_of(file_);
+    std::string text;
+    for (std::size_t i = 0; i < jobs.size(); ++i) {
+      const auto key = key_of(jobs[i].row, jobs[i].seed, jobs[i].official, options.masks);
+      const auto at = std::find_if(before.begin(), before.end(), [&](const Json& line) {
+        return std::all_of(key.items().begin(), key.items().end(), [&](const auto& item) {
+          return line.contains(item.key()) && line[item.key()] == item.value();
+        });
+      });
+      if (at == before.end()) continue;
+      lines_[i] = *at;
+      text += at->dump() + '\n';
+    }
+    replace_file(file_, text);
+    out_.open(file_, std::ios::app);
+  }
+  [[nodiscard]] bool has(std::size_t job) const { return !lines_[job].is_null(); }
+  void set(std::size_t job, Json line) {
+    out_ << line.dump() << '\n' << std::flush;
+    lines_[job] = std::move(line);
+  }
+  /// In the jobs' order, whoever was done first.
+  std::vector<Json> finish() {
+    out_.close();
+    std::erase_if(lines_, [](const Json& line) { return line.is_null(); });
+    std::string text;
+    for (const auto& line : lines_) text += line.dump() + '\n';
+    replace_file(file_, text);
+    return std::move(lines_);
+  }
+
+ private:
+  fs::path file_;
+  std::vector<Json> lines_;
+  std::ofstream out_;
+};
+
+}  // namespace
+
+Json line_of(const Outcome& o) {
+  Json faults = Json::array(), answer = Json::array(), found = Json::array();
+  for (std::size_t f = 0; f < o.faults.size(); ++f) {
+    faults.push_back(o.faults[f].text());
+    found.push_back(is_found(o, f));
+  }
+  for (const auto& c : o.report.causes) {
+    Json names = Json::array();
+    for (const auto& name : c.same) names.push_back(name.text());
+    answer.push_back({{"sentence", c.sentence}, {"class", names}, {"z", c.z}, {"gain", c.heldout_gain}});
+  }
+  Json line = key_of(o.row, o.seed, o.official, o.masks);
+  line.update({{"faults", faults},
+               {"verdict", o.report.verdict},
+               {"sentence", o.report.sentence},
+               {"found", found},
+               {"named", is_named(o)},
+               {"first", !o.faults.empty() && is_first(o)},
+               {"wrong", is_wrong(o)},
+               {"not_explained_away", !o.faults.empty() && is_not_explained_away(o)},
+               {"large_gain", names_a_large_gain(o)},
+               {"held", std::any_of(o.faults.begin(), o.faults.end(), is_held)},
+               {"answer", answer},
+               {"sizes", sizes_of(o)},
+               {"size_mm", o.size_mm},
+               {"seen_px", o.size_px},
+               {"left_mm", o.left_mm},
+               {"left_px", o.report.after.rms_px},
+               {"seconds", o.sizing_s + o.simulation_s + o.diagnosis_s},
+               {"sizing_s", o.sizing_s},
+               {"simulation_s", o.simulation_s}});
+  return line;
+}
+
+Record record_of(const Json& line) {
+  Record r;
+  const auto name = line.at("row").get<std::string>();
+  r.row = static_cast<Row>(std::find(kNames.begin(), kNames.end(), name) - kNames.begin());
+  r.official = line.at("robot") == "official iCub";
+  r.named = line.at("named");
+  r.first = line.at("first");
+  r.wrong = line.at("wrong");
+  r.not_explained_away = line.at("not_explained_away");
+  r.large_gain = line.at("large_gain");
+  r.held = line.at("held");
+  for (const auto& found : line.at("found")) r.found.push_back(found.get<bool>());
+  r.verdict = line.at("verdict").get<std::string>();
+  r.size_mm = line.at("size_mm");
+  r.size_px = line.at("seen_px");
+  r.left_mm = line.at("left_mm");
+  r.seconds = line.at("seconds");
+  for (const auto& size : line.at("sizes"))
+    r.sizes.push_back({size.at("estimate"), size.at("width"), size.at("truth")});
+  return r;
+}
+
+std::vector<Json> run(ExperimentContext& context) {
+  const auto& options = context.options;
+  const auto estimator = context.recorded / "icub_right" / "estimator.yaml";
+  const TrialRobot own(context.simulated, Configuration::load(estimator),
+                       Configuration::load(estimator, with_masks({})), options.masks);
+  const auto official = official_robot(context);
+  const auto jobs = jobs_of(options, official.has_value());
+  Lines lines(jobs, options);
   ProgressBar bar("logs with hidden faults", jobs.size());
+  const auto begin = std::chrono::steady_clock::now();
+  const auto is_over = [&] {
+    const std::chrono::duration<double, std::ratio<60>> passed = std::chrono::steady_clock::now() - begin;
+    return options.minutes > 0.0 && passed.count() >= options.minutes;
+  };
   std::atomic<std::size_t> next{0}, done{0};
   std::mutex mutex;
   std::exception_ptr failure;
   const auto work = [&] {
-    for (std::size_t i; (i = next++) < jobs.size();) {
-      try {
-        outcomes[i] = jobs[i].robot->run(jobs[i].row, jobs[i].seed);
-        outcomes[i].official = jobs[i].robot != &own;
-      } catch (...) {
-        const std::scoped_lock lock(mutex);
-        failure = std::current_exception();
-        next = jobs.size();
+    for (std::size_t i; !is_over() && (i = next++) < jobs.size();) {
+      Json line;
+      if (!lines.has(i)) {
+        try {
+          auto outcome = (jobs[i].official ? *official : own).run(jobs[i].row, jobs[i].seed);
+          outcome.official = jobs[i].official;
+          outcome.masks = options.masks;
+          line = line_of(outcome);
+        } catch (...) {
+          const std::scoped_lock lock(mutex);
+          failure = std::current_exception();
+          next = jobs.size();
+        }
       }
       const std::scoped_lock lock(mutex);
+      if (!line.is_null()) lines.set(i, std::move(line));
       bar.set(++done);
     }
   };
-  const int wanted = context.options.threads > 0 ? context.options.threads
-                                                 : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  const int wanted =
+      options.threads > 0 ? options.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   std::vector<std::jthread> threads;
   for (int t = 1; t < wanted; ++t) threads.emplace_back(work);
   work();
   threads.clear();
   if (failure) std::rethrow_exception(failure);
-  return outcomes;
+  return lines.finish();
 }
 
 }  // namespace bodyschema::diagnosis_trials

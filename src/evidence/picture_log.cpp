@@ -32,7 +32,7 @@ void PictureLog::add(const Observation& observation) {
   for (std::size_t c = 0; c < observation.cameras.size() && c < rig_.cameras.size(); ++c) {
     const auto& seen = observation.cameras[c];
     if (!seen || seen->mask.empty()) continue;
-    Picture picture{seen->joints, {}, c, seen->mask, seen->valid, seen->coverage};
+    Picture picture{seen->joints, {}, {}, c, seen->mask, seen->valid, seen->coverage};
     picture.joints.utime = seen->utime;
     pictures.push_back(std::move(picture));
   }
@@ -100,6 +100,9 @@ void PictureLog::finish() {
     joint_motion(encoders_, picture.joints.utime, picture.joints.qdot, picture.qddot);
     picture.joints.qdot.conservativeResize(picture.joints.q.size());
     picture.qddot.conservativeResize(picture.joints.q.size());
+    // Of a picture whose path is known to its end nothing comes to light later.
+    const bool ends = picture.path.cols() > 0 && !picture.path.col(picture.path.cols() - 1).array().isNaN().all();
+    if (!ends) joint_path(encoders_, picture.joints.utime, picture.path);
   }
 }
 
@@ -112,6 +115,7 @@ ObservedEdges PictureLog::edges(std::size_t picture) const {
 void PictureLog::instant(std::size_t picture, const Eigen::Ref<const Eigen::VectorXd>& offsets, Instant& out) {
   instants_->build(pictures_[picture].joints, pictures_[picture].camera, offsets, out);
   out.qddot = pictures_[picture].qddot;
+  out.path = pictures_[picture].path;
 }
 
 }  // namespace bodyschema

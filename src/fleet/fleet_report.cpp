@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/core/rounded.hpp"
 #include "bodyschema/core/write_file.hpp"
 #include "bodyschema/evidence/distributions.hpp"
 #include "bodyschema/report/report.hpp"
@@ -236,9 +237,10 @@ std::string causes_text(const FleetLog& log) {
   std::vector<std::string> parts;
   for (const auto& cause : log.causes) {
     auto text = cause.name;
-    if (std::isfinite(cause.estimate)) text += fmt::format(": {:.3g} {}", cause.estimate, cause.unit);
+    const auto told = rounded(cause.estimate, cause.ci95[0], cause.ci95[1]);
+    if (std::isfinite(cause.estimate)) text += fmt::format(": {} {}", told.value, cause.unit);
     // What a diagnosis does not explain has none.
-    if (std::isfinite(cause.ci95[0])) text += fmt::format(" ({:.3g} to {:.3g})", cause.ci95[0], cause.ci95[1]);
+    if (std::isfinite(cause.ci95[0])) text += fmt::format(" ({} to {})", told.low, told.high);
     parts.push_back(std::move(text));
   }
   return fmt::format("{}", fmt::join(parts, "; "));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace bodyschema {
 namespace {
@@ -15,6 +16,9 @@ constexpr std::size_t kForParabola = 5;
 /// of a 12-bit encoder alone look like 11 deg/s^2, which is more than slow motion has; and what is made of
 /// the encoder's error seems to explain that error in the pictures.
 constexpr Microseconds kHalfForAcceleration = 150'000;
+/// Half the window of each point of a path. A coarse encoder's steps are as much of slow motion's speed, and what is
+/// noise in the speed makes a delay shorter than it is.
+constexpr Microseconds kHalfOfPath = 125'000;
 /// No arm changes its speed faster than this; on top come the steps of coarse encoders and of joints that
 /// are published in turns (the others then repeat their last value).
 constexpr double kMostAcceleration_rad_s2 = 50.0;
@@ -63,19 +67,25 @@ class Parabola {
     inverse_ = moments.inverse();
   }
 
+  /// Where the joint is at the instant.
+  [[nodiscard]] double position(Eigen::Index joint) const { return near_.front().q[joint] + fitted(joint)[0]; }
+
   struct Motion {
     double velocity = 0.0, acceleration = 0.0;
   };
   /// Still, for a joint that jumps.
   [[nodiscard]] Motion of(Eigen::Index joint) const {
     if (jumps(near_, joint)) return {};
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (const auto& sample : near_) sum += powers(sample) * (sample.q[joint] - near_.front().q[joint]);
-    const Eigen::Vector3d c = inverse_ * sum;
+    const Eigen::Vector3d c = fitted(joint);
     return {c[1] / unit_s_, terms_ == 3 ? 2.0 * c[2] / (unit_s_ * unit_s_) : 0.0};
   }
 
  private:
+  [[nodiscard]] Eigen::Vector3d fitted(Eigen::Index joint) const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const auto& sample : near_) sum += powers(sample) * (sample.q[joint] - near_.front().q[joint]);
+    return inverse_ * sum;
+  }
   [[nodiscard]] Eigen::Vector3d powers(const JointSample& sample) const {
     const double t = seconds(sample.utime - utime_) / unit_s_;
     return {1.0, t, terms_ == 3 ? t * t : 0.0};
@@ -110,6 +120,29 @@ void joint_motion(std::span<const JointSample> ordered, Microseconds utime, Eige
   const Microseconds half_wide = std::max(half, std::min(known, kHalfForAcceleration));
   const Parabola wide(window(ordered, utime, half_wide), utime);
   for (Eigen::Index j = 0; j < joints; ++j) qddot[j] = wide.of(j).acceleration;
+}
+
+void joint_path(std::span<const JointSample> ordered, Microseconds utime, Eigen::MatrixXd& path) {
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  const Eigen::Index joints = ordered.empty() ? 0 : ordered.front().q.size();
+  path.setConstant(joints, 2 * kPathSteps + 1, kUnknown);
+  if (joints == 0) return;
+  const Microseconds half = kHalfOfPath;
+  for (Eigen::Index step = -kPathSteps; step <= kPathSteps; ++step) {
+    const Microseconds at = utime + microseconds(static_cast<double>(step) * kPathStep_s);
+    if (at - half < ordered.front().utime || at + half > ordered.back().utime) continue;
+    const auto near = between(ordered, at - half, at + half);
+    if (near.size() < kForParabola) continue;
+    const Parabola parabola(near, at);
+    for (Eigen::Index j = 0; j < joints; ++j) path(j, kPathSteps + step) = parabola.position(j);
+  }
+  const Microseconds reach = half + microseconds(static_cast<double>(kPathSteps) * kPathStep_s);
+  const auto all = between(ordered, utime - reach, utime + reach);
+  const Eigen::VectorXd middle = path.col(kPathSteps);
+  for (Eigen::Index j = 0; j < joints; ++j) {
+    if (jumps(all, j)) path.row(j).setConstant(kUnknown);
+  }
+  path.colwise() -= middle;
 }
 
 }  // namespace bodyschema

@@ -15,8 +15,12 @@ namespace {
 constexpr double kNarrowestGap_px = 1.0;
 constexpr double kThinnestCover_px = 0.05;
 
-struct OutlineSegment {
+// What every line is asked about, apart from the rest: of a heavy mesh most segments cross none.
+struct SegmentEnds {
   Eigen::Vector2d from, to;  // px
+};
+
+struct OutlineSegment {
   Eigen::Vector3f from_C, to_C;
   int weight = 0;
   std::uint32_t part = 0;
@@ -49,16 +53,19 @@ struct ContourExtractor::Impl {
   const contour::Kernel& kernel;
   std::vector<std::uint32_t> found;
   std::vector<Eigen::Vector3f> vertices;
-  std::vector<OutlineSegment> segments;
+  std::vector<SegmentEnds> ends;
+  std::vector<OutlineSegment> segments;  // in the order of their ends
   std::vector<Crossing> crossings, by_line;
   std::vector<std::size_t> line_ends;  // of the crossings of a line, once they are sorted
   std::vector<ContourPoint> points;
 
   void collect(std::span<const Eigen::Isometry3f> X_CB, const contour::Camera& camera) {
+    ends.clear();
     segments.clear();
     const auto add = [&](const contour::Segment& s, std::uint32_t part) {
-      segments.push_back({camera.intrinsics.project(s.from_C.cast<double>()),
-                          camera.intrinsics.project(s.to_C.cast<double>()), s.from_C, s.to_C, s.weight, part, s.real});
+      ends.push_back(
+          {camera.intrinsics.project(s.from_C.cast<double>()), camera.intrinsics.project(s.to_C.cast<double>())});
+      segments.push_back({s.from_C, s.to_C, s.weight, part, s.real});
     };
     for (std::uint32_t p = 0; p < model.parts().size(); ++p) {
       const contour::Part& part = model.parts()[p];
@@ -79,12 +86,20 @@ struct ContourExtractor::Impl {
           constexpr std::int32_t kAhead = 12;
           if (i + kAhead < count) __builtin_prefetch(&run.ends[found[static_cast<std::size_t>(i + kAhead)] >> 1]);
           const std::uint32_t entry = found[static_cast<std::size_t>(i)];
-          const contour::EdgeEnds& ends = run.ends[entry >> 1];
+          const contour::EdgeEnds& edge = run.ends[entry >> 1];
           const int weight = (entry & 1u) != 0 ? run.weight : -run.weight;
-          add({in_camera(ends.from), in_camera(ends.to), weight, true}, p);
+          add({in_camera(edge.from), in_camera(edge.to), weight, true}, p);
         }
       }
     }
+  }
+
+  // The first line at or beyond a place in the picture: std::ceil, which is a call where the processor may be an old
+  // one.
+  static double first_line(double place) {
+    if (!(place > 0.0)) return 0.0;
+    const auto below = static_cast<double>(static_cast<std::int32_t>(place));
+    return below < place ? below + 1.0 : below;
   }
 
   // axis 0: lines of constant u, crossed by running along v; axis 1 the other way round.
@@ -93,19 +108,19 @@ struct ContourExtractor::Impl {
     const int size = axis == 0 ? k.width : k.height;
     const double last_line = std::floor((size - 1) / spacing);
     crossings.clear();
-    for (std::uint32_t s = 0; s < segments.size(); ++s) {
-      const OutlineSegment& segment = segments[s];
+    for (std::uint32_t s = 0; s < ends.size(); ++s) {
+      const SegmentEnds& segment = ends[s];
       const double a = segment.from[axis];
       const double b = segment.to[axis];
       const double low = std::min(a, b);
       const double high = std::max(a, b);
       if (!(high > 0.0) || !(low < size)) continue;
-      const double first = std::max(std::ceil(low / spacing), 0.0);
-      for (double line = first; line <= last_line && line * spacing < high; line += 1.0) {
+      for (double line = first_line(low / spacing); line <= last_line && line * spacing < high; line += 1.0) {
         const double t = (line * spacing - a) / (b - a);
+        const int weight = segments[s].weight;
         crossings.push_back({static_cast<std::int32_t>(line), s,
                              segment.from[other] + t * (segment.to[other] - segment.from[other]),
-                             a < b ? segment.weight : -segment.weight});
+                             a < b ? weight : -weight});
       }
     }
     sort_crossings(static_cast<std::size_t>(last_line) + 1);
@@ -158,12 +173,13 @@ struct ContourExtractor::Impl {
             double margin) {
     const OutlineSegment& segment = segments[crossing.segment];
     if (!segment.real) return;
-    const Eigen::Vector2d along = segment.to - segment.from;
+    const Eigen::Vector2d& from = ends[crossing.segment].from;
+    const Eigen::Vector2d along = ends[crossing.segment].to - from;
     const int other = 1 - axis;
     const double run = std::abs(along[axis]);
     const double rise = std::abs(along[other]);
     if (axis == 0 ? run < rise : run <= rise) return;  // the other family's
-    const double t = (crossing.line * spacing - segment.from[axis]) / along[axis];
+    const double t = (crossing.line * spacing - from[axis]) / along[axis];
     Eigen::Vector2d pixel;
     pixel[axis] = crossing.line * spacing;
     pixel[other] = crossing.at;

@@ -144,6 +144,15 @@ TEST(JointRoles, OfTheOfficialIcub) {
   for (const auto& name : fingers) EXPECT_EQ(name.find("_0_joint"), std::string::npos) << name;
   EXPECT_EQ(r.roles.neck.size(), 4u);
   EXPECT_TRUE(r.roles.has_pans());
+  // The joint that turns the forearm sits aside of the elbow, 37 deg off its own axis: a shorter forearm lies along
+  // that axis with its cover, and where nothing was called so it was taken for a shifted elbow.
+  std::vector<ArmLink> turned;
+  for (const auto& link : r.roles.links) {
+    if (name_of(r, link.joint) == "r_wrist_prosup") turned.push_back(link);
+  }
+  ASSERT_EQ(turned.size(), 1u);
+  EXPECT_EQ(turned.front().name, "r_forearm");
+  EXPECT_TRUE(turned.front().takes_cover);
 }
 
 /// The other arm's joints move what is drawn, and not the hand that is named; they are no fingers for that.

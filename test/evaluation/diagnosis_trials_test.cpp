@@ -59,7 +59,7 @@ TEST(DiagnosisTrials, WhatTheAnswerDoesNotStandBehindCountsForNothing) {
 TEST(DiagnosisTrials, AThingThatIsHeldIsFoundWhereSomethingIsSaidToBeThere) {
   auto o = outcome("held:thing=stick", {}, {});
   EXPECT_FALSE(is_found(o, 0));
-  EXPECT_GT(o.size(), 1.0);
+  EXPECT_GT(record_of(line_of(o)).size(), 1.0);
   o.report.verdict = "unexplained";
   o.report.not_in_model = "14 cm2 beside the robot";
   EXPECT_TRUE(is_first(o));
@@ -74,6 +74,26 @@ TEST(DiagnosisTrials, HeldThingsAreDrawnWherePicturesShowThem) {
   };
   EXPECT_EQ(held(true), 0);
   EXPECT_GT(held(false), 0);
+}
+
+/// A run that is stopped leaves lines; the tables are made of them alone.
+TEST(DiagnosisTrials, ALineHoldsWhatTheTablesAsk) {
+  auto cause = named(kLatency);
+  cause.parameters = {{.parameter = "delay", .unit = "ms", .estimate = 39.0, .ci95 = {37.0, 41.0}}};
+  auto o = outcome("latency:value=40", {kLatency}, {cause, named(kGain)});
+  o.official = true;
+  o.size_mm = 3.0;
+  o.size_px = 0.5;
+  const auto r = record_of(Json::parse(line_of(o).dump()));
+  EXPECT_EQ(r.row, kSingle);
+  EXPECT_TRUE(r.official && r.named && r.first && r.wrong && r.found.at(0));
+  EXPECT_FALSE(r.large_gain || r.held);
+  EXPECT_EQ(r.verdict, "named");
+  EXPECT_DOUBLE_EQ(r.size(), 1.5);
+  ASSERT_EQ(r.sizes.size(), 1u);
+  EXPECT_DOUBLE_EQ(r.sizes[0].estimate, 39.0);
+  EXPECT_DOUBLE_EQ(r.sizes[0].width, 4.0);
+  EXPECT_DOUBLE_EQ(r.sizes[0].truth, 40.0);
 }
 
 TEST(DiagnosisTrials, OutsideTheCatalogueTheJointIsEnough) {

@@ -24,6 +24,12 @@ struct Instant {
   Eigen::VectorXd gravity_torque;
   /// Torque on each joint of one kilogram at the hand's frame, Nm/kg. Empty without a hand link.
   Eigen::VectorXd payload_torque;
+  /// joint_path() about the instant, where samples after it are known, as in a log; else empty.
+  Eigen::MatrixXd path;
+
+  /// Adds to each joint where it is so much later (negative: earlier), against where it is at the instant: along its
+  /// path, and by velocity and acceleration where that is not known.
+  void add_motion(double after_s, Eigen::VectorXd& dq) const;
 };
 
 /// Fills in the torques of an Instant. One per thread.

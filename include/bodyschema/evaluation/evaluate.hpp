@@ -22,6 +22,11 @@ struct EvaluationOptions {
   /// diagnosis: logs of masks, with noise along their outlines, of 40 s at 5 Hz, instead of pictures of 60 s at 10 Hz:
   /// five times as fast.
   bool masks = false;
+  /// diagnosis: no further log is begun after so many minutes, and what is done is summed up. 0: all of them.
+  double minutes = 0.0;
+  /// diagnosis: logs that trials.jsonl in `out` has of the same seed, robot and kind are not run again, as after a run
+  /// that was stopped. It does not ask whether the program has changed since.
+  bool resume = false;
   /// Choices of the command line ("filter.particles=500"), in force in `simulated` already. Those about
   /// estimating are applied to the recording's robots too; its robot, cameras and bus are its own.
   std::vector<std::string> overrides;

@@ -18,6 +18,7 @@ namespace bodyschema {
 struct Picture {
   JointSample joints;  ///< at the exposure; velocities from the encoder log once that is complete
   Eigen::VectorXd qddot;
+  Eigen::MatrixXd path;  ///< joint_path() about the exposure
   std::size_t camera = 0;
   BinaryMask mask, valid;
   std::vector<std::uint8_t> coverage;
