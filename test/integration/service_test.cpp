@@ -213,11 +213,10 @@ TEST_F(Service, StopsWhileReloading) {
                   scratch_.folder());
   ASSERT_TRUE(service.said("waiting for", kStart));
   // A load without end: it reads from a pipe that nobody writes to.
-  const auto pipe = scratch_ / "background.png";
+  const auto pipe = scratch_ / "extended_model.yaml";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   std::ofstream(config) << "include: [" << reach_configuration() << "]\n"
-                        << "vision: {method: background_picture, background_pictures: {left: " << pipe
-                        << ", right: " << pipe << "}}\n";
+                        << "robot: {extended_model: " << pipe << "}\n";
   service.signal(SIGHUP);
   ASSERT_TRUE(service.said("reloading the configuration", Seconds(5)));
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
