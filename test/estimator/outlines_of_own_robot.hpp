@@ -9,7 +9,8 @@ namespace bodyschema {
 /// What fits outlines in frames of a reach, and an empty memory about the same state.
 class OutlinesOfOwnRobot : public ParticlesOfOwnRobot {
  protected:
-  OutlinesOfOwnRobot() : fitter_(*model_, *scorer_, options_, rig_.cameras.size(), kAllRenders), memory_(layout(), {}) {}
+  OutlinesOfOwnRobot()
+      : fitter_(*model_, *scorer_, options_, rig_.cameras.size(), kAllRenders), memory_(layout(), {}) {}
 
   [[nodiscard]] MemoryLayout layout() const {
     const Eigen::VectorXd sd = model_->state().prior_sd();
