@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <thread>
 #include <utility>
 
@@ -108,8 +109,11 @@ class Calibrator {
     LogFit fit(*log_, threads_of(options_));
     fit.leave_out(loose_);
     std::optional<BatchFit> best;
-    if (!masks || still) best.emplace(fitted(fit, starts_));
-    if (masks) with_better_masks(*masks, fit, best);
+    if (masks && !still) {
+      with_better_masks(*masks, fit, best);
+    } else {
+      best.emplace(best_place(masks, fit));
+    }
     if (masks && rough) settle(*masks, fit, best);
     if (masks || !pipeline_.learns_background()) without_strangers(fit, best);
     progress(0.6);
@@ -289,31 +293,70 @@ class Calibrator {
     return batch;
   }
 
-  /// The best fit from all starts; the rig is that of the best one then. Which start that is, some pictures tell.
-  BatchFit fitted(LogFit& fit, const std::vector<StereoRig>& starts) {
-    const auto some = starts.size() > 1 ? spread_pictures() : std::vector<std::size_t>{};
-    std::optional<BatchFit> best;
-    StereoRig best_rig;
-    std::vector<std::pair<double, std::vector<CalibratedView>>> answers;
-    std::size_t best_answer = 0;
-    for (const auto& rig : starts) {
+  /// What a start ends at.
+  struct Answer {
+    StereoRig rig;
+    std::unique_ptr<BatchFit> fit;
+    std::vector<CalibratedView> views;
+  };
+
+  /// What the places where cameras may be end at, each once, the best first. Which that is, some pictures tell.
+  std::vector<Answer> answers(LogFit& fit) {
+    const auto some = starts_.size() > 1 ? spread_pictures() : std::vector<std::size_t>{};
+    std::vector<Answer> list;
+    for (const auto& rig : starts_) {
       use(fit, rig);
       BatchFit batch = from(fit, some, kFrom_px);
-      answers.emplace_back(batch.misfit(), views(fit, batch));
-      if (best && batch.misfit() >= best->misfit()) continue;
-      best.emplace(std::move(batch));
-      best_rig = rig;
-      best_answer = answers.size() - 1;
+      auto places = views(fit, batch);
+      list.push_back({rig, std::make_unique<BatchFit>(std::move(batch)), std::move(places)});
     }
-    use(fit, best_rig);
-    only_ = kAlone;
-    for (const auto& [misfit, places] : answers) {
-      // Two starts that end at one answer are no rivals.
-      if (apart(places, answers[best_answer].second) < kSameAnswer_m) continue;
-      only_ = std::min(only_, misfit / std::max(1e-9, best->misfit()));
-    }
-    if (!some.empty()) best->run(0.0, {});
+    return once_each(std::move(list));
+  }
+
+  /// The fit of the best place of the cameras, which are there then.
+  /// @param masks  of pictures that come without
+  BatchFit best_place(std::optional<RawPictures>& masks, LogFit& fit) {
+    auto answers = this->answers(fit);
+    bool last = true;  // whether masks and cameras are those of the best answer
+    if (masks) last = judge_by_own_masks(*masks, fit, answers);
+    only_ = answers.size() > 1 ? answers[1].fit->misfit() / std::max(1e-9, answers[0].fit->misfit()) : kAlone;
+    use(fit, answers.front().rig);
+    std::optional<BatchFit> best(std::move(*answers.front().fit));
+    if (!last) with_masks_anew(*masks, fit, best, kReachesMoved.back());
+    if (!masks && starts_.size() > 1 && !spread_pictures().empty()) best->run(0.0, {});
     return std::move(*best);
+  }
+
+  /// Masks of what moved tell places apart that are far apart. Those that are nearly as good are judged by masks about
+  /// each of them: a fit that the rough masks held back is a rival no longer, and a wrong place finds no outline.
+  /// @return whether the masks are about the best of them now
+  bool judge_by_own_masks(RawPictures& masks, LogFit& fit, std::vector<Answer>& answers) {
+    const double most = kOnly * answers.front().fit->misfit();
+    std::erase_if(answers, [&](const Answer& a) { return a.fit->misfit() >= most; });
+    for (auto& answer : answers) {
+      use(fit, answer.rig);
+      std::optional<BatchFit> best(std::move(*answer.fit));
+      with_better_masks(masks, fit, best);
+      answer.views = views(fit, *best);
+      answer.fit = std::make_unique<BatchFit>(std::move(*best));
+    }
+    const auto* last = answers.back().fit.get();
+    answers = once_each(std::move(answers));
+    return answers.front().fit.get() == last;
+  }
+
+  /// Sorted by misfit. Two starts that end at one answer are no rivals.
+  static std::vector<Answer> once_each(std::vector<Answer> list) {
+    std::stable_sort(list.begin(), list.end(),
+                     [](const Answer& a, const Answer& b) { return a.fit->misfit() < b.fit->misfit(); });
+    std::vector<Answer> distinct;
+    for (auto& answer : list) {
+      const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Answer& other) {
+        return apart(answer.views, other.views) < kSameAnswer_m;
+      });
+      if (!known) distinct.push_back(std::move(answer));
+    }
+    return distinct;
   }
 
   /// So many pictures, all over the log, that any start's fit of them tells how good it is; empty: all.
