@@ -113,7 +113,33 @@ class ArmAnatomy {
         segments[static_cast<std::size_t>(at - last.begin())].parts.push_back(part);
       }
     }
+    for (auto& segment : segments) find_inner_parts(segment);
     return segments;
+  }
+
+  /// What moves against the others of its segment, and which of these it hangs on: the one whose frame is nearest.
+  void find_inner_parts(BodySegment& segment) const {
+    const auto moved_by = [&](std::size_t part) {
+      std::vector<Eigen::Index> list;
+      for (Eigen::Index j = 0; j < model_.joint_count(); ++j) {
+        if (kinematics_.moves(j, part)) list.push_back(j);
+      }
+      return list;
+    };
+    const auto first = moved_by(segment.parts.front());
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    for (const auto part : segment.parts) {
+      if (moved_by(part) == first) continue;
+      segment.inner.push_back(part);
+      middle += X_WB_[part].translation();
+    }
+    if (segment.inner.empty()) return;
+    middle /= static_cast<double>(segment.inner.size());
+    const auto away = [&](std::size_t part) { return (X_WB_[part].translation() - middle).norm(); };
+    segment.core = segment.parts.front();
+    for (const auto part : segment.parts) {
+      if (moved_by(part) == first && away(part) < away(segment.core)) segment.core = part;
+    }
   }
 
   /// Where on its axis a joint sits that turns a link about its own length, a URDF chooses freely, often at the near

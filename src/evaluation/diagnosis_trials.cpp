@@ -142,7 +142,8 @@ class TrialRobot {
     }
     if (part.empty()) return {{fault.name, joint, source}};
     RightAnswers answers;
-    for (const auto* name : {"mesh_scale", "silhouette_bias"}) answers.push_back({name, "", segment_of(part)});
+    for (const auto* name : {"mesh_scale", "silhouette_bias", "segment_size"})
+      answers.push_back({name, "", segment_of(part)});
     return answers;
   }
 
@@ -242,6 +243,7 @@ Outcome TrialRobot::outcome_of(const Kind& kind, simulator::SimulationPlan plan,
   options.quiet = true;
   options.fit_only = fit_only;
   Outcome outcome;
+  outcome.motion_s = plan.seconds - 1.0 / kind.size.rate_hz;
   try {
     outcome.report = diagnose_log(kind.configuration, options);
   } catch (const DataError& e) {
@@ -344,6 +346,10 @@ bool is_not_explained_away(const Outcome& o) {
   });
 }
 
+double hidden_size(const FaultSpec& fault, const DiagnosedParameter& told, double motion_s) {
+  return told.duration_s && motion_s > 0.0 ? fault.value() * *told.duration_s / motion_s : fault.value();
+}
+
 namespace {
 
 bool names_a_large_gain(const Outcome& o) {
@@ -362,7 +368,8 @@ Json sizes_of(const Outcome& o) {
       if (!among(o.answers[f], cause.cause) || cause.cause.name != fault.name) continue;
       if (cause.parameters.size() != 1 || fault.value() == 0.0) continue;
       const auto& p = cause.parameters.front();
-      sizes.push_back({{"estimate", p.estimate}, {"width", p.ci95[1] - p.ci95[0]}, {"truth", fault.value()}});
+      sizes.push_back(
+          {{"estimate", p.estimate}, {"width", p.ci95[1] - p.ci95[0]}, {"truth", hidden_size(fault, p, o.motion_s)}});
     }
   }
   return sizes;

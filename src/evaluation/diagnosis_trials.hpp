@@ -38,6 +38,7 @@ struct Outcome {
   std::vector<simulator::FaultSpec> faults;
   std::vector<RightAnswers> answers;  ///< of each; none for a thing that is held: no cause names it
   DiagnosisReport report;
+  double motion_s = 0.0;                                         ///< from its first picture of the motion to its last
   double size_mm = 0.0, size_px = 0.0;                           ///< left where offsets and nuisances are fitted
   double left_mm = 0.0;                                          ///< of the hand's error under the extended model
   double sizing_s = 0.0, simulation_s = 0.0, diagnosis_s = 0.0;  ///< of processor time that it took
@@ -60,6 +61,10 @@ bool is_first(const Outcome& o);
 bool is_wrong(const Outcome& o);
 /// For a fault that no cause describes: unexplained, or a class that holds its joint.
 bool is_not_explained_away(const Outcome& o);
+
+/// What was hidden, as the report tells it: a drift over the time in which the arm is seen, which is longer than the
+/// motion by the arm's coming into view.
+double hidden_size(const simulator::FaultSpec& fault, const DiagnosedParameter& told, double motion_s);
 
 /// What the tables ask of one log: a line of trials.jsonl, so that a run that was stopped can be summed up.
 struct Record {

@@ -31,6 +31,7 @@ auto& number(const Coordinate& coordinate, C& c) {
     case Kind::kK1: return c.camera.k1;
     case Kind::kReadout: return c.camera.readout_s;
     case Kind::kScale: return c.shapes[at].scale;
+    case Kind::kSize: return c.shapes[at].size;
     case Kind::kDilation: break;
   }
   return c.shapes[at].dilation_px;
@@ -65,6 +66,9 @@ Coordinates::Coordinates(const JointRoles& roles) {
   for (const auto kind : {Kind::kFocal, Kind::kCx, Kind::kCy, Kind::kK1, Kind::kReadout}) add(kind, 0);
   for (const auto kind : {Kind::kScale, Kind::kDilation}) {
     for (std::size_t s = 0; s < roles.segments.size(); ++s) add(kind, static_cast<Eigen::Index>(s));
+  }
+  for (std::size_t s = 0; s < roles.segments.size(); ++s) {
+    if (!roles.segments[s].inner.empty()) add(Kind::kSize, static_cast<Eigen::Index>(s));
   }
 }
 

@@ -231,6 +231,7 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
     const Eigen::RowVector3d by_p(by_x.x() * iz, by_x.y() * iz, -by_x.dot(x) * iz);
     const Eigen::Vector4d p_C = point.p_C.homogeneous();
     const std::size_t segment = projection_.segment_of(point.part);
+    const double size = projection_.size(point.part);
     for (std::size_t i = 0; i < active.size(); ++i) {
       const auto& coordinate = coordinates_[active[i]];
       const bool own = coordinate.index == static_cast<Eigen::Index>(segment);
@@ -245,11 +246,19 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
         case Kind::kK1: g = n_f.dot(x) * x.squaredNorm(); break;
         case Kind::kScale:
           if (own) {
-            g = by_p.dot(point.p_C - links_[point.part].translation()) / (1.0 + corrections.shapes[segment].scale);
+            g = by_p.dot(point.p_C - projection_.origin(point.part)) / (1.0 + corrections.shapes[segment].scale);
+          }
+          break;
+        case Kind::kSize:
+          if (own && projection_.core_of(point.part) != RobotProjection::kNone) {
+            g = by_p.dot(projection_.from_core(point.part) +
+                         (point.p_C - projection_.origin(point.part)) / (1.0 + size));
           }
           break;
         case Kind::kDilation: g = own ? 1.0 : 0.0; break;
-        default: g = by_p.dot(motion_[i * links_.size() + point.part] * p_C);
+        default:
+          g = by_p.dot(motion_[i * links_.size() + point.part] * p_C);
+          if (size != 0.0) g += size * by_p.dot(motion_of_size(i, point.part));
       }
       rows_(static_cast<Eigen::Index>(i), p) = g;
     }
@@ -258,6 +267,15 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
   }
   out.A.selfadjointView<Eigen::Lower>().rankUpdate(rows_);
   out.A = out.A.selfadjointView<Eigen::Lower>();
+}
+
+Eigen::Vector3d OutlineMeasurement::motion_of_size(std::size_t i, std::size_t part) const {
+  const auto* motion = &motion_[i * links_.size()];
+  const std::size_t core = projection_.core_of(part);
+  // What the part's own motion says of a point that its segment's size has moved is too much by that of the way there.
+  const Eigen::Vector3d way = motion[part].leftCols<3>() * projection_.from_core(part);
+  return motion[part] * links_[part].translation().homogeneous() -
+         motion[core] * links_[core].translation().homogeneous() - way;
 }
 
 Eigen::MatrixXd OutlineMeasurement::link_jacobian(const Eigen::Ref<const Eigen::VectorXd>& q,

@@ -21,18 +21,21 @@ std::vector<std::string> camera_links(const StereoRig& rig) {
 RobotProjection::RobotProjection(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
                                  const JointRoles& roles)
     : intrinsics_(rig.intrinsics()), segment_of_part_(setup.model.rendered_links.size(), 0),
-      part_count_(setup.model.rendered_links.size()),
+      core_of_part_(segment_of_part_.size(), kNone), part_count_(setup.model.rendered_links.size()),
       kinematics_(std::move(robot), placed_links(setup), camera_links(rig)),
-      X_CB_(part_count_ + 1 + setup.fingertip_links.size(), Pose::Identity()), scale_(roles.segments.size(), 1.0) {
+      X_CB_(part_count_ + 1 + setup.fingertip_links.size(), Pose::Identity()), shapes_(roles.segments.size()) {
   for (std::size_t s = 0; s < roles.segments.size(); ++s) {
-    for (const auto part : roles.segments[s].parts) segment_of_part_[part] = s;
+    const auto& segment = roles.segments[s];
+    for (const auto part : segment.parts) segment_of_part_[part] = s;
+    for (const auto part : segment.inner) core_of_part_[part] = segment.core;
+    if (!segment.inner.empty()) core_of_part_[segment.core] = segment.core;
   }
 }
 
 void RobotProjection::place(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
                             std::size_t camera) {
   kinematics_.compute(q, corrections, camera, X_CB_);
-  for (std::size_t s = 0; s < scale_.size(); ++s) scale_[s] = 1.0 + corrections.shapes[s].scale;
+  shapes_ = corrections.shapes;
   const auto& k = intrinsics_[camera];
   warp_(0, 0) = warp_(1, 1) = 1.0 + corrections.camera.focal_scale;
   warp_(0, 2) = corrections.camera.cx_px / k.fx;
@@ -41,11 +44,27 @@ void RobotProjection::place(const Eigen::Ref<const Eigen::VectorXd>& q, const Co
 
 void RobotProjection::parts(std::span<Eigen::Isometry3f> X_CB) const {
   for (std::size_t part = 0; part < part_count_; ++part) {
-    const Pose& X = X_CB_[part];
-    X_CB[part].linear() = (warp_ * X.linear() * scale_[segment_of_part_[part]]).cast<float>();
-    X_CB[part].translation() = (warp_ * X.translation()).cast<float>();
+    X_CB[part].linear() = (warp_ * X_CB_[part].linear() * scale(part)).cast<float>();
+    X_CB[part].translation() = (warp_ * origin(part)).cast<float>();
     X_CB[part].makeAffine();
   }
+}
+
+double RobotProjection::size(std::size_t part) const {
+  return core_of_part_[part] == kNone ? 0.0 : shapes_[segment_of_part_[part]].size;
+}
+
+double RobotProjection::scale(std::size_t part) const {
+  return (1.0 + shapes_[segment_of_part_[part]].scale) * (1.0 + size(part));
+}
+
+Eigen::Vector3d RobotProjection::from_core(std::size_t part) const {
+  if (core_of_part_[part] == kNone) return Eigen::Vector3d::Zero();
+  return X_CB_[part].translation() - X_CB_[core_of_part_[part]].translation();
+}
+
+Eigen::Vector3d RobotProjection::origin(std::size_t part) const {
+  return X_CB_[part].translation() + size(part) * from_core(part);
 }
 
 SilhouetteModel silhouette_model(const RobotModel& robot, const RobotSetup& setup) {

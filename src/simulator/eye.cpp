@@ -222,7 +222,12 @@ void Eye::pose(double t_s) {
   X_WC_ = kinematics_->camera(index_, X_W_.back());
   if (studio_.plan.output == Output::kJoints) return;
   const Pose X_CW = X_WC_.inverse(Eigen::Isometry);
-  for (std::size_t p = 0; p < covers_; ++p) X_CA_[p] = (X_CW * X_W_[p]).cast<float>();
+  const Eigen::Vector3d hand_W = X_W_[covers_].translation();
+  for (std::size_t p = 0; p < covers_; ++p) {
+    Pose& X = X_W_[p];
+    X.translation() = hand_W + studio_.robot->body().covers[p].reach * (X.translation() - hand_W);
+    X_CA_[p] = (X_CW * X).cast<float>();
+  }
   if (!placer_) return;
   placer_->place(t_s, X_W_[covers_], X_WT_, hidden_);
   for (std::size_t p = 0; p < X_WT_.size(); ++p) X_CT_[p] = (X_CW * X_WT_[p]).cast<float>();

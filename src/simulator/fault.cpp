@@ -305,6 +305,7 @@ const std::vector<FaultKind>& fault_kinds() {
                                                faults::camera_rotation(),
                                                faults::camera_position(),
                                                faults::cover_dilation(),
+                                               faults::hand_size(),
                                                faults::held(),
                                                faults::stalled_encoder(),
                                                faults::exposure_time(),

@@ -43,6 +43,14 @@ TEST(HiddenFault, AHandLargerThanItsMeshesIsNamedByItsPart) {
   expect_size(report, {"mesh_scale", "", "r_hand"}, "scale", 6.0);
 }
 
+/// Palm and fingers alone larger would leave the fingers where they begin: one cause says all of it.
+TEST(HiddenFault, AHandOfAnotherSizeIsNamedWithTheFingersThatBeginFurtherOut) {
+  const auto report = answer({"hand_size:value=5"});
+  EXPECT_TRUE(test::is_named(report)) << report.sentence;
+  EXPECT_TRUE(test::names_only_part(report, "r_hand")) << report.sentence;
+  expect_size(report, {"segment_size", "", "r_hand"}, "scale", 5.0);
+}
+
 /// The state holds offsets of the head, so the log is explained; the answer says so all the same.
 TEST(HiddenFault, ANeckThatStandsOffIsSaidThoughTheStateTakesItUp) {
   test::Simulated what;

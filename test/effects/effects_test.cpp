@@ -53,7 +53,7 @@ double size_of(const Corrections& c) {
 
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
-  EXPECT_EQ(shipped_effects().size(), 28u);
+  EXPECT_EQ(shipped_effects().size(), 29u);
   auto at = instant(r);
   at.q.setConstant(0.7);
   at.encoder.setConstant(0.8);
@@ -374,6 +374,19 @@ TEST(Shapes, AreThoseOfTheBodyOrOfOneSegment) {
         make_effect("mesh_scale", {"", "hnad"}, r);
       },
       testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr("expected forearm or hand")));
+}
+
+/// A segment with joints within as a whole: parts and places of joints.
+TEST(Shapes, OfAnotherSizeMoveTheirJointsToo) {
+  const auto r = roles();
+  ASSERT_EQ(effect_targets("segment_size", r).size(), 1u) << "the forearm is one part";
+  const auto effect = make_effect("segment_size", {"", "hand"}, r);
+  const auto hand = corrections(*effect, 2.0, instant(r));
+  EXPECT_NEAR(hand.shapes[1].size, 0.02, 1e-15);
+  EXPECT_EQ(hand.shapes[1].scale, 0.0);
+  EXPECT_EQ(hand.shapes[0].size, 0.0);
+  EXPECT_EQ(effect_kind("segment_size").sentence(*effect, r, std::vector<std::string>{"2 %"}),
+            "the hand is 2 % larger than in the URDF, the places of its joints with it");
 }
 
 TEST(InTime, DriftGrowsAndSlipJumps) {

@@ -17,7 +17,7 @@ inline JointRoles roles() {
   r.arm = {6, 7, 8, 9, 10, 11, 12};
   r.fingers = {13, 14};
   r.cameras = {"left", "right"};
-  r.segments = {{"forearm", {0}}, {"hand", {1, 2}}};
+  r.segments = {{"forearm", {0}}, {"hand", {1, 2}, {2}, 1}};
   r.links = {{"upper_arm", 8, 0.15, {.along_m = 1.0}}, {"forearm", 10, 0.14, {.along_m = 0.6, .shift_1_m = 0.8}}};
   r.mounts = {{"hand", 12, {1.0, 0.0, 0.0}}};
   return r;

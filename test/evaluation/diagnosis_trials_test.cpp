@@ -48,6 +48,14 @@ TEST(DiagnosisTrials, OfACoverThePartIsTheAnswer) {
   EXPECT_TRUE(is_first(outcome("cover_dilation:part=hand,value=2", {kCover, kBias}, {named(kCover)})));
 }
 
+/// A joint that creeps while the arm comes into view is not told to creep faster.
+TEST(DiagnosisTrials, ADriftIsComparedOverTheTimeThatItIsToldFor) {
+  DiagnosedParameter told;
+  told.duration_s = 60.7;
+  EXPECT_NEAR(hidden_size(FaultSpec::parse("drift:joint=elbow,value=8.4"), told, 59.9), 8.4 * 60.7 / 59.9, 1e-12);
+  EXPECT_EQ(hidden_size(FaultSpec::parse("encoder_gain:joint=elbow,value=2"), {}, 59.9), 2.0);
+}
+
 /// What an unexplained answer lists stands in for something: it neither finds nor errs.
 TEST(DiagnosisTrials, WhatTheAnswerDoesNotStandBehindCountsForNothing) {
   auto o = outcome("latency:value=40", {kLatency}, {named(kLatency), named(kGain)});

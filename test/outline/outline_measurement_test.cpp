@@ -19,7 +19,7 @@ bool is_angle(Kind kind) {
 
 bool moves_no_link(Kind kind) {
   return kind == Kind::kFocal || kind == Kind::kCx || kind == Kind::kCy || kind == Kind::kK1 ||
-         kind == Kind::kReadout || kind == Kind::kScale || kind == Kind::kDilation;
+         kind == Kind::kReadout || kind == Kind::kScale || kind == Kind::kSize || kind == Kind::kDilation;
 }
 
 class OutlineOfOwnRobot : public OwnRobot {
@@ -50,8 +50,8 @@ class OutlineOfOwnRobot : public OwnRobot {
   [[nodiscard]] Eigen::Vector2d appears(const Eigen::Vector3d& p_B, std::size_t part, const Corrections& c,
                                         std::size_t camera) {
     projection_.place(q_, c, camera);
-    const double scale = 1.0 + c.shapes[projection_.segment_of(part)].scale;
-    const Eigen::Vector3d p_C = projection_.links()[part] * (scale * p_B);
+    const Eigen::Vector3d p_C =
+        projection_.origin(part) + projection_.links()[part].linear() * (projection_.scale(part) * p_B);
     const Eigen::Vector2d x = p_C.head<2>() / p_C.z();
     const auto& k = rig_.cameras[camera].intrinsics;
     const Eigen::Vector2d bent = (1.0 + c.camera.k1 * x.squaredNorm()) * x;
@@ -86,11 +86,18 @@ TEST_F(OutlineOfOwnRobot, DerivativesAreThoseOfTheProjection) {
     ASSERT_GT(points.size(), 20u);
     projection_.place(q_, c, camera);
     const std::vector<Pose> links(projection_.links().begin(), projection_.links().end());
+    std::vector<Eigen::Vector3d> origins;
+    std::vector<double> scales;
+    for (std::size_t part = 0; part < projection_.part_count(); ++part) {
+      origins.push_back(projection_.origin(part));
+      scales.push_back(projection_.scale(part));
+    }
     Eigen::MatrixXd G(points.size(), all_.size());
     for (std::size_t p = 0; p < points.size(); ++p) {
       const auto& point = points[p];
       const std::size_t segment = projection_.segment_of(point.part);
-      const Eigen::Vector3d p_B = links[point.part].inverse() * point.p_C / (1.0 + c.shapes[segment].scale);
+      const Eigen::Vector3d p_B =
+          links[point.part].linear().transpose() * (point.p_C - origins[point.part]) / scales[point.part];
       // The point is where it is said to be.
       const Eigen::Vector2d own = appears(p_B, point.part, c, camera) + c.shapes[segment].dilation_px * point.normal;
       ASSERT_LT((own - point.pixel).norm(), 0.02);
@@ -155,6 +162,7 @@ TEST_F(OutlineOfOwnRobot, OneStepTakesASmallErrorAway) {
   errors.insert(errors.end(), {{Kind::kFocal, 0, 0.01}, {Kind::kCx, 0, 1.5}, {Kind::kCy, 0, -1.5}});
   const auto hand = static_cast<Eigen::Index>(roles_.segments.size() - 1);
   errors.push_back({Kind::kScale, hand, 0.03});
+  errors.push_back({Kind::kSize, hand, 0.03});
   const std::size_t camera = 1;
   const CameraObservation seen = reach_.draw(q_, nothing_, camera);
   for (const auto& error : errors) {

@@ -75,6 +75,29 @@ TEST_F(ProjectionOfOwnRobot, SizeScalesThePartsOfASegmentAboutTheirOwnOrigins) {
   }
 }
 
+// A larger hand: its fingers begin further from the palm, which stays where it is, as does the wrist's own part.
+TEST_F(ProjectionOfOwnRobot, AnotherSizeMovesTheInnerJointsAwayFromTheCore) {
+  const std::size_t hand = roles_.segments.size() - 1;
+  const auto& segment = roles_.segments[hand];
+  const auto part = [&](const char* link) {
+    const auto& links = setup_.model.rendered_links;
+    return static_cast<std::size_t>(std::find(links.begin(), links.end(), link) - links.begin());
+  };
+  ASSERT_EQ(segment.core, part("r_hand"));
+  EXPECT_EQ(segment.inner.size(), 16u) << "thumb and fingers";
+  const auto before = parts(nothing_, 0);
+  change_.shapes[hand].size = 0.03;
+  const auto after = parts(change_, 0);
+  for (const char* link : {"r_hand", "r_thumb_4", "r_little_3"}) {
+    const std::size_t p = part(link);
+    const Eigen::Vector3f way = before[p].translation() - before[segment.core].translation();
+    EXPECT_TRUE(after[p].translation().isApprox(before[p].translation() + 0.03f * way)) << link;
+    EXPECT_NEAR(after[p].linear().col(0).norm(), 1.03, 1e-5) << link;
+  }
+  for (const char* link : {"r_wrist_2", "r_forearm"})
+    EXPECT_TRUE(after[part(link)].isApprox(before[part(link)])) << link;
+}
+
 TEST_F(ProjectionOfOwnRobot, ALinkThatDoesNotExistIsAnError) {
   setup_.hand_link = "r_hnad";
   EXPECT_THROW(RobotProjection(robot_, setup_, rig_, roles_), ConfigurationError);

@@ -103,6 +103,7 @@ constexpr Touches kCatalogue[] = {
     {"distortion:value=0.1", false, false, false, false, true},
     {"silhouette_bias:value=1", false, false, false, false, true},
     {"mesh_scale:value=3", false, false, false, false, true},
+    {"hand_size:value=3", false, false, false, false, true},
     {"finger_posture:value=5", true, false, false, false, true},
     {"drift:joint=r_elbow,value=3", true, false, false, false, true},
     {"slip:joint=r_elbow,value=3,at=0", true, false, false, false, true},

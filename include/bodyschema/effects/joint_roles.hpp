@@ -15,7 +15,9 @@ namespace bodyschema {
 /// fingers counted to the hand.
 struct BodySegment {
   std::string name;  ///< its first rendered link, from the root outwards; of the hand RobotSetup::hand_link
-  std::vector<std::size_t> parts;  ///< positions in RobotSetup's rendered links
+  std::vector<std::size_t> parts;    ///< positions in RobotSetup's rendered links
+  std::vector<std::size_t> inner{};  ///< those that joints within the segment move: fingers
+  std::size_t core = 0;              ///< the part that carries these: the palm
 };
 
 /// A link between two joints of the arm that lie apart, and how its length changes: by the joint at its far end, which

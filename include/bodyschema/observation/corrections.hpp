@@ -41,7 +41,10 @@ struct JointAdjustment {
 
 /// What the rendered parts of one segment of the body (JointRoles::segments) look like, minus what their meshes say.
 struct ShapeCorrection {
-  double scale = 0.0;        ///< parts are scaled by 1 + this about their own frames
+  double scale = 0.0;  ///< parts are scaled by 1 + this about their own frames
+  /// Of a segment with joints within: its core and what these joints move are 1 + this times as large, the places of
+  /// the joints with them, about the core's frame.
+  double size = 0.0;
   double dilation_px = 0.0;  ///< the observed outline lies this far outside the predicted one
 };
 

@@ -32,6 +32,7 @@ struct Coordinate {
     kK1,
     kReadout,   ///< s
     kScale,     ///< of segment `index`, relative
+    kSize,      ///< ..., its joints with it
     kDilation,  ///< of segment `index`, px
   };
   Kind kind;

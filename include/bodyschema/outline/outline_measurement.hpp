@@ -115,6 +115,9 @@ class OutlineMeasurement {
                const OutlineSearch& search, OutlineEvidence& out);
   /// Leaves odd pieces of `samples_` out of the points.
   void leave_out_odd(const OutlineSearch& search, double unit_px, OutlineEvidence& out);
+  /// Velocity of a part's place, per unit of coordinate `i` of `find_motions`, that is due to another size of its
+  /// segment, per unit of that.
+  [[nodiscard]] Eigen::Vector3d motion_of_size(std::size_t i, std::size_t part) const;
   void differentiate(const Corrections& corrections, const PinholeIntrinsics& k, std::span<const std::uint32_t> active,
                      OutlineEvidence& out);
 

@@ -31,8 +31,16 @@ class RobotProjection {
   void place(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera);
   /// Transforms of the parts for drawing, metres; one per part.
   void parts(std::span<Eigen::Isometry3f> X_CB) const;
-  /// Poses of the parts, of the hand's frame and of the fingertips in the camera, metres.
+  /// Poses of the parts as the URDF has their places to each other, of the hand's frame and of the fingertips in the
+  /// camera, metres.
   [[nodiscard]] std::span<const Pose> links() const { return X_CB_; }
+  /// Of a part whose segment is of another size: where its frame's origin lies in the camera, m.
+  [[nodiscard]] Eigen::Vector3d origin(std::size_t part) const;
+  /// From the origin of its segment's core to its own as in the URDF, in the camera, m; zero where it has none.
+  [[nodiscard]] Eigen::Vector3d from_core(std::size_t part) const;
+  /// By which a part's mesh is scaled, all in all; and Corrections' `size` where it is a part's.
+  [[nodiscard]] double scale(std::size_t part) const;
+  [[nodiscard]] double size(std::size_t part) const;
   [[nodiscard]] const Pose& hand() const { return X_CB_[part_count_]; }
   [[nodiscard]] std::size_t hand_link() const { return part_count_; }
   [[nodiscard]] std::span<const Pose> fingertips() const { return std::span(X_CB_).subspan(part_count_ + 1); }
@@ -45,14 +53,18 @@ class RobotProjection {
   [[nodiscard]] std::size_t camera_count() const { return intrinsics_.size(); }
   [[nodiscard]] const PinholeIntrinsics& intrinsics(std::size_t camera) const { return intrinsics_[camera]; }
   [[nodiscard]] std::size_t segment_of(std::size_t part) const { return segment_of_part_[part]; }
+  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+  /// The part from which another size of the segment is measured; kNone: it keeps its size.
+  [[nodiscard]] std::size_t core_of(std::size_t part) const { return core_of_part_[part]; }
 
  private:
   std::vector<PinholeIntrinsics> intrinsics_;
   std::vector<std::size_t> segment_of_part_;
+  std::vector<std::size_t> core_of_part_;
   std::size_t part_count_;
   CorrectedKinematics kinematics_;  ///< parts, hand, fingertips
   std::vector<Pose> X_CB_;
-  std::vector<double> scale_;  ///< per segment
+  std::vector<ShapeCorrection> shapes_;  ///< per segment
   Eigen::Matrix3d warp_ = Eigen::Matrix3d::Identity();
 };
 

@@ -77,6 +77,7 @@ struct JointMisplacement {
 /// A rendered link's cover as it was moulded, against its mesh.
 struct TrueCover {
   double scale = 1.0;       ///< about the origin of the link's frame
+  double reach = 1.0;       ///< that origin lies this many times as far from the hand link's
   double dilation_m = 0.0;  ///< the surface lies this far outside the drawn one, along its normals
 };
 

@@ -35,6 +35,7 @@ FaultKind principal_point();
 FaultKind distortion();
 FaultKind silhouette_bias();
 FaultKind mesh_scale();
+FaultKind hand_size();
 FaultKind finger_posture();
 FaultKind drift();
 FaultKind slip();
