@@ -113,7 +113,13 @@ class ArmAnatomy {
         segments[static_cast<std::size_t>(at - last.begin())].parts.push_back(part);
       }
     }
-    for (auto& segment : segments) find_inner_parts(segment);
+    // Further in, what hangs on inner joints may carry the arm: a body whose legs move.
+    for (std::size_t s = 0; s < segments.size(); ++s) {
+      const bool arm_goes_on = std::any_of(segments.begin(), segments.end(), [&](const BodySegment& other) {
+        return &other != &segments[s] && (last[s] < 0 || kinematics_.moves(last[s], other.parts.front()));
+      });
+      if (!arm_goes_on) find_inner_parts(segments[s]);
+    }
     return segments;
   }
 

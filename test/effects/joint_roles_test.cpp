@@ -129,6 +129,18 @@ TEST(JointRoles, SegmentsHoldEveryPartOnceAndLinksAreAsLongAsTheRobotsAre) {
   }
 }
 
+/// Of the body between arm and ground, too, some parts move against others; but the arm stands on them.
+TEST(JointRoles, OnlyTheLastSegmentOfAnArmHasJointsWithin) {
+  const auto configuration = Configuration::load(std::string(BODYSCHEMA_SOURCE_DIR) + "/config/icub_right/robot.yaml");
+  auto setup = RobotSetup::from(configuration.section("robot"));
+  auto& links = setup.model.rendered_links;
+  links.insert(links.begin(), {"torso_1", "torso_2"});
+  const auto roles = JointRoles::of(setup.load(), setup, StereoRig::from(configuration.section("cameras")));
+  EXPECT_EQ(roles.segments.front().parts.size(), 2u);
+  for (const auto& segment : roles.segments) EXPECT_EQ(segment.inner.size(), segment.name == "r_hand" ? 16u : 0u);
+  EXPECT_EQ(links[roles.segments.back().core], "r_hand");
+}
+
 TEST(JointRoles, OfARobotWithoutHeadOrFingers) {
   const auto r = robot("arm7/robot.yaml");
   EXPECT_TRUE(r.roles.fingers.empty()) << r.names(r.roles.fingers).front();

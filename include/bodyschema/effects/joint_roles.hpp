@@ -16,7 +16,7 @@ namespace bodyschema {
 struct BodySegment {
   std::string name;  ///< its first rendered link, from the root outwards; of the hand RobotSetup::hand_link
   std::vector<std::size_t> parts;    ///< positions in RobotSetup's rendered links
-  std::vector<std::size_t> inner{};  ///< those that joints within the segment move: fingers
+  std::vector<std::size_t> inner{};  ///< of an arm's last one, those that joints within it move: fingers
   std::size_t core = 0;              ///< the part that carries these: the palm
 };
 
