@@ -119,7 +119,7 @@ struct Estimator::Impl {
   Estimate report() {
     Estimate estimate;
     const auto joints = model.state().joints();
-    if (!particles_only()) shape = shape_covariance(known.memory, fitter);
+    if (!particles_only()) shape = shape_covariance(known.memory, fitter.shape_variance_share(known.memory.told()));
     estimate.joint_names = joint_names;
     estimate.offset_rad = known.x.head(joints);
     estimate.prior_sd_rad = model.state().prior_sd().head(joints);

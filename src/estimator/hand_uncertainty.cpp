@@ -1,6 +1,5 @@
 #include "hand_uncertainty.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -38,21 +37,6 @@ HandUncertainty hand_uncertainty(FrameModel& model, const Exposure& exposure, co
       (J.leftCols(n) * known.in_frame.sensitivity + J.rightCols(J.cols() - n)) * known.memory.layout().considered_root;
   result.covariance_m2 += T * T.transpose();
   return result;
-}
-
-Eigen::MatrixXd shape_covariance(const PostureMemory& memory, const OutlineFitter& fitter) {
-  const Eigen::Index n = memory.layout().estimated();
-  if (memory.empty()) return Eigen::MatrixXd::Zero(n, n);
-  const auto& own = memory.estimate().own;
-  const Eigen::VectorXd prior = memory.layout().prior_sd.array().square().inverse();
-  const double share = fitter.shape_variance_share(memory.told());
-  if (share <= 0.0) return Eigen::MatrixXd::Zero(n, n);
-  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(n, n);
-  Eigen::MatrixXd precision = own.ldlt().solve(identity);
-  precision.diagonal() -= prior;
-  precision /= share * static_cast<double>(memory.postures());
-  precision.diagonal() += prior;
-  return precision.ldlt().solve(identity);
 }
 
 }  // namespace bodyschema

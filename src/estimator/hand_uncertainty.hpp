@@ -26,8 +26,4 @@ struct HandUncertainty {
 HandUncertainty hand_uncertainty(FrameModel& model, const Exposure& exposure, const FusedState& known,
                                  const Eigen::MatrixXd& shape);
 
-/// What outlines that are wrong alike in all postures do to the state: as if one average posture alone were known,
-/// for the others err with it. No more than what was believed before any.
-Eigen::MatrixXd shape_covariance(const PostureMemory& memory, const OutlineFitter& fitter);
-
 }  // namespace bodyschema

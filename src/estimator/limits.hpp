@@ -50,18 +50,9 @@ inline constexpr double kNearer = 0.8;
 /// Statistical. What one more free parameter must be better by: ln of prior over posterior variance, usually.
 inline constexpr double kPerParameter = 9.0;
 
-/// Physical. Points of a part in a picture; of fewer the mean is a point's own error.
-inline constexpr double kFewestOfPart = 4.0;
-/// Statistical. Postures; of fewer the variance between them is not known.
-inline constexpr int kPosturesOfShape = 3;
-/// Statistical. Postures after which one has faded to 1/e: the estimate that left its residuals is no longer held.
+/// Statistical. Postures after which what one showed of the parts' shapes has faded to 1/e: the estimate that left its
+/// residuals is no longer held.
 inline constexpr double kRecentPostures = 12.0;
-/// Numerical. Of one posture: what has faded to less is as if it had not been seen.
-inline constexpr double kForgotten = 1e-3;
-
-/// Physical. Share of what parts get wrong that no fit takes up: parameters turn and shift a limb, which moves its two
-/// flanks against each other; to the outside of both at once, as a wrong shape does, few do.
-inline constexpr double kLeastLeft = 0.5;
 
 /// Statistical. A parameter further from what was believed than this many of its standard deviations contradicts it.
 inline constexpr double kBeyondBelief_sd = 4.0;

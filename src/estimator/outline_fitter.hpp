@@ -8,9 +8,10 @@
 #include "bodyschema/estimator/estimator_options.hpp"
 #include "bodyschema/evidence/outline_noise.hpp"
 #include "bodyschema/evidence/posture_memory.hpp"
+#include "bodyschema/evidence/shape_error.hpp"
 #include "frame_model.hpp"
 #include "hypothesis_scorer.hpp"
-#include "shape_error.hpp"
+#include "limits.hpp"
 
 namespace bodyschema {
 
@@ -122,7 +123,7 @@ class OutlineFitter {
   int search_renders_;               ///< at most, in one frame
   int searched_renders_ = 0;         ///< in this one
   int renders_ = 0;                  ///< of all that was looked at
-  ShapeError shape_;
+  ShapeError shape_{limits::kRecentPostures};
 };
 
 }  // namespace bodyschema

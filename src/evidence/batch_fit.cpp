@@ -4,6 +4,8 @@
 #include <numeric>
 #include <utility>
 
+#include "bodyschema/evidence/shape_error.hpp"
+
 namespace bodyschema {
 namespace {
 
@@ -41,7 +43,7 @@ MemoryLayout memory_layout(const State& state, const Considered& considered) {
 
 BatchFit::BatchFit(LogFit& fit, State state, const std::vector<Belief>& tolerances, const BatchSettings& settings)
     : fit_(fit), state_(std::move(state)), beside_(Considered::beside(state_, tolerances)), settings_(settings),
-      memory_(memory_layout(state_, beside_), unfading(settings.memory)),
+      memory_(memory_layout(state_, beside_), unfading(settings.memory)), estimate_(memory_.estimate()),
       noise_(fit.log().rig().cameras.size(), OutlineNoise(settings.noise)) {
   group_postures();
 }
@@ -73,8 +75,7 @@ std::vector<OutlineSearch> BatchFit::searches() const {
 }
 
 void BatchFit::widen(const Eigen::VectorXd& factor) {
-  widened_ = memory_.estimate();
-  for (auto* covariance : {&widened_->own, &widened_->covariance}) {
+  for (auto* covariance : {&estimate_.own, &estimate_.covariance}) {
     *covariance = (factor.asDiagonal() * *covariance * factor.asDiagonal()).eval();
   }
 }
@@ -127,9 +128,12 @@ void BatchFit::fuse(const std::vector<std::size_t>& pictures) {
   double robust_px = 0.0;
   for (const auto& noise : noise_) robust_px = std::max(robust_px, noise.robust_px());
   const Eigen::VectorXd start = state_.x();
-  widened_.reset();
+  std::vector<std::vector<OutlinePoint>> points(all.size());
+  const auto keep = [&](std::size_t p, std::span<const OutlinePoint> seen) {
+    points[p].assign(seen.begin(), seen.end());
+  };
   for (int round = 0; round < kRounds; ++round) {
-    at_ = fit_.linearise(state_.model(), coordinates, {kFinest_px, settings_.spacing_px, robust_px}, pictures);
+    at_ = fit_.linearise(state_.model(), coordinates, {kFinest_px, settings_.spacing_px, robust_px}, pictures, keep);
     misfit_ = fit_.misfit(at_, at_.sampled());
     const auto own = fit_.directions(at_, state_.model(), refs), other = fit_.directions(at_, beside_.effects, beside);
     std::vector<Eigen::Index> position(static_cast<std::size_t>(fit_.coordinates().size()), -1);
@@ -168,11 +172,33 @@ void BatchFit::fuse(const std::vector<std::size_t>& pictures) {
       }
       first = last;
     }
-    if (memory_.empty()) return;
+    if (memory_.empty()) break;
     state_.set(memory_.estimate().x);
     const Eigen::VectorXd moved = (state_.x() - x).cwiseQuotient(memory_.layout().prior_sd);
-    if (moved.cwiseAbs().maxCoeff() < 1e-3) return;
+    if (moved.cwiseAbs().maxCoeff() < 1e-3) break;
   }
+  estimate_ = memory_.estimate();
+  add_shape_error(points);
+}
+
+void BatchFit::add_shape_error(const std::vector<std::vector<OutlinePoint>>& points) {
+  const auto& cameras = fit_.log().rig().cameras;
+  ShapeError shape;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    std::vector<std::vector<OutlinePoint>> shown(postures_);  // a posture's pictures err alike
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      if (fit_.log().pictures()[p].camera != c) continue;
+      auto& own = shown[posture_of_[p]];
+      own.insert(own.end(), points[p].begin(), points[p].end());
+    }
+    for (const auto& own : shown) {
+      if (!own.empty()) shape.add(own, c, picture_unit(cameras[c].intrinsics));
+    }
+  }
+  const double share = shape.variance_px2(settings_.noise.floor_px, memory_.told()) / noise_.front().variance_px2();
+  const Eigen::MatrixXd covariance = shape_covariance(memory_, share);
+  estimate_.own += covariance;
+  estimate_.covariance += covariance;
 }
 
 }  // namespace bodyschema

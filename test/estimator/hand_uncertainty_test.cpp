@@ -47,19 +47,21 @@ TEST_F(HandOfOwnRobot, WhatShapesAddIsAdded) {
 }
 
 TEST_F(HandOfOwnRobot, ShapesAddNothingBeforeAnyPostureAndNoMoreThanThePriorAfterwards) {
-  EXPECT_EQ(shape_covariance(memory_, fitter_), Eigen::MatrixXd(Eigen::MatrixXd::Zero(7, 7)));
+  EXPECT_EQ(shape_covariance(memory_, fitter_.shape_variance_share(memory_.told())),
+            Eigen::MatrixXd(Eigen::MatrixXd::Zero(7, 7)));
   ErrorModel larger(model_->roles());
   larger.add("mesh_scale", EffectTarget{}).parameters()[0].value = 0.05;
   reach_.befall(larger);
   learn(4);
-  const Eigen::VectorXd variance = shape_covariance(memory_, fitter_).diagonal();
+  const Eigen::VectorXd variance = shape_covariance(memory_, fitter_.shape_variance_share(memory_.told())).diagonal();
   const Eigen::VectorXd prior = layout().prior_sd.cwiseAbs2();
   for (Eigen::Index k = 0; k < 7; ++k) {
     EXPECT_GT(variance[k], 0.0) << k;
     EXPECT_LE(variance[k], prior[k] * (1.0 + 1e-9)) << k;
   }
   fitter_.forget_shape();
-  EXPECT_EQ(shape_covariance(memory_, fitter_), Eigen::MatrixXd(Eigen::MatrixXd::Zero(7, 7)));
+  EXPECT_EQ(shape_covariance(memory_, fitter_.shape_variance_share(memory_.told())),
+            Eigen::MatrixXd(Eigen::MatrixXd::Zero(7, 7)));
 }
 
 }  // namespace

@@ -20,8 +20,8 @@ struct BatchSettings {
 };
 
 /// The answer of a whole log at once: a state fitted to all of its pictures, with the noise measured on what the fit
-/// leaves and the uncertainty by the same rules as in the running estimator (PostureMemory), all postures linearised
-/// about the result.
+/// leaves and the uncertainty by the same rules as in the running estimator (PostureMemory, ShapeError), all postures
+/// linearised about the result.
 class BatchFit {
  public:
   /// @param state  where it starts; beliefs about it are its priors
@@ -36,7 +36,7 @@ class BatchFit {
 
   [[nodiscard]] const State& state() const { return state_; }
   /// Values and covariance over the state's parameters.
-  [[nodiscard]] const MemoryEstimate& estimate() const { return widened_ ? *widened_ : memory_.estimate(); }
+  [[nodiscard]] const MemoryEstimate& estimate() const { return estimate_; }
   /// Standard deviations of the estimate times these factors, one a parameter: what a log says of itself beyond what
   /// its pictures' noise explains.
   void widen(const Eigen::VectorXd& factor);
@@ -56,13 +56,15 @@ class BatchFit {
   void group_postures();
   void measure(const std::vector<std::size_t>& pictures);
   void fuse(const std::vector<std::size_t>& pictures);
+  /// What outlines get wrong alike in all postures, on what the fit leaves of each picture.
+  void add_shape_error(const std::vector<std::vector<OutlinePoint>>& points);
 
   LogFit& fit_;
   State state_;
   Considered beside_;
   BatchSettings settings_;
   PostureMemory memory_;
-  std::optional<MemoryEstimate> widened_;
+  MemoryEstimate estimate_;
   std::vector<OutlineNoise> noise_;
   LinearLog at_;
   double misfit_ = 0.0;

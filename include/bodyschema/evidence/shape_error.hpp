@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "bodyschema/evidence/posture_memory.hpp"
 #include "bodyschema/outline/outline_measurement.hpp"
 
 namespace bodyschema {
@@ -22,6 +23,8 @@ namespace bodyschema {
 /// less those of the parameters that were fitted. Lengths are px of a 320x240 picture.
 class ShapeError {
  public:
+  /// @param memory_postures  after so many a posture counts 1/e; 0: none fades
+  explicit ShapeError(double memory_postures = 0.0);
   /// Adds one posture's picture.
   void add(std::span<const OutlinePoint> points, std::size_t camera, double unit_px);
   /// All pictures of a posture were added. Parameters as of `variance_px2`.
@@ -36,15 +39,21 @@ class ShapeError {
   [[nodiscard]] double lasting_variance_px2(double floor_px, double fitted) const;
   /// Whether enough postures were seen to tell.
   [[nodiscard]] bool known() const;
-  void forget() { *this = {}; }
+  void forget() { *this = ShapeError(memory_postures_); }
 
  private:
   struct Part {
     int seen = 0;                                                  ///< postures
     double postures = 0.0, weight = 0.0, sum = 0.0, square = 0.0;  ///< of mean residuals; fading
   };
+  double memory_postures_, kept_;                              ///< kept: of what was there, when a posture comes
   std::map<std::pair<std::size_t, std::size_t>, Part> parts_;  ///< by camera and part
   double postures_ = 0.0, recent_px2_ = 0.0;                   ///< fading; the variance's mean over these
 };
+
+/// What outlines that are wrong alike in all postures do to a memory's estimate: as if one average posture alone were
+/// known, for the others err with it. No more than what was believed before any. To be added to what the memory knows.
+/// @param variance_share  ShapeError's variance over that of the residuals which the memory was taught with
+Eigen::MatrixXd shape_covariance(const PostureMemory& memory, double variance_share);
 
 }  // namespace bodyschema

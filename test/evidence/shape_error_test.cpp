@@ -1,4 +1,4 @@
-#include "../../src/estimator/shape_error.hpp"
+#include "bodyschema/evidence/shape_error.hpp"
 
 #include <gtest/gtest.h>
 
