@@ -89,7 +89,7 @@ class Calibrator {
     WatchedLog watched = watch_log(pipeline_,
                                    {.log = options_.log,
                                     .picture_rate_hz = options_.picture_rate_hz,
-                                    .kept = raw() ? kRawKept : 12,
+                                    .kept = raw() || given() ? kRawKept : 12,
                                     .quiet = options_.quiet},
                                    false);
     refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);
@@ -120,6 +120,7 @@ class Calibrator {
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
     leave_out_sections(fit, *best);
+    if (given()) read_once_more(watched.kept, fit, *best);
     describe(fit, *best);
     judge_left_out();
     progress(0.9);
@@ -274,6 +275,43 @@ class Calibrator {
 
   /// Encoders and cameras as they are configured.
   std::vector<Corrections> nominal(LogFit& fit) const { return fit.predict(ErrorModel(log_->roles()), {}).corrections; }
+
+  // --- masks that were given ----------------------------------------------------------------------
+
+  [[nodiscard]] bool given() const { return pipeline_.vision().method == SegmentationMethod::kGiven; }
+
+  /// Masks that somebody made are one reading of the pictures. What all of them get wrong alike, postures do not show;
+  /// the pictures read once more, by colours and edges about the answer, do.
+  void read_once_more(const std::vector<Observation>& kept, LogFit& fit, BatchFit& best) {
+    const bool pictures = std::any_of(kept.begin(), kept.end(), [](const Observation& o) {
+      return std::any_of(o.cameras.begin(), o.cameras.end(), [](const auto& c) { return c && !c->image.empty(); });
+    });
+    const bool credible = implausible_.empty() && beyond_belief(best).empty();  // what is not, is not to be applied
+    if (!pictures || !credible || !is_near(best)) return;
+    RawPictures masks(*log_, VisionSetup::from(configuration_.section("vision")), kept);
+    const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
+    std::optional<PictureLog> given;
+    std::optional<BatchFit> own;
+    for (const double reach_px : kReachesAgain) {
+      PictureLog before = masks.about(own ? own->at().corrections : best.at().corrections, reach_px);
+      if (!given) given.emplace(std::move(before));
+      fit.refresh();
+      BatchFit next(fit, own ? own->state() : best.state(), beliefs.tolerances, settings());
+      next.run(reach_px, {});
+      own.emplace(std::move(next));
+    }
+    *log_ = std::move(*given);
+    fit.refresh();
+    if (!is_near(*own)) {
+      result_.remarks.push_back("colours and edges of the pictures do not show the robot: masks are as good as given");
+      return;
+    }
+    const auto joint = moved_joint(best.state(), best.estimate(), own->estimate());
+    best.meet(own->memory().estimate());
+    if (joint.empty()) return;
+    result_.remarks.push_back("masks and the pictures' own edges disagree about " + joint +
+                              ": the answer lies between them, and by so much it is uncertain");
+  }
 
   // --- fit --------------------------------------------------------------------------------------
 

@@ -80,6 +80,20 @@ void BatchFit::widen(const Eigen::VectorXd& factor) {
   }
 }
 
+void BatchFit::meet(const MemoryEstimate& other) {
+  const Eigen::MatrixXd own = memory_.estimate().own;
+  // P_b of (P_a + P_b)^-1 P_b, without an inverse of what is hardly known.
+  const Eigen::VectorXd moved = own * (own + other.own).ldlt().solve(other.x - estimate_.x);
+  estimate_.x += moved;
+  for (auto* covariance : {&estimate_.own, &estimate_.covariance}) *covariance += moved * moved.transpose();
+  state_.set(estimate_.x);
+  std::vector<std::size_t> pictures;
+  for (std::size_t p = 0; p < at_.evidence.size(); ++p) {
+    if (at_.evidence[p].weight > 0.0) pictures.push_back(p);
+  }
+  at_ = fit_.linearise(state_.model(), at_.coordinates, searches().front(), pictures);
+}
+
 void BatchFit::run(double from_px, const std::vector<std::size_t>& pictures) {
   const auto variance = [&] {
     double sum = 0.0;

@@ -22,6 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 const std::map<std::string, double> kOffsets_deg = {{"joint1", 3.0}, {"joint2", -2.0}, {"joint3", 4.0},
                                                     {"joint4", 2.0}, {"joint5", -3.0}, {"joint6", 2.0},
@@ -72,10 +73,7 @@ class Calibrated : public ::testing::Test {
     return options;
   }
 
-  /// Ten postures of the simulated arm, white on black: pictures that are their own masks.
-  fs::path recorded() { return recorded(simulator::Output::kSilhouettes, kOffsets_deg); }
-  fs::path recorded(simulator::Output output, const std::map<std::string, double>& offsets_deg,
-                    bool scrambled = false) {
+  static simulator::Simulator simulation(simulator::Output output, const std::map<std::string, double>& offsets_deg) {
     const auto configuration = arm7("simulator.yaml", {});
     const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
     const StereoRig rig = StereoRig::from(configuration.section("cameras"));
@@ -88,7 +86,13 @@ class Calibrated : public ::testing::Test {
     plan.offsets_deg = offsets_deg;
     plan.output = output;
     if (output == simulator::Output::kPictures) settings.camera_rate_hz = 1.0;
-    simulator::Simulator simulator(load_robot(setup, rig), setup, rig, settings, plan);
+    return {load_robot(setup, rig), setup, rig, settings, plan};
+  }
+  /// Ten postures of the simulated arm, white on black: pictures that are their own masks.
+  fs::path recorded() { return recorded(simulator::Output::kSilhouettes, kOffsets_deg); }
+  fs::path recorded(simulator::Output output, const std::map<std::string, double>& offsets_deg,
+                    bool scrambled = false) {
+    auto simulator = simulation(output, offsets_deg);
     LogWriter log(folder_ / "log");
     simulator::FramePublisher publisher(
         simulator.joint_names(), {.channels = Channels::with_prefix("ARM7"),
@@ -105,6 +109,34 @@ class Calibrated : public ::testing::Test {
       if (shown) publisher.publish(*frame, log);
     }
     return folder_ / "log";
+  }
+
+  /// Pictures with masks that are alike wrong in all postures: further to the right by `px`.
+  fs::path recorded_with_masks(int px) {
+    auto simulator = simulation(simulator::Output::kPictures, kOffsets_deg);
+    Channels channels = Channels::with_prefix("ARM7");
+    simulator::FramePublisher pictures(simulator.joint_names(), {.channels = channels});
+    channels.cameras = channels.masks;
+    channels.joint_state = "NOBODY";
+    simulator::FramePublisher masks(simulator.joint_names(),
+                                    {.channels = channels, .format = simulator::PictureFormat::kMasks});
+    LogWriter log(folder_ / "log");
+    while (auto frame = simulator.next()) {
+      if (frame->phase != simulator::Phase::kMotion) continue;
+      pictures.publish(*frame, log);
+      for (auto& seen : frame->cameras) {
+        if (seen) move_to_the_right(*seen, px);
+      }
+      masks.publish(*frame, log);
+    }
+    return folder_ / "log";
+  }
+  static void move_to_the_right(simulator::CameraFrame& seen, int px) {
+    const int width = seen.silhouette.width();
+    for (int v = 0; v < seen.silhouette.height(); ++v) {
+      auto* row = seen.coverage.data() + static_cast<std::ptrdiff_t>(v) * width;
+      for (int u = width - 1; u >= 0; --u) row[u] = u < px || row[u - px] < 128 ? 0 : 255;
+    }
   }
 
   Calibration calibration(const fs::path& log, std::vector<std::string> overrides) {
@@ -171,7 +203,7 @@ TEST_F(Calibrated, HowAHandIsMountedIsWrittenOfAGoodResultOnly) {
   const std::string place = R"(xyz="0 0 0.11" rpy="0 0 -0.785398163397")",
                     further = R"(xyz="0 0 0.14" rpy="0 0 -0.785398163397")";
   EXPECT_EQ(calibration(log, {"estimator.state.hand_mount={sd_deg: 10, sd_mm: 5}"}).state, CalibrationState::kGood);
-  EXPECT_THAT(text_of(folder_ / "out" / "corrected.urdf"), testing::Not(testing::HasSubstr(place)));
+  EXPECT_THAT(text_of(folder_ / "out" / "corrected.urdf"), Not(HasSubstr(place)));
 
   // 30 mm further out than it is, which is more than anybody believes possible.
   std::string urdf = text_of(fs::path(BODYSCHEMA_SOURCE_DIR) / "meshes/arm7/arm7.urdf");
@@ -181,7 +213,7 @@ TEST_F(Calibrated, HowAHandIsMountedIsWrittenOfAGoodResultOnly) {
   const auto result = calibration(
       log, {"estimator.state.hand_mount={sd_deg: 10, sd_mm: 2}", "robot.urdf=" + (folder_ / "other.urdf").string()});
   EXPECT_NE(result.state, CalibrationState::kGood);
-  EXPECT_THAT(text_of(folder_ / "out" / "corrected.urdf"), testing::HasSubstr(further)) << result.sentence;
+  EXPECT_THAT(text_of(folder_ / "out" / "corrected.urdf"), HasSubstr(further)) << result.sentence;
 }
 
 /// Two cameras on one bar keep what their own calibration says: where both are hardly known to the robot, they are well
@@ -237,6 +269,22 @@ TEST_F(Calibrated, PicturesWithoutMasksDoWhereTheCameraStandsStill) {
         << joint.name;
   }
   EXPECT_GE(told, 4);
+}
+
+/// Masks of which nobody has reason to doubt: the pictures say the same. And some that lie beside the robot.
+TEST_F(Calibrated, GivenMasksAreHeldAgainstTheirPictures) {
+  for (const int px : {0, 2}) {
+    const auto result = calibrated(recorded_with_masks(px), {"vision.method=given"});
+    EXPECT_EQ(result.state, CalibrationState::kGood) << result.sentence;
+    if (px == 0) {
+      for (const auto& remark : result.remarks) EXPECT_THAT(remark, Not(HasSubstr("disagree"))) << px;
+    }
+    for (const auto& joint : result.joints) {
+      if (!joint.told) continue;
+      EXPECT_NEAR(degrees(joint.offset_rad), kOffsets_deg.at(joint.name), 2.5 * std::hypot(degrees(joint.sd_rad), 0.05))
+          << joint.name << ", " << px << " px";
+    }
+  }
 }
 
 // Masks that are made about a prediction follow it: what they agree with is itself.

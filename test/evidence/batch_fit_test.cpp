@@ -89,6 +89,47 @@ TEST_F(BatchFitOfOwnRobot, WhatIsConsideredWidensAndContains) {
   EXPECT_NEAR(found.estimate().x[found.state().find("link_length", {"r_wrist_pitch", ""}, 0)], 0.005, 0.001);
 }
 
+/// A hand that is larger than its mesh is so in all postures: their number does not make its joints better known.
+TEST_F(BatchFitOfOwnRobot, WhatShapesGetWrongAlikeWidens) {
+  ErrorModel larger(roles_);
+  larger.add("mesh_scale", {"", roles_.segments.back().name}).parameters()[0].value = 0.15;
+  const auto log = log_of(observe(3 * kPostures, paper_offsets_rad(), &larger));
+  LogFit fit(*log, 2);
+  const BatchFit batch = fitted(fit);
+  EXPECT_LT(in_sd(batch).cwiseAbs().maxCoeff(), 3.0);
+  const Eigen::VectorXd by_postures = batch.memory().estimate().covariance.diagonal().head(7).cwiseSqrt();
+  EXPECT_GT((batch.estimate().x.head(7) - paper_offsets_rad()).cwiseQuotient(by_postures).cwiseAbs().maxCoeff(), 3.0)
+      << "who takes every posture for a witness of its own believes it too well";
+}
+
+/// Another reading of the pictures that is as good lies as near to what is right.
+TEST_F(BatchFitOfOwnRobot, MeetsAnotherReadingHalfWayAndKnowsItNoBetter) {
+  const auto log = log_of(seen_);
+  LogFit fit(*log, 2);
+  BatchFit batch = fitted(fit);
+  const MemoryEstimate before = batch.memory().estimate();
+  MemoryEstimate other = before;
+  other.x[3] += radians(2.0);
+  batch.meet(other);
+  EXPECT_NEAR(batch.estimate().x[3], before.x[3] + radians(1.0), 1e-9);
+  EXPECT_EQ(batch.state().x(), batch.estimate().x);
+  EXPECT_NEAR(std::sqrt(batch.estimate().covariance(3, 3) - before.covariance(3, 3)), radians(1.0), radians(0.1));
+  EXPECT_NEAR(batch.estimate().x[2], before.x[2], 1e-9);
+  EXPECT_GT(batch.at().rms_px(), 0.3) << "pictures about where it is now";
+}
+
+TEST_F(BatchFitOfOwnRobot, AReadingThatKnowsNothingMovesNothing) {
+  const auto log = log_of(seen_);
+  LogFit fit(*log, 2);
+  BatchFit batch = fitted(fit);
+  const MemoryEstimate before = batch.estimate();
+  MemoryEstimate other = before;
+  other.x.setZero();
+  other.own = batch.memory().layout().prior_sd.cwiseAbs2().asDiagonal();
+  batch.meet(other);
+  EXPECT_LT((batch.estimate().x - before.x).cwiseAbs().maxCoeff(), radians(0.02));
+}
+
 /// Postures that were not looked at are explained all the same.
 TEST_F(BatchFitOfOwnRobot, OfSomePicturesItPredictsTheOthers) {
   const auto log = log_of(seen_);

@@ -10,6 +10,7 @@ namespace bodyschema {
 namespace {
 
 constexpr double kFloor_px = 0.1;
+constexpr double kRecent = 12.0;  ///< postures
 
 /// Eight points of each of some parts, all with the part's residual, px.
 std::vector<OutlinePoint> outline(const std::vector<double>& residual_px) {
@@ -68,6 +69,16 @@ TEST(ShapeError, APartThatAFitFollowsIsNotBetterThanMost) {
   EXPECT_NEAR(shape.variance_px2(0.0, 0.0), 8.0, 1e-9);
 }
 
+TEST(ShapeError, OfAWholeLogNothingFades) {
+  ShapeError shape;
+  for (int i = 0; i < 30; ++i) shape.add(outline({1.0, -1.0, 1.0}), 0, 1.0);
+  for (int i = 0; i < 30; ++i) shape.add(outline({0.0, 0.0, 0.0}), 0, 1.0);
+  ShapeError half;
+  for (int i = 0; i < 60; ++i) half.add(outline({0.5, -0.5, 0.5}), 0, 1.0);
+  // Less by what differs between the postures, which leaves the mean so uncertain.
+  EXPECT_NEAR(shape.variance_px2(0.0, 0.0), half.variance_px2(0.0, 0.0) - 8.0 * 0.25 / 59.0, 1e-9);
+}
+
 TEST(ShapeError, WhatDiffersFromPostureToPostureIsNone) {
   ShapeError shape;
   std::mt19937_64 random(test::seed());
@@ -92,7 +103,7 @@ TEST(ShapeError, FewPosturesDoNotTellItFromChance) {
 
 /// What an earlier estimate left is no longer there once the estimate has moved.
 TEST(ShapeError, EarlierPosturesFade) {
-  ShapeError shape;
+  ShapeError shape(kRecent);
   for (int i = 0; i < 5; ++i) shape.add(outline({2.0, -2.0}), 0, 1.0);
   for (int i = 0; i < 60; ++i) shape.add(outline({0.0, 0.0}), 0, 1.0);
   EXPECT_EQ(shape.variance_px2(kFloor_px, 0.0), 0.0);
@@ -101,7 +112,7 @@ TEST(ShapeError, EarlierPosturesFade) {
 /// A fingertip that was far off in the one posture that showed it, long ago, kept the whole hand's uncertainty up for
 /// the rest of a log.
 TEST(ShapeError, PartsThatAreNoLongerShownFadeAsWell) {
-  ShapeError shape;
+  ShapeError shape(kRecent);
   shape.add(outline({0.1, -0.1, 0.1, 2.0}), 0, 1.0);
   const double at_first = shape.variance_px2(0.0, 0.0);
   double before = at_first;
@@ -112,7 +123,7 @@ TEST(ShapeError, PartsThatAreNoLongerShownFadeAsWell) {
   }
   EXPECT_LT(before, 0.1 * at_first);
   for (int i = 0; i < 200; ++i) shape.add(outline({0.1, -0.1, 0.1}), 0, 1.0);
-  ShapeError without;
+  ShapeError without(kRecent);
   for (int i = 0; i < 231; ++i) without.add(outline({0.1, -0.1, 0.1}), 0, 1.0);
   EXPECT_NEAR(shape.variance_px2(0.0, 0.0), without.variance_px2(0.0, 0.0), 1e-6) << "as if it had not been seen";
 }
@@ -121,7 +132,7 @@ TEST(ShapeError, PartsThatAreNoLongerShownFadeAsWell) {
 /// the variance as the last postures have it, a hand of which 3 mm were said to be open was known to 0.4 mm one posture
 /// later.
 TEST(ShapeError, LastsOverPosturesThatShowLittleOfIt) {
-  ShapeError shape;
+  ShapeError shape(kRecent);
   const auto add = [&shape](double residual_px) {
     shape.add(outline({residual_px, -residual_px, residual_px}), 0, 1.0);
     shape.end_posture(0.0, 0.0);

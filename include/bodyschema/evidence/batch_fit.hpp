@@ -40,6 +40,10 @@ class BatchFit {
   /// Standard deviations of the estimate times these factors, one a parameter: what a log says of itself beyond what
   /// its pictures' noise explains.
   void widen(const Eigen::VectorXd& factor);
+  /// Another reading of the same pictures, of no less say: the state moves to the mean of both, each weighted by what
+  /// it claims to know, and is uncertain by as much as it moved. (Two readings of one thing share what pictures and
+  /// postures get wrong; half their difference is what each reading errs by.)
+  void meet(const MemoryEstimate& other);
   [[nodiscard]] const PostureMemory& memory() const { return memory_; }
   [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
   /// The pictures about the result; evidence over LinearLog::coordinates.
