@@ -10,12 +10,12 @@
 namespace bodyschema {
 
 double hand_sd_limit_m(const EstimatorOptions& options, const State& state, const HandUncertainty& hand,
-                       double distance_m) {
+                       double pixel_m) {
   if (options.converged_hand_sd_m > 0.0) return options.converged_hand_sd_m;
   constexpr double kMore = 1.5;
-  const double near_m = limits::kHandPerDistance * distance_m;
-  const double own_m = std::min(limits::kMostPerDistance * near_m,
-                                std::hypot(near_m, limits::kOfDescription * hand.described_sd_m(state)));
+  const double own_m =
+      std::min(limits::kMostHand_px * pixel_m,
+               std::hypot(limits::kHand_px * pixel_m, limits::kOfDescription * hand.described_sd_m(state)));
   return std::hypot(own_m, kMore * hand.tolerated_sd_m());
 }
 

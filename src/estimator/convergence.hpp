@@ -12,8 +12,9 @@ namespace bodyschema {
 
 /// How well the hand is to be known for `converged`, m: as configured, or as well as its distance and what is tolerated
 /// allow.
+/// @param pixel_m  what a pixel of a 320x240 picture shows at that distance
 double hand_sd_limit_m(const EstimatorOptions& options, const State& state, const HandUncertainty& hand,
-                       double distance_m);
+                       double pixel_m);
 
 /// What is wrong by more than is believed possible, and what to do; empty: nothing.
 std::string misfit(const PostureMemory& memory, const State& state);

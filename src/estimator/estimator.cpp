@@ -178,8 +178,10 @@ struct Estimator::Impl {
       const auto hand = hand_uncertainty(model, frame.exposures[0], known, shape);
       estimate.hand_sd_m = hand.sd_m();
       if (!particles_only()) {
+        const std::size_t camera = frame.exposures[0].at.camera;
+        const double px = rig.cameras[camera].intrinsics.fx / model.picture_unit_px(camera);
         estimate.hand_sd_limit_m =
-            hand_sd_limit_m(options, model.state(), hand, estimate.X_CP.front().translation().norm());
+            hand_sd_limit_m(options, model.state(), hand, estimate.X_CP.front().translation().norm() / px);
       }
     }
     tracker.hand_known_to(estimate.hand_sd_m);

@@ -68,11 +68,11 @@ inline constexpr double kAlternative_s = 3.0;
 inline constexpr double kSearchSpread_rad = 0.0349066;
 /// Physical. rad; of slips that are searched for at once; larger ones take more frames.
 inline constexpr double kLargestSlip_rad = 0.2094395;
-/// Physical. of the distance to the camera: how well hands are to be known where nobody says (1 mm at 0.35 m).
-inline constexpr double kHandPerDistance = 1.0 / 350.0;
+/// Physical. Pixels of a 320x240 picture, at the hand's distance: how well hands are to be known where nobody says.
+inline constexpr double kHand_px = 1.0;
 /// Physical. ... or to this share of what the description of links and cameras leaves open, where that is more,
 inline constexpr double kOfDescription = 0.25;
-/// Physical. ... but no worse than by so many times the distance's share.
-inline constexpr double kMostPerDistance = 3.0;
+/// Physical. ... but no worse than this many pixels.
+inline constexpr double kMostHand_px = 2.0;
 
 }  // namespace bodyschema::limits

@@ -94,20 +94,20 @@ TEST_F(ConvergenceOfOwnRobot, WhatNobodyBelievesIsAMisfitByName) {
   EXPECT_THAT(estimate_.misfit, HasSubstr("6 times what is believed possible"));
 }
 
-TEST_F(ConvergenceOfOwnRobot, TheLimitIsAsConfiguredOrByDistanceAndTolerances) {
+TEST_F(ConvergenceOfOwnRobot, TheLimitIsAsConfiguredOrByAPixelAndTolerances) {
   HandUncertainty hand{1e-6 * Eigen::Matrix3d::Identity(), 1e-6 * Eigen::Matrix3d::Identity(),
                        Eigen::MatrixXd::Zero(3, 2)};
   EstimatorOptions options;
   options.converged_hand_sd_m = 0.004;
-  EXPECT_EQ(hand_sd_limit_m(options, state_, hand, 0.35), 0.004);
+  EXPECT_EQ(hand_sd_limit_m(options, state_, hand, 0.001), 0.004);
   options.converged_hand_sd_m = 0.0;
-  EXPECT_NEAR(hand_sd_limit_m(options, state_, hand, 0.35), 0.001, 1e-12);
-  EXPECT_NEAR(hand_sd_limit_m(options, state_, hand, 0.70), 0.002, 1e-12);
+  EXPECT_NEAR(hand_sd_limit_m(options, state_, hand, 0.001), 0.001, 1e-12);
+  EXPECT_NEAR(hand_sd_limit_m(options, state_, hand, 0.002), 0.002, 1e-12);
   hand.covariance_m2 = 4e-6 * Eigen::Matrix3d::Identity();
-  EXPECT_NEAR(hand_sd_limit_m(options, state_, hand, 0.35), std::hypot(1e-3, 1.5 * 3e-3), 1e-12);
+  EXPECT_NEAR(hand_sd_limit_m(options, state_, hand, 0.001), std::hypot(1e-3, 1.5 * 3e-3), 1e-12);
   hand.covariance_m2 = hand.own_m2;
   hand.J.col(1).setConstant(1e3);
-  EXPECT_NEAR(hand_sd_limit_m(options, state_, hand, 0.35), 0.003, 1e-12) << "descriptions leave no more than this";
+  EXPECT_NEAR(hand_sd_limit_m(options, state_, hand, 0.001), 0.002, 1e-12) << "descriptions leave no more than this";
 }
 
 }  // namespace
