@@ -76,6 +76,8 @@ constexpr double kSettled_sd = 2.0;  ///< statistical
 constexpr double kRough_px = 30.0, kAnywhere_px = 1e3;
 constexpr double kHardlyKnown_rad = radians(3.0);  ///< ... and so are those of a camera that may be turned by more
 constexpr std::size_t kRawKept = 128;              ///< observations of such a log whose pictures are looked at
+constexpr std::size_t kReadAgain = 32;             ///< ... of one with masks, to hold these against them
+constexpr std::size_t kShown = 12;                 ///< ... of any other, for the report alone
 
 class Calibrator {
  public:
@@ -89,7 +91,9 @@ class Calibrator {
     WatchedLog watched = watch_log(pipeline_,
                                    {.log = options_.log,
                                     .picture_rate_hz = options_.picture_rate_hz,
-                                    .kept = raw() || given() ? kRawKept : 12,
+                                    .kept = raw()     ? kRawKept
+                                            : given() ? kReadAgain
+                                                      : kShown,
                                     .quiet = options_.quiet},
                                    false);
     refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);

@@ -14,8 +14,7 @@ class TrackerOfOwnRobot : public OutlinesOfOwnRobot {
  protected:
   static constexpr std::size_t kLeastPostures = 3;
   TrackerOfOwnRobot()
-      : known_(model_->state(), layout(), {}, kLeastPostures),
-        occlusion_(*model_, *scorer_, rig_, setup_.hand_link),
+      : known_(model_->state(), layout(), {}, kLeastPostures), occlusion_(*model_, *scorer_, rig_, setup_.hand_link),
         tracker_(*model_, *scorer_, *particles_, fitter_, occlusion_, known_, options_) {
     known_.x = nothing_;
     tracker_.reset();
