@@ -53,7 +53,7 @@ double size_of(const Corrections& c) {
 
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
-  EXPECT_EQ(shipped_effects().size(), 29u);
+  EXPECT_EQ(shipped_effects().size(), 30u);
   auto at = instant(r);
   at.q.setConstant(0.7);
   at.encoder.setConstant(0.8);
@@ -322,19 +322,19 @@ TEST(Cameras, CorrectionsReachTheRightEye) {
   EXPECT_NEAR(corrections(*make_effect("distortion", {}, r), 0.05, at).camera.k1, 0.05, 1e-15);
 }
 
-TEST(Cameras, ThePoseIsThatOfTheRigThePairThatOfTheSecondAlone) {
+TEST(Cameras, ThePoseIsThatOfTheRigThePairThatOfTheSecondAloneAndTheFirstHasItsOwn) {
   const auto r = roles();
   for (const std::size_t camera : {0u, 1u}) {
     auto at = instant(r);
     at.camera = camera;
-    for (const std::string name : {"camera_pose", "camera_pair"}) {
+    for (const std::string name : {"camera_pose", "camera_pair", "first_camera"}) {
       const auto effect = make_effect(name, {}, r);
       for (std::size_t i = 0; i < 6; ++i) effect->parameters()[i].value = 0.01 * static_cast<double>(i + 1);
       Corrections c = r.no_corrections();
       effect->apply(at, c);
       const Eigen::Vector3d shift(0.01, 0.02, 0.03), turn(0.04, 0.05, 0.06);
-      const bool pair = name == "camera_pair";
-      const double rig = pair ? 0.0 : 1.0, own = pair && camera == 1 ? 1.0 : 0.0;
+      const double rig = name == "camera_pose" ? 1.0 : 0.0;
+      const double own = rig == 0.0 && camera == (name == "camera_pair" ? 1u : 0u) ? 1.0 : 0.0;
       EXPECT_LT((c.camera.rig_shift_m - rig * shift).norm() + (c.camera.rig_turn_rad - rig * turn).norm(), 1e-15);
       EXPECT_LT((c.camera.shift_m - own * shift).norm() + (c.camera.turn_rad - own * turn).norm(), 1e-15) << camera;
     }
@@ -344,7 +344,7 @@ TEST(Cameras, ThePoseIsThatOfTheRigThePairThatOfTheSecondAlone) {
 TEST(Cameras, OneCameraHasNoPair) {
   auto r = roles();
   r.cameras = {"only"};
-  for (const char* name : {"camera_pair", "baseline"}) {
+  for (const char* name : {"camera_pair", "first_camera", "baseline"}) {
     EXPECT_TRUE(effect_targets(name, r).empty()) << name;
     EXPECT_THAT([&] { make_effect(name, {}, r); },
                 testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr(name)));
