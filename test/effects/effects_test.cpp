@@ -261,9 +261,36 @@ TEST(Latency, FollowsThePathOfTheArmWhereItIsKnown) {
       EXPECT_NEAR(dq_deg(corrections(*effect, delay_ms, at), kElbow),
                   degrees(angle(t_s - 1e-3 * delay_ms) - angle(t_s)), 0.02);
     }
-    EXPECT_NEAR(dq_deg(corrections(*effect, 300.0, at), kElbow),
-                degrees(-0.3 * at.qdot[kElbow] + 0.045 * at.qddot[kElbow]), 1e-9)
+    EXPECT_NEAR(dq_deg(corrections(*effect, 500.0, at), kElbow),
+                degrees(-0.5 * at.qdot[kElbow] + 0.125 * at.qddot[kElbow]), 1e-9)
         << "beyond the path";
+  }
+}
+
+/// Where the arm is 207 ms later is not where it would be 73 and 134 ms later, one after the other from here.
+TEST(Latency, AddsUpWithASkewAlongThePathOfTheArm) {
+  const auto r = roles();
+  const auto early = make_effect("latency", {}, r), skewed = make_effect("camera_skew", {}, r);
+  early->parameters()[0].value = -0.073;
+  skewed->parameters()[0].value = 0.134;
+  const auto angle = [](double t_s) { return 0.5 * std::sin(3.0 * t_s); };
+  std::vector<JointSample> samples;
+  for (int i = 0; i <= 300; ++i) {
+    samples.push_back({.utime = microseconds(0.01 * i), .q = instant(r).q, .qdot = {}});
+    samples.back().q[kElbow] = angle(0.01 * i);
+  }
+  for (const double t_s : {1.0, 1.3, 1.6}) {
+    auto at = instant(r);
+    at.camera = 1;
+    joint_path(samples, microseconds(t_s), at.path);
+    for (const bool first : {true, false}) {
+      Corrections c = r.no_corrections();
+      (first ? early : skewed)->apply(at, c);
+      (first ? skewed : early)->apply(at, c);
+      EXPECT_NEAR(dq_deg(c, kElbow), degrees(angle(t_s + 0.207) - angle(t_s)), 0.02) << t_s;
+      c.clear();
+      EXPECT_EQ(c.later_s, 0.0);
+    }
   }
 }
 
