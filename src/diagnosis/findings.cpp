@@ -521,7 +521,7 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
           e.duration_s = found.duration_s;
         }
         cause.parameters.push_back(std::move(e));
-        cause.implausible = cause.implausible || std::abs(value) > limits::kImplausible * parameter.typical;
+        cause.implausible = cause.implausible || std::abs(value) > largest_plausible(log, *effect, parameter);
       }
       find_class(reduced, columns, columns, reduced.own, candidates, cause);
     }
