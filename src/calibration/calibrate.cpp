@@ -596,7 +596,9 @@ class Calibrator {
     Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, state.size());
     for (Eigen::Index k = 0; k < state.size(); ++k) {
       const auto& effect = state.model()[state.parameters()[static_cast<std::size_t>(k)].ref.effect].name();
-      if (effect != "camera_pose" && effect != "camera_pair" && effect != "baseline") continue;
+      if (effect != "camera_pose" && effect != "camera_pair" && effect != "first_camera" && effect != "baseline") {
+        continue;
+      }
       any = true;
       Eigen::VectorXd changed = x;
       changed[k] += kStep;

@@ -399,13 +399,29 @@ std::vector<Candidate> stated_slips(LogFit& fit, const LogAbout& log, const Bloc
   return list;
 }
 
-bool is_told(const Candidate& candidate, const JointRoles& roles, double threshold) {
+double largest_plausible(const LogAbout& log, const Effect& effect, const EffectParameter& parameter) {
+  const double largest = limits::kImplausible * parameter.typical;
+  const auto& joint = effect.target().joint;
+  if (!effect.follows_gravity() || joint.empty()) return largest;
+  const auto& roles = log.state.model().roles();
+  const auto at = roles.index(joint);
+  double torque_nm = 0.0;
+  for (const auto& instant : log.at.instants) {
+    if (instant.gravity_torque.size() > 0) torque_nm = std::max(torque_nm, std::abs(instant.gravity_torque[at]));
+  }
+  const auto offset = make_effect("joint_offset", {joint, ""}, roles);
+  const double angle = limits::kImplausible * std::as_const(*offset).parameters()[0].typical;
+  return std::max(largest, torque_nm > 0.0 ? angle / torque_nm : 0.0);
+}
+
+bool is_told(const LogAbout& log, const Candidate& candidate, double threshold) {
+  const auto& roles = log.state.model().roles();
   const auto effect = make_effect(candidate.cause.name, {candidate.cause.joint, candidate.cause.source}, roles);
   Eigen::Index i = 0;
   for (const auto& p : std::as_const(*effect).parameters()) {
     if (!p.fitted) continue;
     const double t = student_quantile(normal_tail(threshold), candidate.scores.dof[i]);
-    if (t < limits::kImplausible * p.typical * std::sqrt(std::max(0.0, candidate.scores.S(i, i)))) return true;
+    if (t < largest_plausible(log, *effect, p) * std::sqrt(std::max(0.0, candidate.scores.S(i, i)))) return true;
     ++i;
   }
   return false;

@@ -98,8 +98,12 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
 std::vector<Candidate> stated_slips(LogFit& fit, const LogAbout& log, const BlockRegression& base,
                                     const std::vector<Microseconds>& times);
 
+/// The largest size of a parameter that is found on any robot, SI: a multiple of the typical one. How far a joint gives
+/// way under each Nm says little where it carries little: such a joint may turn by as much as the largest offset.
+double largest_plausible(const LogAbout& log, const Effect& effect, const EffectParameter& parameter);
+
 /// Whether a cause would stand out of a log, with this threshold of z, before it is larger than on any robot.
-bool is_told(const Candidate& candidate, const JointRoles& roles, double threshold);
+bool is_told(const LogAbout& log, const Candidate& candidate, double threshold);
 
 /// First and last picture in which the robot was found, s since the Unix epoch.
 std::pair<double, double> seen_span(const LogFit& fit, const LinearLog& at);

@@ -287,7 +287,7 @@ class Diagnoser {
       if (!without) without = field.base.heldout().total();
       Trial trial{&candidate, field.base.heldout(candidate.columns), 0.0, true};
       trial.gain = *without - trial.heldout.total();
-      trial.plausible = is_plausible(candidate, trial.heldout.estimate.tail(candidate.columns.size()));
+      trial.plausible = is_plausible(field.log, candidate, trial.heldout.estimate.tail(candidate.columns.size()));
       if (trial.gain > 0.0 && !says_hardly_more(candidate, trial.gain)) trials.push_back(std::move(trial));
     }
     std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.gain > b.gain; });
@@ -308,13 +308,25 @@ class Diagnoser {
            });
   }
 
-  [[nodiscard]] bool is_plausible(const Candidate& candidate, const Eigen::VectorXd& estimate) const {
+  [[nodiscard]] double room_of(const LogAbout& log, const Candidate& candidate) const {
+    if (candidate.generic()) return 1.0;
+    const auto effect =
+        make_effect(candidate.cause.name, {candidate.cause.joint, candidate.cause.source}, fit_.log().roles());
+    double room = 1.0;
+    for (const auto& p : std::as_const(*effect).parameters()) {
+      if (p.fitted) room = std::max(room, largest_plausible(log, *effect, p) / (limits::kImplausible * p.typical));
+    }
+    return room;
+  }
+
+  [[nodiscard]] bool is_plausible(const LogAbout& log, const Candidate& candidate,
+                                  const Eigen::VectorXd& estimate) const {
     if (candidate.generic()) return true;
     const auto effect =
         make_effect(candidate.cause.name, {candidate.cause.joint, candidate.cause.source}, fit_.log().roles());
     Eigen::Index i = 0;
     for (const auto& p : std::as_const(*effect).parameters()) {
-      if (p.fitted && std::abs(estimate[i++]) > limits::kImplausible * p.typical) return false;
+      if (p.fitted && std::abs(estimate[i++]) > largest_plausible(log, *effect, p)) return false;
     }
     return true;
   }
@@ -364,6 +376,7 @@ class Diagnoser {
     cause.duration_s = end - begin;
     cause.amounts = candidate.amounts;
     cause.columns = static_cast<std::size_t>(candidate.columns.size());
+    cause.room = room_of(field.log, candidate);
     return search_.with(cause, trial.heldout.estimate, field.base.size());
   }
 
@@ -449,7 +462,6 @@ class Diagnoser {
   /// What offsets and nuisances make up for in this log, and what so few blocks would show only if it were larger than
   /// on any robot.
   void leave_out_untold(const Field& field) {
-    const auto& roles = fit_.log().roles();
     for (const auto& candidate : field.candidates) {
       if (candidate.generic()) continue;
       if (candidate.scores.independent.maxCoeff() < limits::kRounding) {
@@ -457,7 +469,7 @@ class Diagnoser {
             {candidate.cause, "joint offsets and usual nuisances make up for it in this log"});
         continue;
       }
-      const bool told = is_told(candidate, roles, field.threshold);
+      const bool told = is_told(field.log, candidate, field.threshold);
       if (!told)
         report_.not_testable.push_back(
             {candidate.cause, fmt::format("not testable with {} postures", field.log.blocks)});

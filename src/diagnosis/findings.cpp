@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 
 #include "agreed_motion.hpp"
@@ -82,6 +83,33 @@ double worse_by(const Heldout& other, const Heldout& best) {
   if (n < 2) return 0.0;
   const double variance = (d.array() - d.mean()).square().sum() * n / (n - 1.0) + 4.0 * std::abs(beliefs);
   return variance > 0.0 ? (d.sum() + beliefs) / std::sqrt(variance) : 0.0;
+}
+
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+/// The least of x'Hx / 2 - g'x within bounds around zero: what would leave them most is held there, and the rest fitted
+/// anew, until nothing does.
+Eigen::VectorXd within(const Eigen::MatrixXd& H, const Eigen::VectorXd& g, const Bounds& bounds) {
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(g.size());
+  std::vector<Eigen::Index> held;
+  while (true) {
+    const auto free = all_but(g.size(), held);
+    if (free.empty()) return x;
+    const Eigen::MatrixXd own = H(free, free);
+    const Eigen::VectorXd pull = g(free) - H(free, held) * x(held), best = own.ldlt().solve(pull);
+    x(free) = best;
+    Eigen::Index worst = -1;
+    double most = 1.0;
+    for (const auto i : free) {
+      const double beyond = x[i] > 0.0 ? x[i] / bounds.high[i] : x[i] / bounds.low[i];
+      if (!(beyond > most)) continue;
+      most = beyond;
+      worst = i;
+    }
+    if (worst < 0) return x;
+    x[worst] = std::clamp(x[worst], bounds.low[worst], bounds.high[worst]);
+    held.push_back(worst);
+  }
 }
 
 }  // namespace
@@ -316,12 +344,26 @@ Size Findings::size_of(const LogAbout& log, const BlockRegression& all, const st
     B += block.H(kept, columns);
   }
   Eigen::VectorXd of_base = Eigen::VectorXd::Zero(search_.state().size());
-  of_base(kept) = -H.ldlt().solve(B * amount);
+  of_base(kept) = within(H, -B * amount, room_of(all, kept));
   std::vector<std::vector<Direction>> directions(log.base.size());
   for (std::size_t p = 0; p < directions.size(); ++p) {
     for (const auto i : columns) directions[p].push_back(log.base[p][static_cast<std::size_t>(i)]);
   }
   return search_.size_of(log, directions, amount, of_base);
+}
+
+Bounds Findings::room_of(const BlockRegression& all, const std::vector<Eigen::Index>& kept) const {
+  const auto n = static_cast<Eigen::Index>(kept.size());
+  Bounds room{Eigen::VectorXd::Constant(n, -kUnbounded), Eigen::VectorXd::Constant(n, kUnbounded)};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto at = kept[static_cast<std::size_t>(i)];
+    if (at < search_.state().joints()) continue;  // any offset is an answer
+    const double away = all.away()[at] + all.step()[at];
+    const double most = normal_quantile(options_.level) / std::sqrt(all.precision()[at]);
+    room.low[i] = std::min(0.0, -most - away);
+    room.high[i] = std::max(0.0, most - away);
+  }
+  return room;
 }
 
 void Findings::add_estimated(const LogAbout& log, const BlockRegression& all, const std::string& kind,
@@ -479,7 +521,7 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
           e.duration_s = found.duration_s;
         }
         cause.parameters.push_back(std::move(e));
-        cause.implausible = cause.implausible || std::abs(value) > limits::kImplausible * parameter.typical;
+        cause.implausible = cause.implausible || std::abs(value) > largest_plausible(log, *effect, parameter);
       }
       find_class(reduced, columns, columns, reduced.own, candidates, cause);
     }

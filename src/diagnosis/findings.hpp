@@ -19,6 +19,11 @@ struct Reduced {
 };
 Reduced without(const ModelSearch& search, const BlockRegression& all, const std::vector<Eigen::Index>& out);
 
+/// How far parameters may still move.
+struct Bounds {
+  Eigen::VectorXd low, high;
+};
+
 /// What the answer says of a model: sizes with their intervals, what else would explain the same, what is excluded, and
 /// how well pictures are predicted.
 class Findings {
@@ -54,11 +59,15 @@ class Findings {
   /// any picture gets wrong.
   [[nodiscard]] bool matters(const Size& size) const;
   /// What columns of the base move by so much: offsets and nuisances fitted anew without them, as the answer would be
-  /// then. @param out  columns, these among them, that stay where they are
+  /// then; nuisances no further than is believed of them (room_of). A principal point ten times as far off as any
+  /// camera's is no answer to a camera that is turned. @param out  columns, these among them, that stay where they are
   [[nodiscard]] Size size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns,
                              const Eigen::VectorXd& amount, const std::vector<Eigen::Index>& out);
   /// ... by what was found.
   [[nodiscard]] Size size_of(const LogAbout& log, const BlockRegression& all, const std::vector<Eigen::Index>& columns);
+  /// How far parameters of the state can go from where they are, within what is believed of each but in one of
+  /// 1 / `level` robots; offsets anywhere.
+  [[nodiscard]] Bounds room_of(const BlockRegression& all, const std::vector<Eigen::Index>& kept) const;
   /// Which of the effects that are estimated anyway stand out (report.estimated).
   void name_estimated(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
   /// An effect of the state against a model that knows no effect of its kind: of joints of one kind that move the

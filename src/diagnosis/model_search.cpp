@@ -142,7 +142,8 @@ State ModelSearch::state_with(const std::vector<FoundCause>& causes) const {
   auto beliefs = beliefs_;
   for (const auto& cause : causes) {
     if (cause.generic()) continue;
-    const auto wide = wide_belief(cause.name, fit_.log().roles());
+    auto wide = wide_belief(cause.name, fit_.log().roles());
+    for (double& sd : wide.sd) sd *= cause.room;
     std::erase_if(beliefs, [&](const Belief& b) { return b.effect == wide.effect && b.target == wide.target; });
     beliefs.push_back(wide);
   }

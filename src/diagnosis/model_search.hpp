@@ -30,6 +30,7 @@ struct FoundCause {
   std::size_t columns = 0;                     ///< how many parameters are fitted
   bool stated = false;                         ///< others saw it happen
   double gain = 0.0;                           ///< in held-out blocks, when it was taken in
+  double room = 1.0;  ///< its largest plausible size, of the usual multiple of the typical one: what it is left to find
   [[nodiscard]] bool generic() const { return !variable.empty(); }
 };
 

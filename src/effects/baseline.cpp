@@ -13,7 +13,7 @@ EffectKind baseline() {
                              }),
           .sentence = in_words("the cameras are {size} {further apart|nearer together} than configured"),
           .not_testable = needs_two_cameras,
-          .lookalikes = {"vergence", "principal_point", "camera_pair"},
+          .lookalikes = {"vergence", "principal_point", "camera_pair", "first_camera"},
           .splitting_motion =
               "Show the hand at depths from 0.2 to 0.6 m and in the corners of the picture, or a checkerboard.",
           .home = EffectHome::kUrdf};

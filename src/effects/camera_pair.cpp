@@ -20,7 +20,7 @@ EffectKind camera_pair() {
                        "' than configured: " + camera_place(e.parameters(), amounts);
               },
           .not_testable = needs_two_cameras,
-          .lookalikes = {"vergence", "baseline", "principal_point"},
+          .lookalikes = {"first_camera", "vergence", "baseline", "principal_point"},
           .splitting_motion =
               "Show the hand at depths from 0.2 to 0.6 m and in the corners of the picture, or a checkerboard.",
           .home = EffectHome::kUrdf};

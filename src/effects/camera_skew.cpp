@@ -13,7 +13,7 @@ EffectKind camera_skew() {
           "camera_skew", {in_ms("skew", 20.0)},
           [](Parameters p, const Instant& at, Corrections& c) {
             if (at.camera != 1) return;
-            at.add_motion(p[0].value, c.dq);
+            at.show_later(p[0].value, c);
           },
           Follows::kMotion),
       .sentence = in_words(

@@ -6,9 +6,12 @@
 #include "bodyschema/observation/joint_motion.hpp"
 
 namespace bodyschema {
+namespace {
 
-void Instant::add_motion(double after_s, Eigen::VectorXd& dq) const {
+/// Adds `share` times where each joint is so much later, against where it is at the instant.
+void add_motion(const Instant& at, double after_s, double share, Eigen::VectorXd& dq) {
   if (after_s == 0.0) return;
+  const Eigen::MatrixXd& path = at.path;
   const double place = after_s / kPathStep_s + static_cast<double>(kPathSteps);
   const bool within = path.cols() == 2 * kPathSteps + 1 && place >= 0.0 && place <= 2.0 * kPathSteps;
   // The cubic through four points of the path.
@@ -23,8 +26,16 @@ void Instant::add_motion(double after_s, Eigen::VectorXd& dq) const {
       moved = 0.0;
       for (Eigen::Index k = 0; k < 4; ++k) moved += weight[k] * path(j, first + k);
     }
-    dq[j] += std::isfinite(moved) ? moved : after_s * qdot[j] + 0.5 * after_s * after_s * qddot[j];
+    dq[j] += share * (std::isfinite(moved) ? moved : after_s * at.qdot[j] + 0.5 * after_s * after_s * at.qddot[j]);
   }
+}
+
+}  // namespace
+
+void Instant::show_later(double after_s, Corrections& c) const {
+  add_motion(*this, c.later_s, -1.0, c.dq);
+  c.later_s += after_s;
+  add_motion(*this, c.later_s, 1.0, c.dq);
 }
 
 InstantBuilder::InstantBuilder(std::shared_ptr<const RobotModel> model, const std::string& hand_link,

@@ -46,7 +46,7 @@ EffectKind principal_point() {
               [](const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) {
                 return target.source == "common" ? std::string() : needs_two_cameras(target, roles, motion);
               },
-          .lookalikes = {"head_offset", "base_shift", "vergence", "camera_pose", "camera_pair"},
+          .lookalikes = {"head_offset", "base_shift", "vergence", "camera_pose", "camera_pair", "first_camera"},
           .splitting_motion = "Move the head by 20 to 30 deg with the arm still.",
           .home = EffectHome::kCameras};
 }

@@ -19,7 +19,7 @@ EffectKind vergence() {
               },
           .sentence = in_words("the eyes look {size} {further|less far} inwards than their encoders say"),
           .not_testable = needs_two_cameras,
-          .lookalikes = {"principal_point", "baseline", "camera_pair"},
+          .lookalikes = {"principal_point", "baseline", "camera_pair", "first_camera"},
           .splitting_motion =
               "Show the hand at depths from 0.2 to 0.6 m and in the corners of the picture, or a checkerboard.",
           .home = EffectHome::kUrdf};

@@ -138,7 +138,10 @@ class TrialRobot {
     const auto part = argument(fault, "part"), joint = argument(fault, "joint"), source = argument(fault, "source");
     if (is_held(fault)) return {};
     if (fault.name == "camera_rotation") {
-      return {{"camera_pair", "", ""}, {"vergence", "", ""}, {"principal_point", "", "difference"}};
+      return {{"first_camera", "", ""},
+              {"camera_pair", "", ""},
+              {"vergence", "", ""},
+              {"principal_point", "", "difference"}};
     }
     if (part.empty()) return {{fault.name, joint, source}};
     RightAnswers answers;

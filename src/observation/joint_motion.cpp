@@ -38,17 +38,34 @@ std::span<const JointSample> window(std::span<const JointSample> ordered, Micros
   return between(ordered, utime + after - 2 * half, utime + after);
 }
 
+/// Whether a joint jumps about a sample that is neither the first nor the last.
+bool jumps_at(std::span<const JointSample> near, std::size_t i, Eigen::Index joint) {
+  const double before_s = seconds(near[i].utime - near[i - 1].utime);
+  const double after_s = seconds(near[i + 1].utime - near[i].utime);
+  if (before_s <= 0.0 || after_s <= 0.0) return false;
+  const double step_s = std::min(before_s, after_s);
+  const double change =
+      (near[i + 1].q[joint] - near[i].q[joint]) / after_s - (near[i].q[joint] - near[i - 1].q[joint]) / before_s;
+  return std::abs(change) * step_s > kSteps_rad + kMostAcceleration_rad_s2 * step_s * step_s;
+}
+
 bool jumps(std::span<const JointSample> near, Eigen::Index joint) {
   for (std::size_t i = 1; i + 1 < near.size(); ++i) {
-    const double before_s = seconds(near[i].utime - near[i - 1].utime);
-    const double after_s = seconds(near[i + 1].utime - near[i].utime);
-    if (before_s <= 0.0 || after_s <= 0.0) continue;
-    const double step_s = std::min(before_s, after_s);
-    const double change =
-        (near[i + 1].q[joint] - near[i].q[joint]) / after_s - (near[i].q[joint] - near[i - 1].q[joint]) / before_s;
-    if (std::abs(change) * step_s > kSteps_rad + kMostAcceleration_rad_s2 * step_s * step_s) return true;
+    if (jumps_at(near, i, joint)) return true;
   }
   return false;
+}
+
+/// The last sample before an instant at which a joint jumps, and the first from it on.
+std::pair<Microseconds, Microseconds> nearest_jumps(std::span<const JointSample> near, Microseconds utime,
+                                                    Eigen::Index joint) {
+  std::pair nearest(std::numeric_limits<Microseconds>::min(), std::numeric_limits<Microseconds>::max());
+  for (std::size_t i = 1; i + 1 < near.size(); ++i) {
+    if (!jumps_at(near, i, joint)) continue;
+    if (near[i].utime < utime) nearest.first = near[i].utime;
+    if (near[i].utime >= utime) nearest.second = std::min(nearest.second, near[i].utime);
+  }
+  return nearest;
 }
 
 /// Least squares of c0 + c1 t + c2 t^2 (or without c2), t from an instant on in units of the window.
@@ -140,7 +157,11 @@ void joint_path(std::span<const JointSample> ordered, Microseconds utime, Eigen:
   const auto all = between(ordered, utime - reach, utime + reach);
   const Eigen::VectorXd middle = path.col(kPathSteps);
   for (Eigen::Index j = 0; j < joints; ++j) {
-    if (jumps(all, j)) path.row(j).setConstant(kUnknown);
+    const auto [before, after] = nearest_jumps(all, utime, j);
+    for (Eigen::Index step = -kPathSteps; step <= kPathSteps; ++step) {
+      const Microseconds at = utime + microseconds(static_cast<double>(step) * kPathStep_s);
+      if (at - half <= before || at + half >= after) path(j, kPathSteps + step) = kUnknown;
+    }
   }
   path.colwise() -= middle;
 }

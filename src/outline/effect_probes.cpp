@@ -19,7 +19,10 @@ EffectProbes::EffectProbes(const ErrorModel& model, std::vector<ParameterRef> pa
                            const Coordinates& coordinates)
     : coordinates_(coordinates), parameters_(std::move(parameters)), low_(model.roles().no_corrections()), high_(low_) {
   for (const auto& ref : parameters_) {
-    probes_.push_back({model[ref.effect].clone(), model[ref.effect].clone(), 1.0});
+    probes_.push_back({model[ref.effect].clone(), model[ref.effect].clone(), 1.0, ref.effect});
+  }
+  for (std::size_t e = 0; e < model.size(); ++e) {
+    if (model[e].follows_motion() && !model[e].has_memory()) beside_.push_back({model[e].clone(), e, 0.0});
   }
   follow(model);
 }
@@ -42,6 +45,11 @@ void EffectProbes::follow(const ErrorModel& model) {
     }
     place(probes_[i], parameters_[i].parameter, effect.parameters()[parameters_[i].parameter].value);
   }
+  for (auto& beside : beside_) {
+    const auto values = model[beside.which].parameters();
+    const auto own = beside.effect->parameters();
+    for (std::size_t p = 0; p < values.size(); ++p) own[p].value = values[p].value;
+  }
 }
 
 void EffectProbes::observe(const JointSample& sample) {
@@ -59,10 +67,23 @@ void EffectProbes::forget() {
   }
 }
 
+void EffectProbes::find_times(const Instant& at) {
+  for (auto& beside : beside_) {
+    low_.clear();
+    beside.effect->apply(at, low_);
+    beside.later_s = low_.later_s;
+  }
+  low_.clear();
+}
+
 void EffectProbes::directions(const Instant& at, std::vector<Direction>& out) {
   out.resize(probes_.size());
+  find_times(at);
   for (std::size_t i = 0; i < probes_.size(); ++i) {
     const Effect &low = *probes_[i].low, &high = *probes_[i].high;
+    double later_s = 0.0;
+    for (const auto& beside : beside_) later_s += beside.which == probes_[i].effect ? 0.0 : beside.later_s;
+    low_.later_s = high_.later_s = later_s;
     const auto is_nothing = [](const EffectParameter& p) { return !p.fitted || p.value == 0.0; };
     // Of an effect that is at zero nothing is known but its own change: the usual case, of a whole catalogue.
     if (!std::all_of(low.parameters().begin(), low.parameters().end(), is_nothing)) low.apply(at, low_);

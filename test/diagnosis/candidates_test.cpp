@@ -162,10 +162,10 @@ TEST_F(Candidates, ASmallerOneIsToldByMoreOfTheLog) {
   Candidate gain{.cause = {"encoder_gain", "r_elbow", ""}, .variable = {}, .parameters = {0}};
   gain.columns = added_columns(about, directions_of(log_.fit(), about, gain));
   gain.scores = base.score(gain.columns);
-  EXPECT_TRUE(is_told(gain, log_.roles(), 4.2));
+  EXPECT_TRUE(is_told(about, gain, 4.2));
   // Of two blocks no threshold of 4.2 normal deviations is reached before the gain is that of no robot.
   gain.scores.dof[0] = 0.5;
-  EXPECT_FALSE(is_told(gain, log_.roles(), 4.2));
+  EXPECT_FALSE(is_told(about, gain, 4.2));
 }
 
 TEST_F(Candidates, BlocksEndWhereTheArmHasMoved) {

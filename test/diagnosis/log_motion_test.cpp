@@ -113,7 +113,7 @@ TEST_F(Motion, AnArmThatCreepsShowsNoLatency) {
 
 TEST_F(Motion, OneCameraTellsNothingBetweenTwo) {
   const auto list = refused(moving(100.0, swinging), 1);
-  for (const char* name : {"camera_skew", "vergence", "baseline", "camera_pair"}) {
+  for (const char* name : {"camera_skew", "vergence", "baseline", "camera_pair", "first_camera"}) {
     EXPECT_NE(find(list, {name, "", ""}), nullptr) << name;
   }
   EXPECT_EQ(find(list, {"latency", "", ""}), nullptr);

@@ -32,6 +32,16 @@ TEST(CameraWords, SayWhichWayACameraSits) {
   EXPECT_LT(looks.y(), 0.0) << "y points down";
 }
 
+TEST(CameraWords, OfTheFirstAloneSayThatTheOtherDoesNot) {
+  const auto roles = test::roles();
+  const auto effect = make_effect("first_camera", {}, roles);
+  std::vector<std::string> amounts(6, "0 mm (at most 1)");
+  amounts[4] = "0.7 deg (0.6 to 0.8)";
+  EXPECT_EQ(effect_kind("first_camera").sentence(*effect, roles, amounts),
+            "camera 'left' sits otherwise than configured, and 'right' does not: looking 0.7 deg (0.6 to 0.8) further "
+            "right");
+}
+
 TEST(CameraWords, WhereNothingIsToldAllIsSaid) {
   const auto roles = test::roles();
   const auto effect = make_effect("camera_pose", {}, roles);

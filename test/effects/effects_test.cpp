@@ -53,7 +53,7 @@ double size_of(const Corrections& c) {
 
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
-  EXPECT_EQ(shipped_effects().size(), 29u);
+  EXPECT_EQ(shipped_effects().size(), 30u);
   auto at = instant(r);
   at.q.setConstant(0.7);
   at.encoder.setConstant(0.8);
@@ -261,9 +261,36 @@ TEST(Latency, FollowsThePathOfTheArmWhereItIsKnown) {
       EXPECT_NEAR(dq_deg(corrections(*effect, delay_ms, at), kElbow),
                   degrees(angle(t_s - 1e-3 * delay_ms) - angle(t_s)), 0.02);
     }
-    EXPECT_NEAR(dq_deg(corrections(*effect, 300.0, at), kElbow),
-                degrees(-0.3 * at.qdot[kElbow] + 0.045 * at.qddot[kElbow]), 1e-9)
+    EXPECT_NEAR(dq_deg(corrections(*effect, 500.0, at), kElbow),
+                degrees(-0.5 * at.qdot[kElbow] + 0.125 * at.qddot[kElbow]), 1e-9)
         << "beyond the path";
+  }
+}
+
+/// Where the arm is 207 ms later is not where it would be 73 and 134 ms later, one after the other from here.
+TEST(Latency, AddsUpWithASkewAlongThePathOfTheArm) {
+  const auto r = roles();
+  const auto early = make_effect("latency", {}, r), skewed = make_effect("camera_skew", {}, r);
+  early->parameters()[0].value = -0.073;
+  skewed->parameters()[0].value = 0.134;
+  const auto angle = [](double t_s) { return 0.5 * std::sin(3.0 * t_s); };
+  std::vector<JointSample> samples;
+  for (int i = 0; i <= 300; ++i) {
+    samples.push_back({.utime = microseconds(0.01 * i), .q = instant(r).q, .qdot = {}});
+    samples.back().q[kElbow] = angle(0.01 * i);
+  }
+  for (const double t_s : {1.0, 1.3, 1.6}) {
+    auto at = instant(r);
+    at.camera = 1;
+    joint_path(samples, microseconds(t_s), at.path);
+    for (const bool first : {true, false}) {
+      Corrections c = r.no_corrections();
+      (first ? early : skewed)->apply(at, c);
+      (first ? skewed : early)->apply(at, c);
+      EXPECT_NEAR(dq_deg(c, kElbow), degrees(angle(t_s + 0.207) - angle(t_s)), 0.02) << t_s;
+      c.clear();
+      EXPECT_EQ(c.later_s, 0.0);
+    }
   }
 }
 
@@ -322,19 +349,19 @@ TEST(Cameras, CorrectionsReachTheRightEye) {
   EXPECT_NEAR(corrections(*make_effect("distortion", {}, r), 0.05, at).camera.k1, 0.05, 1e-15);
 }
 
-TEST(Cameras, ThePoseIsThatOfTheRigThePairThatOfTheSecondAlone) {
+TEST(Cameras, ThePoseIsThatOfTheRigThePairThatOfTheSecondAloneAndTheFirstHasItsOwn) {
   const auto r = roles();
   for (const std::size_t camera : {0u, 1u}) {
     auto at = instant(r);
     at.camera = camera;
-    for (const std::string name : {"camera_pose", "camera_pair"}) {
+    for (const std::string name : {"camera_pose", "camera_pair", "first_camera"}) {
       const auto effect = make_effect(name, {}, r);
       for (std::size_t i = 0; i < 6; ++i) effect->parameters()[i].value = 0.01 * static_cast<double>(i + 1);
       Corrections c = r.no_corrections();
       effect->apply(at, c);
       const Eigen::Vector3d shift(0.01, 0.02, 0.03), turn(0.04, 0.05, 0.06);
-      const bool pair = name == "camera_pair";
-      const double rig = pair ? 0.0 : 1.0, own = pair && camera == 1 ? 1.0 : 0.0;
+      const double rig = name == "camera_pose" ? 1.0 : 0.0;
+      const double own = rig == 0.0 && camera == (name == "camera_pair" ? 1u : 0u) ? 1.0 : 0.0;
       EXPECT_LT((c.camera.rig_shift_m - rig * shift).norm() + (c.camera.rig_turn_rad - rig * turn).norm(), 1e-15);
       EXPECT_LT((c.camera.shift_m - own * shift).norm() + (c.camera.turn_rad - own * turn).norm(), 1e-15) << camera;
     }
@@ -344,7 +371,7 @@ TEST(Cameras, ThePoseIsThatOfTheRigThePairThatOfTheSecondAlone) {
 TEST(Cameras, OneCameraHasNoPair) {
   auto r = roles();
   r.cameras = {"only"};
-  for (const char* name : {"camera_pair", "baseline"}) {
+  for (const char* name : {"camera_pair", "first_camera", "baseline"}) {
     EXPECT_TRUE(effect_targets(name, r).empty()) << name;
     EXPECT_THAT([&] { make_effect(name, {}, r); },
                 testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr(name)));

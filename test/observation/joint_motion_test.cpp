@@ -93,6 +93,27 @@ TEST(JointMotion, AJumpBetweenTwoHoldsIsNoMotion) {
   for (Microseconds t = 400'000; t < 600'000; t += 9'000) EXPECT_EQ(motion(samples, t).qdot[0], 0.0) << t;
 }
 
+TEST(JointMotion, APathIsKnownUpToWhereItsJointJumps) {
+  const Microseconds t = 2'000'000, jump = 2'300'000;
+  auto samples = every(10'000, 4'000'000);
+  for (auto& sample : samples) {
+    if (sample.utime >= jump) sample.q[1] += radians(4.0);
+  }
+  Eigen::MatrixXd path;
+  joint_path(samples, t, path);
+  ASSERT_EQ(path.cols(), 2 * kPathSteps + 1);
+  for (Eigen::Index step = -kPathSteps; step <= kPathSteps; ++step) {
+    const double after_s = static_cast<double>(step) * kPathStep_s;
+    const Eigen::VectorXd there = swing(t + microseconds(after_s)).q - swing(t).q;
+    EXPECT_NEAR(path(0, kPathSteps + step), there[0], 0.02 * kAmplitude) << after_s;
+    if (after_s < 0.16) {
+      EXPECT_NEAR(path(1, kPathSteps + step), there[1], 0.02 * kAmplitude) << after_s;
+    } else if (after_s > 0.19) {
+      EXPECT_TRUE(std::isnan(path(1, kPathSteps + step))) << after_s;
+    }
+  }
+}
+
 TEST(JointMotion, HeadAndArmPublishedInTurnsMoveAllTheSame) {
   std::vector<JointSample> samples;
   for (Microseconds t = 0; t <= 4'000'000; t += 10'000) {

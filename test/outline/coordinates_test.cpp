@@ -41,7 +41,7 @@ TEST_F(CoordinatesOfOwnRobot, HoldEverythingThatTheCataloguesEffectsMove) {
     for (const auto& target : effect_targets(name, roles_)) {
       const auto effect = make_effect(name, target, roles_);
       for (auto& p : effect->parameters()) p.value = p.fitted ? p.typical : 1.0;
-      at.camera = target.source == "left" ? 0 : 1;
+      at.camera = target.source == "left" || name == "first_camera" ? 0 : 1;
       Corrections before = roles_.no_corrections(), after = before;
       effect->observe({0, Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)});
       effect->observe({60'000'000, at.encoder, Eigen::VectorXd::Zero(n)});

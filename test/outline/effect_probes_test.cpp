@@ -1,7 +1,9 @@
 #include "bodyschema/outline/effect_probes.hpp"
 
+#include <cmath>
 #include <map>
 
+#include "bodyschema/observation/joint_motion.hpp"
 #include "outline/own_robot.hpp"
 
 namespace bodyschema {
@@ -65,6 +67,28 @@ TEST_F(ProbesOfOwnRobot, WhatActsOnOneCameraMovesNothingInTheOther) {
   EXPECT_TRUE(directions(probes)[0].empty());
   at_.camera = 1;
   EXPECT_EQ(directions(probes)[0].size(), 1u);
+}
+
+/// A millisecond more of skew moves the arm by its speed where the picture was taken, not where its stamp says.
+TEST_F(ProbesOfOwnRobot, ATimeIsProbedWhereAllTimesTogetherPutThePicture) {
+  ErrorModel model(roles_);
+  model.add("latency", {}).parameters()[0].value = -0.073;
+  model.add("camera_skew", {}).parameters()[0].value = 0.134;
+  const auto angle = [](double t_s) { return 0.5 * std::sin(3.0 * t_s); };
+  std::vector<JointSample> samples;
+  for (int i = 0; i <= 300; ++i) {
+    samples.push_back({.utime = microseconds(0.01 * i), .q = at_.q, .qdot = {}});
+    samples.back().q[elbow_] = angle(0.01 * i);
+  }
+  at_.camera = 1;
+  joint_path(samples, microseconds(1.3), at_.path);
+  EffectProbes probes(model, fitted_parameters(model), coordinates_);
+  const double speed = 1.5 * std::cos(3.0 * (1.3 + 0.207));
+  for (int picture = 0; picture < 3; ++picture) {
+    const auto d = directions(probes);
+    EXPECT_NEAR(d[0].at(coordinate(Kind::kJoint, elbow_)), -speed, 0.03);
+    EXPECT_NEAR(d[1].at(coordinate(Kind::kJoint, elbow_)), speed, 0.03);
+  }
 }
 
 /// Backlash has no derivative at zero; how it would show is the difference to one of a typical size.

@@ -349,6 +349,7 @@ TEST_F(ExportCorrection, TheUrdfHoldsWhatItCanOfAnExtendedModel) {
   put("axis_shift", {"r_elbow", ""});
   put("axis_shift", {"r_wrist_prosup", ""});
   put("hand_mount", {"r_wrist_yaw", ""});
+  put("first_camera", {});
   put("camera_pair", {});  // turned, then moved by the baseline: the order of a file is no matter
   put("baseline", {});
   put("base_shift", {});

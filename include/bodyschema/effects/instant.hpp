@@ -5,6 +5,7 @@
 #include <string>
 
 #include "bodyschema/core/time.hpp"
+#include "bodyschema/observation/corrections.hpp"
 #include "bodyschema/observation/observation.hpp"
 #include "bodyschema/robot/robot_setup.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
@@ -27,9 +28,10 @@ struct Instant {
   /// joint_path() about the instant, where samples after it are known, as in a log; else empty.
   Eigen::MatrixXd path;
 
-  /// Adds to each joint where it is so much later (negative: earlier), against where it is at the instant: along its
-  /// path, and by velocity and acceleration where that is not known.
-  void add_motion(double after_s, Eigen::VectorXd& dq) const;
+  /// Shows the joints so much later (negative: earlier) than `c` has them: along their paths, and by velocity and
+  /// acceleration where these are not known. Times add up: of a picture that is late and skewed the path is followed
+  /// once, by both together.
+  void show_later(double after_s, Corrections& c) const;
 };
 
 /// Fills in the torques of an Instant. One per thread.

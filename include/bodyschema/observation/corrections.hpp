@@ -55,7 +55,10 @@ struct ShapeCorrection {
 /// Sign everywhere: true minus assumed, so `q_true = q_encoder + dq` (a joint offset of +3 deg,
 /// encoder = true + offset, is dq = -3 deg).
 struct Corrections {
-  Eigen::VectorXd dq;                        ///< radians, RobotModel order
+  Eigen::VectorXd dq;  ///< radians, RobotModel order
+  /// The picture was taken so much later than its stamp says, s, by all that says so: what it moves is in `dq` already
+  /// (Instant::show_later).
+  double later_s = 0.0;
   std::vector<JointAdjustment> adjustments;  ///< RobotModel order
   /// The arm stands this much further along the root's axes, seen from the eyes, metres.
   Eigen::Vector3d base_shift_m = Eigen::Vector3d::Zero();
@@ -71,6 +74,7 @@ struct Corrections {
   /// Back to zero; allocates nothing.
   void clear() {
     dq.setZero();
+    later_s = 0.0;
     for (auto& a : adjustments) a = {};
     base_shift_m.setZero();
     camera = {};

@@ -21,14 +21,15 @@ namespace bodyschema {
 void joint_motion(std::span<const JointSample> ordered, Microseconds utime, Eigen::VectorXd& qdot,
                   Eigen::VectorXd& qddot);
 
-/// Steps of a path on each side of its instant, and their length, s: as far as any picture's stamp is off.
-inline constexpr Eigen::Index kPathSteps = 10;
+/// Steps of a path on each side of its instant, and their length, s: as far as any picture's stamp is off, late and
+/// skewed together.
+inline constexpr Eigen::Index kPathSteps = 20;
 inline constexpr double kPathStep_s = 0.02;
 
-/// Where the joints are from 0.2 s before an instant to 0.2 s after it, against where they are at it: of a stamp that
+/// Where the joints are from 0.4 s before an instant to 0.4 s after it, against where they are at it: of a stamp that
 /// is off by more than some 30 ms velocity and acceleration say too little. Each point is the middle of a parabola
-/// through the positions within 125 ms on both sides. NaN where samples do not reach as far or are too few, and for a
-/// joint that jumps. No throw.
+/// through the positions within 125 ms on both sides. NaN where samples do not reach as far or are too few, and of a
+/// joint that jumps from there on. No throw.
 /// @param path  out: rad, joints in RobotModel order x 2 kPathSteps + 1
 void joint_path(std::span<const JointSample> ordered, Microseconds utime, Eigen::MatrixXd& path);
 

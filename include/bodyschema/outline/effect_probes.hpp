@@ -39,13 +39,22 @@ class EffectProbes {
  private:
   struct Probe {
     std::unique_ptr<Effect> low, high;
-    double step = 1.0;  ///< between them, SI
+    double step = 1.0;       ///< between them, SI
+    std::size_t effect = 0;  ///< which it is of
   };
+  /// Of the effects beside it: what they say of the time at which the picture was taken.
+  struct Beside {
+    std::unique_ptr<Effect> effect;
+    std::size_t which = 0;
+    double later_s = 0.0;
+  };
+  void find_times(const Instant& at);
   void place(Probe& probe, std::size_t parameter, double value) const;
 
   const Coordinates& coordinates_;
   std::vector<ParameterRef> parameters_;
   std::vector<Probe> probes_;
+  std::vector<Beside> beside_;
   Corrections low_, high_;  ///< zero between two effects
 };
 
