@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "diagnosis_trials.hpp"
@@ -22,6 +23,12 @@ struct Sizes {
   std::vector<double> error;  ///< relative
   std::vector<double> ratio;  ///< error over half the width of the 95 % interval
   int right_sign = 0;
+  /// Share of the truths within so many half widths.
+  [[nodiscard]] double inside(double widths) const {
+    if (ratio.empty()) return std::nan("");
+    const auto count = std::count_if(ratio.begin(), ratio.end(), [&](double r) { return r <= widths; });
+    return static_cast<double>(count) / static_cast<double>(ratio.size());
+  }
 };
 
 void add_size(const Record& o, Sizes& sizes) {
@@ -68,17 +75,12 @@ class Table {
 bool in_class(const Record& o) {
   return o.found.at(0);
 }
-bool first_right(const Record& o) {
-  return o.first;
-}
-bool any_wrong(const Record& o) {
-  return o.wrong;
-}
 
 template <class Test>
 double rate(const std::vector<const Record*>& outcomes, Test test) {
   if (outcomes.empty()) return std::nan("");
-  const auto hits = std::count_if(outcomes.begin(), outcomes.end(), [&](const Record* o) { return test(*o); });
+  const auto hits =
+      std::count_if(outcomes.begin(), outcomes.end(), [&](const Record* o) { return std::invoke(test, *o); });
   return static_cast<double>(hits) / static_cast<double>(outcomes.size());
 }
 
@@ -93,12 +95,30 @@ void add_curve(ExperimentContext& context, const std::vector<const Record*>& sin
       if (o->size() >= kEdges[i] && o->size() < kEdges[i + 1]) in.push_back(o);
     }
     if (in.empty()) continue;
-    const double first = rate(in, first_right), off = rate(in, any_wrong), named = rate(in, in_class);
+    const double first = rate(in, &Record::first), off = rate(in, &Record::wrong), named = rate(in, in_class);
     const auto label =
         kEdges[i + 1] < 1e8 ? fmt::format("{} to {}", kEdges[i], kEdges[i + 1]) : fmt::format("{} and more", kEdges[i]);
     context.table += fmt::format("{:<44} {:>6} {:>9.2f} {:>9.2f} {:>9.2f}\n", label, in.size(), first, named, off);
     context.summary["detection"].push_back(
         {{"from", kEdges[i]}, {"logs", in.size()}, {"first", first}, {"in_class", named}, {"wrong", off}});
+  }
+}
+
+void add_sizes(Table& table, const Sizes& sizes) {
+  const auto n = sizes.error.size();
+  table.add("parameters", "coverage95", n, sizes.inside(1.0), 0.90, false, 0.99);
+  table.add("parameters", "error_median", n, quantile(sizes.error, kMedian), 0.04, true);
+  table.add("parameters", "error_p90", n, quantile(sizes.error, kNinth), 0.15, true);
+  table.add("parameters", "sign_rate", n,
+            n > 0 ? static_cast<double>(sizes.right_sign) / static_cast<double>(n) : std::nan(""), 1.0, false);
+}
+
+/// Of the intervals: what share of the truths lies within so much of their width.
+void add_reliability(ExperimentContext& context, const Sizes& sizes) {
+  context.table += fmt::format("\n{:<44} {:>6}\n", "interval narrowed or widened by", "holds");
+  for (const double widths : {0.34, 0.65, 1.0, 1.5, 2.0}) {
+    context.table += fmt::format("{:<44} {:>6.2f}\n", widths, sizes.inside(widths));
+    context.summary["reliability"].push_back({{"widths", widths}, {"holds", sizes.inside(widths)}});
   }
 }
 
@@ -135,42 +155,25 @@ void run_diagnosis(ExperimentContext& context) {
   }
 
   Table table(context);
-  table.add("null", "false_alarm_rate", rows[kNull].size(), rate(rows[kNull], [](const Record& o) { return o.named; }),
-            0.04, true);
+  table.add("null", "false_alarm_rate", rows[kNull].size(), rate(rows[kNull], &Record::named), 0.04, true);
   // Small errors of nine kinds at once: none of them stands for the rest.
-  table.add("background", "named_large_rate", rows[kBackground].size(),
-            rate(rows[kBackground], [](const Record& o) { return o.large_gain; }), 0.05, true);
+  table.add("background", "named_large_rate", rows[kBackground].size(), rate(rows[kBackground], &Record::large_gain),
+            0.05, true);
   table.add("single", "in_class_rate", single.size(), rate(single, in_class), 0.95, false);
-  table.add("single", "first_rate", single.size(), rate(single, first_right), 0.88, false);
-  table.add("single", "wrong_rate", single.size(), rate(single, any_wrong), 0.02, true);
-  table.add("limit", "wrong_rate", limit.size(), rate(limit, any_wrong), 0.05, true);
+  table.add("single", "first_rate", single.size(), rate(single, &Record::first), 0.88, false);
+  table.add("single", "wrong_rate", single.size(), rate(single, &Record::wrong), 0.02, true);
+  table.add("limit", "wrong_rate", limit.size(), rate(limit, &Record::wrong), 0.05, true);
   table.add("two", "both_rate", rows[kTwo].size(),
             rate(rows[kTwo], [](const Record& o) { return o.found.at(0) && o.found.at(1); }), 0.88, false);
-  table.add("two", "wrong_rate", rows[kTwo].size(), rate(rows[kTwo], any_wrong), 0.02, true);
-  table.add("outside", "unexplained_rate", rows[kOutside].size(),
-            rate(rows[kOutside], [](const Record& o) { return o.not_explained_away; }), 0.90, false);
+  table.add("two", "wrong_rate", rows[kTwo].size(), rate(rows[kTwo], &Record::wrong), 0.02, true);
+  table.add("outside", "unexplained_rate", rows[kOutside].size(), rate(rows[kOutside], &Record::not_explained_away),
+            0.90, false);
   table.add("outside", "none_rate", rows[kOutside].size(),
             rate(rows[kOutside], [](const Record& o) { return o.verdict == "none"; }), 0.0, true);
-  const auto inside = [&](double widths) {
-    if (sizes.ratio.empty()) return std::nan("");
-    return static_cast<double>(
-               std::count_if(sizes.ratio.begin(), sizes.ratio.end(), [&](double r) { return r <= widths; })) /
-           static_cast<double>(sizes.ratio.size());
-  };
-  const auto n = sizes.error.size();
-  table.add("parameters", "coverage95", n, inside(1.0), 0.90, false, 0.99);
-  table.add("parameters", "error_median", n, quantile(sizes.error, kMedian), 0.04, true);
-  table.add("parameters", "error_p90", n, quantile(sizes.error, kNinth), 0.15, true);
-  table.add("parameters", "sign_rate", n,
-            n > 0 ? static_cast<double>(sizes.right_sign) / static_cast<double>(n) : std::nan(""), 1.0, false);
+  add_sizes(table, sizes);
   table.add("gain", "hand_improvement_median", gain.size(), quantile(gain, kMedian), 3.0, false);
   add_curve(context, rows[kSingle]);
-  // Reliability of the intervals: what share of the truths lies within so much of their width.
-  context.table += fmt::format("\n{:<44} {:>6}\n", "interval narrowed or widened by", "holds");
-  for (const double widths : {0.34, 0.65, 1.0, 1.5, 2.0}) {
-    context.table += fmt::format("{:<44} {:>6.2f}\n", widths, inside(widths));
-    context.summary["reliability"].push_back({{"widths", widths}, {"holds", inside(widths)}});
-  }
+  add_reliability(context, sizes);
   if (took_s.empty()) return;
   const double all_s = std::accumulate(took_s.begin(), took_s.end(), 0.0);
   context.summary["seconds_a_log"] = all_s / static_cast<double>(took_s.size());
