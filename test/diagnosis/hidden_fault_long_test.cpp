@@ -38,6 +38,22 @@ TEST(ManyHiddenFaults, AWanderingJointIsNeverNothing) {
   }
 }
 
+/// Nuisances could make up for each of them, were they free. To the side the depth of the arm makes up for some of it.
+TEST(ManyHiddenFaults, CamerasThatLookElsewhereAreNamed) {
+  const struct {
+    const char* fault;
+    CauseName cause;
+  } kCases[] = {{"camera_rotation:source=left,axis=y,value=0.9", {"first_camera", "", ""}},
+                {"principal_point:source=left,axis=y,value=4", {"principal_point", "", "left"}},
+                {"vergence:value=1", {"vergence", "", ""}}};
+  for (const auto& c : kCases) {
+    const auto report = answer({c.fault});
+    EXPECT_TRUE(test::is_named(report)) << report.sentence;
+    ASSERT_EQ(report.causes.size(), 1u) << report.sentence;
+    EXPECT_NE(test::found(report, c.cause), nullptr) << report.sentence;
+  }
+}
+
 TEST(ManyHiddenFaults, EachIsNamedWithItsSize) {
   const struct {
     const char* fault;

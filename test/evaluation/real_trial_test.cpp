@@ -14,16 +14,22 @@ namespace {
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
+/// Photographs of a physical arm with offsets of 4 deg standard deviation hidden in its encoders.
+RealTrialOptions arm_before(const char* set, std::uint64_t seed) {
+  RealTrialOptions options;
+  options.set = data_folder() / "real" / set;
+  options.urdf = data_folder() / "real/robots/lbr_med7/lbr_med7.urdf";
+  options.hidden.offsets_deg = draw_offsets(options.set, seed, 4.0);
+  return options;
+}
+
 // No start of the search got beyond 24 px^2 with masks of what moved, where others get to 14, and a second place was
 // only 1.1 times as bad: "another place of the camera explains the pictures nearly as well". The finer masks that
 // followed brought the first one to the right answer all the same.
 TEST(RealTrial, APlaceThatOnlyRoughMasksAllowIsNoRival) {
   SKIP_WITHOUT("real");
   const TemporaryFolder folder;
-  RealTrialOptions options;
-  options.set = data_folder() / "real/lbr_zed10";
-  options.urdf = data_folder() / "real/robots/lbr_med7/lbr_med7.urdf";
-  options.hidden.offsets_deg = draw_offsets(options.set, 2077, 4.0);
+  RealTrialOptions options = arm_before("lbr_zed10", 2077);
   options.masks = false;
   const RealTrial trial = run_real_trial(options, folder.path() / "trial");
   EXPECT_EQ(trial.calibration.state, CalibrationState::kGood) << trial.calibration.sentence;
@@ -39,10 +45,7 @@ TEST(RealTrial, APlaceThatOnlyRoughMasksAllowIsNoRival) {
 TEST(RealTrial, WhatGivenMasksGetWrongInAllPosturesIsSaid) {
   SKIP_WITHOUT("real");
   const TemporaryFolder folder;
-  RealTrialOptions options;
-  options.set = data_folder() / "real/lbr_zed5";
-  options.urdf = data_folder() / "real/robots/lbr_med7/lbr_med7.urdf";
-  options.hidden.offsets_deg = draw_offsets(options.set, 1795683057, 4.0);
+  const RealTrialOptions options = arm_before("lbr_zed5", 1795683057);
   const RealTrial trial = run_real_trial(options, folder.path() / "trial");
   EXPECT_EQ(trial.calibration.state, CalibrationState::kGood) << trial.calibration.sentence;
   EXPECT_THAT(trial.calibration.remarks, Contains(HasSubstr("own edges disagree about lbr_A6")));
