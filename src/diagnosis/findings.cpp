@@ -87,31 +87,6 @@ double worse_by(const Heldout& other, const Heldout& best) {
 
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
-/// The least of x'Hx / 2 - g'x within bounds around zero: what would leave them most is held there, and the rest fitted
-/// anew, until nothing does.
-Eigen::VectorXd within(const Eigen::MatrixXd& H, const Eigen::VectorXd& g, const Bounds& bounds) {
-  Eigen::VectorXd x = Eigen::VectorXd::Zero(g.size());
-  std::vector<Eigen::Index> held;
-  while (true) {
-    const auto free = all_but(g.size(), held);
-    if (free.empty()) return x;
-    const Eigen::MatrixXd own = H(free, free);
-    const Eigen::VectorXd pull = g(free) - H(free, held) * x(held), best = own.ldlt().solve(pull);
-    x(free) = best;
-    Eigen::Index worst = -1;
-    double most = 1.0;
-    for (const auto i : free) {
-      const double beyond = x[i] > 0.0 ? x[i] / bounds.high[i] : x[i] / bounds.low[i];
-      if (!(beyond > most)) continue;
-      most = beyond;
-      worst = i;
-    }
-    if (worst < 0) return x;
-    x[worst] = std::clamp(x[worst], bounds.low[worst], bounds.high[worst]);
-    held.push_back(worst);
-  }
-}
-
 }  // namespace
 
 Reduced without(const ModelSearch& search, const BlockRegression& all, const std::vector<Eigen::Index>& out) {
@@ -344,7 +319,7 @@ Size Findings::size_of(const LogAbout& log, const BlockRegression& all, const st
     B += block.H(kept, columns);
   }
   Eigen::VectorXd of_base = Eigen::VectorXd::Zero(search_.state().size());
-  of_base(kept) = within(H, -B * amount, room_of(all, kept));
+  of_base(kept) = bounded_minimum(H, -B * amount, room_of(all, kept));
   std::vector<std::vector<Direction>> directions(log.base.size());
   for (std::size_t p = 0; p < directions.size(); ++p) {
     for (const auto i : columns) directions[p].push_back(log.base[p][static_cast<std::size_t>(i)]);

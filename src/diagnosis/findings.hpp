@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "agreed_motion.hpp"
+#include "bounded_minimum.hpp"
 #include "bodyschema/diagnosis/diagnoser.hpp"
 #include "candidates.hpp"
 #include "model_search.hpp"
@@ -18,11 +19,6 @@ struct Reduced {
   std::vector<Eigen::Index> kept;
 };
 Reduced without(const ModelSearch& search, const BlockRegression& all, const std::vector<Eigen::Index>& out);
-
-/// How far parameters may still move.
-struct Bounds {
-  Eigen::VectorXd low, high;
-};
 
 /// What the answer says of a model: sizes with their intervals, what else would explain the same, what is excluded, and
 /// how well pictures are predicted.
