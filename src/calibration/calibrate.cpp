@@ -235,12 +235,14 @@ class Calibrator {
     }
   }
 
-  void with_masks_anew(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best, double reach_px) {
-    masks.about(best ? best->at().corrections : nominal(fit), reach_px);
+  /// @return the log as it was
+  PictureLog with_masks_anew(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best, double reach_px) {
+    PictureLog before = masks.about(best ? best->at().corrections : nominal(fit), reach_px);
     fit.refresh();
-    BatchFit next = started(fit, best ? best->state().x() : Eigen::VectorXd());
+    BatchFit next = best ? about_the_same(fit, *best) : started(fit, {});
     next.run(reach_px, {});
     best.emplace(std::move(next));
+    return before;
   }
 
   /// A joint that two answers about one state place further apart than either claims to know it; empty: none.
@@ -277,6 +279,12 @@ class Calibrator {
     return batch;
   }
 
+  /// A fit that has still to run, of the state that another one has come to: what was found besides is in it.
+  [[nodiscard]] BatchFit about_the_same(LogFit& fit, const BatchFit& batch) const {
+    const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
+    return {fit, batch.state(), beliefs.tolerances, settings()};
+  }
+
   /// Encoders and cameras as they are configured.
   std::vector<Corrections> nominal(LogFit& fit) const { return fit.predict(ErrorModel(log_->roles()), {}).corrections; }
 
@@ -293,16 +301,11 @@ class Calibrator {
     const bool credible = implausible_.empty() && beyond_belief(best).empty();  // what is not, is not to be applied
     if (!pictures || !credible || !is_near(best)) return;
     RawPictures masks(*log_, VisionSetup::from(configuration_.section("vision")), kept);
-    const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
     std::optional<PictureLog> given;
-    std::optional<BatchFit> own;
+    std::optional<BatchFit> own(best);
     for (const double reach_px : kReachesAgain) {
-      PictureLog before = masks.about(own ? own->at().corrections : best.at().corrections, reach_px);
+      PictureLog before = with_masks_anew(masks, fit, own, reach_px);
       if (!given) given.emplace(std::move(before));
-      fit.refresh();
-      BatchFit next(fit, own ? own->state() : best.state(), beliefs.tolerances, settings());
-      next.run(reach_px, {});
-      own.emplace(std::move(next));
     }
     *log_ = std::move(*given);
     fit.refresh();
@@ -687,13 +690,11 @@ class Calibrator {
         (batch.posture_of()[p] * sections / postures == section ? left_out : kept).push_back(p);
       }
       if (kept.empty() || left_out.empty()) continue;
-      const auto roles = log_->roles();
-      const auto beliefs = Beliefs::from(configuration_, roles, rig_, pipeline_.options());
-      BatchFit part(fit, batch.state(), beliefs.tolerances, settings());  // what was found besides is in that state
+      BatchFit part = about_the_same(fit, batch);
       part.run(0.0, kept);
       without.push_back(part.state().x());
       left_out_.push_back({static_cast<double>(left_out.size()),
-                           median_outline_distance_px(fit, ErrorModel(roles), left_out),
+                           median_outline_distance_px(fit, ErrorModel(log_->roles()), left_out),
                            median_outline_distance_px(fit, part.state().model(), left_out)});
     }
     const Eigen::VectorXd sd = batch.estimate().covariance.diagonal().cwiseMax(0.0).cwiseSqrt();

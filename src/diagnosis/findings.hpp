@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "agreed_motion.hpp"
-#include "bounded_minimum.hpp"
 #include "bodyschema/diagnosis/diagnoser.hpp"
+#include "bounded_minimum.hpp"
 #include "candidates.hpp"
 #include "model_search.hpp"
 
