@@ -63,9 +63,12 @@ void FrameModel::expose(const JointSample& joints, std::size_t camera, const Eig
     }
   }
   if (!sags_) return;
-  // Gravity acts on the arm where it stands, sagged.
-  corrections(out, x, scratch_);
-  track_.torques_at(joints, -scratch_.dq, out.at);
+  settle_under_gravity(
+      [&]() -> const Eigen::VectorXd& {
+        corrections(out, x, scratch_);
+        return scratch_.dq;
+      },
+      [&](const Eigen::VectorXd& dq) { track_.torques_at(joints, -dq, out.at); });
 }
 
 Frame FrameModel::take(const Observation& observation, const Eigen::VectorXd& x) {

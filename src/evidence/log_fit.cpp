@@ -157,13 +157,21 @@ LinearLog LogFit::predict(const ErrorModel& model, std::span<const std::uint32_t
       log_, [&](const JointSample& sample) { playing.observe(sample); },
       [&](std::size_t p) {
         log_.instant(p, offsets, result.instants[p]);
-        playing.corrections(result.instants[p], result.corrections[p]);
-        if (!sags) return;
-        // Gravity acts on the arm where it stands, sagged.
-        log_.instant(p, -result.corrections[p].dq, sagged);
-        result.instants[p].gravity_torque = sagged.gravity_torque;
-        result.instants[p].payload_torque = sagged.payload_torque;
-        playing.corrections(result.instants[p], result.corrections[p]);
+        auto& instant = result.instants[p];
+        if (!sags) {
+          playing.corrections(instant, result.corrections[p]);
+          return;
+        }
+        settle_under_gravity(
+            [&]() -> const Eigen::VectorXd& {
+              playing.corrections(instant, result.corrections[p]);
+              return result.corrections[p].dq;
+            },
+            [&](const Eigen::VectorXd& dq) {
+              log_.instant(p, -dq, sagged);
+              instant.gravity_torque = sagged.gravity_torque;
+              instant.payload_torque = sagged.payload_torque;
+            });
       });
   return result;
 }

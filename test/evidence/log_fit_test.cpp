@@ -146,5 +146,26 @@ TEST_F(LogFitOfOwnRobot, BeliefsHoldWhatNoPictureTells) {
   for (Eigen::Index k = 7; k < 10; ++k) EXPECT_LT(std::abs(found.x()[k]), 3.0 * 0.002) << k;
 }
 
+/// A soft joint stands where its drive and gravity's torque there agree, not where the torque of a stiff arm, or of one
+/// that has sagged once, would have it.
+TEST_F(LogFitOfOwnRobot, ASoftJointStandsWhereItsTorqueHasIt) {
+  const auto log = log_of(seen_);
+  LogFit fit(*log, 1);
+  ErrorModel model(roles_);
+  const double softness = radians(3.0);  // rad/Nm: it gives way by up to 15 deg
+  model.add("compliance", {"r_shoulder_pitch", ""}).parameters()[0].value = softness;
+  const auto joint = roles_.index("r_shoulder_pitch");
+  const auto predicted = fit.predict(model, {});
+  double most = 0.0;
+  for (std::size_t p = 0; p < predicted.corrections.size(); ++p) {
+    const auto& dq = predicted.corrections[p].dq;
+    Instant there;
+    log->instant(p, -dq, there);
+    EXPECT_NEAR(dq[joint], softness * there.gravity_torque[joint], 2e-5);
+    most = std::max(most, std::abs(dq[joint]));
+  }
+  EXPECT_GT(most, radians(5.0));
+}
+
 }  // namespace
 }  // namespace bodyschema

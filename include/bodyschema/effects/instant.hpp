@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "bodyschema/core/time.hpp"
 #include "bodyschema/observation/corrections.hpp"
@@ -33,6 +34,23 @@ struct Instant {
   /// once, by both together.
   void show_later(double after_s, Corrections& c) const;
 };
+
+/// Gravity acts on the arm where it stands, sagged: takes the torques where the corrections have the arm until both
+/// agree, within what no encoder reads.
+/// @param joints  -> corrections of all joints, rad, under the torques as they are
+/// @param take_torques  (corrections of all joints): those of the arm there
+template <class Joints, class TakeTorques>
+void settle_under_gravity(Joints&& joints, TakeTorques&& take_torques) {
+  constexpr int kRounds = 10;  // a joint that gives way by a third of its torque's change is there to 1e-5
+  constexpr double kSettled_rad = 1e-5;
+  Eigen::VectorXd before;
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::VectorXd now = joints();
+    if (round > 0 && (now - before).cwiseAbs().maxCoeff() < kSettled_rad) return;
+    take_torques(now);
+    before = std::move(now);
+  }
+}
 
 /// Fills in the torques of an Instant. One per thread.
 class InstantBuilder {
