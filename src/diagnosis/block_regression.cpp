@@ -14,6 +14,12 @@ namespace {
 constexpr double kRounding = 1e-9;
 /// A column that lives in one block alone is not known without it: this share of the whole keeps it at zero.
 constexpr double kAlone = 1e-7;
+/// Of a block's mean information on a column.
+constexpr double kLittle = 1e-3;
+/// Columns whose sum is smaller, in standard deviations, are no finding however blocks weigh.
+constexpr double kStandsOut = 2.0;
+/// Weights follow from what a fit leaves, and the fit from the weights.
+constexpr int kRounds = 2;
 
 Eigen::MatrixXd symmetric_inverse(const Eigen::MatrixXd& S) {
   return S.ldlt().solve(Eigen::MatrixXd::Identity(S.rows(), S.cols()));
@@ -24,6 +30,20 @@ Eigen::MatrixXd stiffened(Eigen::MatrixXd H) {
   H.diagonal() *= 1.0 + kRounding;
   H.diagonal().array() += 1e-300;
   return H;
+}
+
+/// Weights of blocks in the fit of one column: 1 for those whose own noise says all of how they differ.
+/// @param u, share  each block's score and information
+Eigen::RowVectorXd even_weights(const Eigen::RowVectorXd& u, const Eigen::RowVectorXd& share) {
+  const double whole = share.sum();
+  if (whole <= 0.0) return Eigen::RowVectorXd::Ones(share.size());
+  const double n = static_cast<double>(share.size());
+  // What hardly knows the column says nothing of how blocks differ.
+  const double least = kLittle * whole / n;
+  const double best = u.sum() / whole;
+  const double q = ((u - best * share).array().square() / (share.array() + least)).sum();
+  const double between = std::max(0.0, q - (n - 1.0)) / std::max(1e-300, whole - share.squaredNorm() / whole);
+  return (1.0 + between * share.array()).inverse().matrix();
 }
 
 double blocks_factor(std::size_t blocks) {
@@ -48,11 +68,11 @@ AddedColumns AddedColumns::only(const std::vector<Eigen::Index>& columns) const 
 }
 
 double Scores::z() const {
-  const Eigen::VectorXd all = t();
   double largest = 0.0;
-  for (Eigen::Index i = 0; i < all.size(); ++i) {
-    const double n = dof[i];
-    largest = std::max(largest, (8.0 * n + 1.0) / (8.0 * n + 3.0) * std::sqrt(n * std::log1p(all[i] * all[i] / n)));
+  for (Eigen::Index i = 0; i < even_t.size(); ++i) {
+    const double n = even_dof[i];
+    largest =
+        std::max(largest, (8.0 * n + 1.0) / (8.0 * n + 3.0) * std::sqrt(n * std::log1p(even_t[i] * even_t[i] / n)));
   }
   return largest;
 }
@@ -137,6 +157,8 @@ Scores BlockRegression::score(const AddedColumns& added, const Eigen::MatrixXd& 
   s.independent = s.S.diagonal().cwiseQuotient(C.diagonal().cwiseMax(1e-300)).cwiseMax(0.0);
   s.sd.resize(k);
   s.dof.resize(k);
+  s.even_t.resize(k);
+  s.even_dof.resize(k);
   for (Eigen::Index i = 0; i < k; ++i) {
     const double best = s.total[i] / std::max(1e-300, s.S(i, i));
     const double whole = share.row(i).cwiseMax(0.0).sum();
@@ -145,8 +167,45 @@ Scores BlockRegression::score(const AddedColumns& added, const Eigen::MatrixXd& 
     const double scatter = (s.u.row(i) - best * share.row(i)).squaredNorm() * (s.dof[i] + 1.0) / s.dof[i];
     // Never less than white noise has.
     s.sd[i] = std::sqrt(std::max(scatter, whole) + s.beliefs.row(i).squaredNorm());
+    s.even_t[i] = s.total[i] / std::max(1e-300, s.sd[i]);
+    s.even_dof[i] = s.dof[i];
+    if (std::abs(s.even_t[i]) < kStandsOut) continue;
+    Weighed even{s.u.row(i), share.row(i).cwiseMax(0.0)};
+    for (int round = 0; round < kRounds; ++round) even = weigh(added, i, even_weights(even.u, even.share));
+    s.even_t[i] = even.t;
+    s.even_dof[i] = even.dof;
   }
   return s;
+}
+
+BlockRegression::Weighed BlockRegression::weigh(const AddedColumns& added, Eigen::Index column,
+                                                const Eigen::RowVectorXd& weight) const {
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(size(), size());
+  Eigen::VectorXd g = pull_, B = Eigen::VectorXd::Zero(size());
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const double w = weight[static_cast<Eigen::Index>(b)];
+    H += w * blocks_[b].H;
+    g += w * blocks_[b].g;
+    B += w * added.B[b].col(column);
+  }
+  H.diagonal() += precision_;
+  const Eigen::LDLT<Eigen::MatrixXd> fit(stiffened(std::move(H)));
+  const Eigen::VectorXd step = fit.solve(g), Y = fit.solve(B);
+  Weighed result{Eigen::RowVectorXd(weight.size()), Eigen::RowVectorXd(weight.size())};
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const auto at = static_cast<Eigen::Index>(b);
+    const Eigen::VectorXd HY = blocks_[b].H * Y, own = added.B[b].col(column);
+    result.u[at] = added.d[b][column] - own.dot(step) - Y.dot(blocks_[b].g) + HY.dot(step);
+    result.share[at] = std::max(0.0, added.C[b](column, column) - 2.0 * Y.dot(own) + Y.dot(HY));
+  }
+  const Eigen::RowVectorXd u = weight.cwiseProduct(result.u), share = weight.cwiseProduct(result.share);
+  const double sum = u.sum() - Y.dot(pull_ - precision_.cwiseProduct(step)), whole = share.sum();
+  if (whole <= 0.0) return result;
+  result.dof = std::max(0.5, whole * whole / share.squaredNorm() - 1.0);
+  const double scatter = (u - sum / whole * share).squaredNorm() * (result.dof + 1.0) / result.dof;
+  const double white = weight.dot(share), of_beliefs = Y.cwiseProduct(precision_.cwiseSqrt()).squaredNorm();
+  result.t = sum / std::sqrt(std::max(scatter, white) + of_beliefs);
+  return result;
 }
 
 const std::vector<BlockRegression::Rest>& BlockRegression::rests() const {

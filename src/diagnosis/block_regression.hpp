@@ -36,11 +36,15 @@ struct Scores {
   Eigen::VectorXd total;    ///< sum of everything
   Eigen::VectorXd sd;       ///< of the total, from how blocks differ about the best value, and from the beliefs
   Eigen::VectorXd dof;      ///< blocks that carry the information, less one (Satterthwaite's count)
+  /// Total over standard deviation, and blocks that carry it, where blocks weigh by how far they can be believed: each
+  /// errs by its pictures' noise and by what the model gets wrong in its posture (random effects: DerSimonian and Laird
+  /// 1986), so that no single one decides because it knows the column best. Of columns that hardly stand out: as above.
+  Eigen::VectorXd even_t, even_dof;
   /// Share of each column that the base cannot make up for.
   Eigen::VectorXd independent;
   /// The total over its standard deviation.
   [[nodiscard]] Eigen::VectorXd t() const { return total.cwiseQuotient(sd.cwiseMax(1e-300)); }
-  /// The largest |t|, as the normal variable that is as unlikely (Wallace's approximation, 1959).
+  /// The largest |even_t|, as the normal variable that is as unlikely (Wallace's approximation, 1959).
   [[nodiscard]] double z() const;
   [[nodiscard]] Eigen::VectorXd estimate() const;
 };
@@ -89,6 +93,12 @@ class BlockRegression {
   [[nodiscard]] const std::vector<Rest>& rests() const;
   [[nodiscard]] Scores score(const AddedColumns& added, const Eigen::MatrixXd& Y,
                              const Eigen::MatrixXd& quadratic) const;
+  /// One added column beside the base, fitted with weights of the blocks.
+  struct Weighed {
+    Eigen::RowVectorXd u, share;  ///< per block as in Scores, before they are weighed
+    double t = 0.0, dof = 0.0;
+  };
+  [[nodiscard]] Weighed weigh(const AddedColumns& added, Eigen::Index column, const Eigen::RowVectorXd& weight) const;
 
   std::vector<BaseBlock> blocks_;
   Eigen::VectorXd precision_, away_, pull_;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "bodyschema/evidence/distributions.hpp"
 #include "random_seed.hpp"
 
 namespace bodyschema::diagnosis {
@@ -279,9 +280,8 @@ TEST(Scores, AreAsUnlikelyAsANormalVariable) {
   // Two-sided 1 % of Student's t: 4.604 with 4 degrees of freedom, 3.250 with 9, 2.756 with 29; normal: 2.576.
   for (const auto& [t, dof] : {std::pair{4.604, 4.0}, {3.250, 9.0}, {2.756, 29.0}}) {
     Scores scores;
-    scores.total = Eigen::VectorXd::Constant(1, -t);
-    scores.sd = Eigen::VectorXd::Ones(1);
-    scores.dof = Eigen::VectorXd::Constant(1, dof);
+    scores.even_t = Eigen::VectorXd::Constant(1, -t);
+    scores.even_dof = Eigen::VectorXd::Constant(1, dof);
     EXPECT_NEAR(scores.z(), 2.576, 0.03) << dof;
   }
 }
@@ -292,6 +292,51 @@ TEST(Scores, CountTheBlocksThatCarryAColumn) {
   EXPECT_NEAR(rows.regression().score(rows.added()).dof[0], 37.0, 3.0);
   rows.Z.bottomRows(35 * rows.length()).setZero();
   EXPECT_NEAR(rows.regression().score(rows.added()).dof[0], 4.0, 1.0);
+}
+
+/// Blocks of one column that know it differently well, and each of which errs by what the model gets wrong in its
+/// posture.
+/// @param value, differ  of the column's coefficient: its mean, and by how much blocks differ about it
+Rows uneven(std::mt19937_64& random, double value, double differ) {
+  std::normal_distribution<double> normal;
+  auto rows = noise(random, 30, 2, 1, 0.0);
+  for (Eigen::Index b = 0; b < rows.blocks; ++b) {
+    rows.Z.middleRows(b * rows.length(), rows.length()) *= std::exp(1.5 * normal(random));
+    if (b == 7) rows.Z.middleRows(b * rows.length(), rows.length()) *= 30.0;  // a fast motion close to the camera
+    rows.y.segment(b * rows.length(), rows.length()) +=
+        (value + differ * normal(random)) * rows.Z.col(0).segment(b * rows.length(), rows.length());
+  }
+  return rows;
+}
+
+TEST(Scores, ABlockThatKnowsMostIsOneWitnessAndNotAllOfThem) {
+  std::mt19937_64 random(test::seed());
+  std::vector<double> z, dof;
+  for (int i = 0; i < 51; ++i) {
+    const auto rows = uneven(random, 1.0, 0.3);
+    const auto scores = rows.regression().score(rows.added());
+    z.push_back(scores.z());
+    dof.push_back(scores.even_dof[0]);
+  }
+  std::sort(z.begin(), z.end());
+  std::sort(dof.begin(), dof.end());
+  EXPECT_GT(z[25], 6.0) << "thirty blocks agree";
+  EXPECT_GT(z[2], 4.0);
+  EXPECT_GT(dof[25], 15.0);
+}
+
+TEST(Scores, UnevenBlocksThatDisagreeAreNoFinding) {
+  constexpr int kLogs = 1000;
+  constexpr double kLevel = 0.01;
+  std::mt19937_64 random(test::seed());
+  for (const double differ : {0.0, 0.3}) {
+    int alarms = 0;
+    for (int i = 0; i < kLogs; ++i) {
+      const auto rows = uneven(random, 0.0, differ);
+      alarms += rows.regression().score(rows.added()).z() > normal_quantile(kLevel / 2.0);
+    }
+    EXPECT_LT(alarms, kLevel * kLogs + 3.0 * std::sqrt(kLevel * kLogs)) << differ;
+  }
 }
 
 TEST(Blocks, ThatErrAlikeBesideEachOtherAreSeen) {
