@@ -35,8 +35,9 @@ struct LogAbout {
       : state(std::move(s)), linear(std::move(pictures)), at(*linear) {}
   State state;
   std::shared_ptr<const LinearLog> linear;
-  const LinearLog& at;            ///< over all coordinates
-  std::vector<double> precision;  ///< per picture: 1 / variance of a residual, 1/px^2; 0: nothing seen
+  const LinearLog& at;  ///< over all coordinates
+  /// Per picture: 1 / variance of a residual, 1/px^2, less where an arm stands still; 0: nothing seen.
+  std::vector<double> precision;
   /// [picture][column]: the state's parameters, the free curves that were found, and what is not estimated but may be
   /// wrong within the robot's tolerances or a picture's sharpness.
   std::vector<std::vector<Direction>> base;

@@ -54,13 +54,13 @@ class Diagnoser {
   }
 
   /// The search alone, about pictures that were linearised already.
-  DiagnosisReport look() {
+  Look look() {
     report_.not_testable = untestable(fit_.log().roles(), motion());
     find_causes();
     if (!asked_) field();
     Findings(fit_, search_, options_, report_).name_causes(asked_->log, asked_->candidates);
     word_verdict(report_, fit_.log().roles());
-    return std::move(report_);
+    return {std::move(report_), search_.best(asked_->base)};
   }
 
  private:
@@ -497,7 +497,7 @@ DiagnosisReport diagnose(LogFit& fit, const std::vector<Belief>& beliefs, const 
   return diagnosis::Diagnoser(fit, diagnosis::ModelSearch(fit, beliefs, tolerances, options), options).run();
 }
 
-DiagnosisReport diagnosis::look(LogFit& fit, State state, std::shared_ptr<const LinearLog> pictures,
+diagnosis::Look diagnosis::look(LogFit& fit, State state, std::shared_ptr<const LinearLog> pictures,
                                 std::vector<OutlineNoise> noise, const std::vector<Belief>& tolerances,
                                 const DiagnosisOptions& options, const std::vector<Microseconds>& changes) {
   ModelSearch search(fit, std::move(state), std::move(pictures), std::move(noise), tolerances, options);

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <chrono>
 #include <future>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -33,7 +34,11 @@ constexpr double kLeastPeriod_s = 5.0, kPeriodShare = 0.2, kMostPeriod_s = 20.0;
 constexpr double kFirstLook_s = 10.0;     // of pictures, before the first look
 constexpr double kPicturePeriod_s = 0.5;  // from one frame that is looked at to the next
 constexpr double kWindow_s = 90.0;        // older pictures are forgotten
-constexpr double kAnswer_s = 3.0;         // what a look found is said this much later, when it is surely known
+/// Outlines that are kept to measure them again, some 80 frames of two cameras at 320x240.
+constexpr std::size_t kOutlines_bytes = 16u << 20;
+/// Of 320x240; outlines that a picture's own joints would move no further are measured where they are predicted.
+constexpr double kNear_px = 0.5;
+constexpr double kAnswer_s = 3.0;  // what a look found is said this much later, when it is surely known
 /// In how many looks together anything may be named in a robot without a fault, ever: every look has its share.
 constexpr double kLiveLevel = 0.01;
 
@@ -81,6 +86,15 @@ bool agree(const Finding& a, const Finding& b) {
   return names(a, name_of(b)) || names(b, name_of(a));
 }
 
+/// Whether two looks found the same causes, as large as each knows them.
+bool about_the_same(const std::vector<Finding>& a, const std::vector<Finding>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Finding& one, const Finding& other) {
+    return name_of(one) == name_of(other) &&
+           std::equal(one.parameters.begin(), one.parameters.end(), other.parameters.begin(), other.parameters.end(),
+                      [](const auto& p, const auto& q) { return std::abs(p.value - q.value) <= p.sd; });
+  });
+}
+
 /// The window of pictures, and the looks at it. Used by the worker's thread alone.
 class Window {
  public:
@@ -97,26 +111,31 @@ class Window {
     }
   }
 
-  LiveFindings look(const Batch& batch) {
+  /// @return nothing where that cannot tell: what was found before stays as good as it was
+  std::optional<LiveFindings> look(const Batch& batch) {
     if (batch.anew) forget();
-    if (!take(batch)) return found_;
+    if (!take(batch)) return std::nullopt;
     LiveFindings found;
     const auto last = log_.pictures().back().joints.utime;
     found.utime = last;
     found.span_s = seconds(last - log_.pictures().front().joints.utime);
-    found_ = found;
-    if (found.span_s < kFirstLook_s) return found;
+    if (found.span_s < kFirstLook_s) return std::nullopt;
     // A share of what may be wrong for every look, all of them together (Lan and DeMets 1983): of the k-th 6 / (pi
     // k)^2.
     const double k = static_cast<double>(++looks_);
     diagnosis_.level = kLiveLevel * 6.0 / (kPi * kPi * k * k);
-    const auto report = diagnosis::look(fit_, state_, at_, noise_, tolerances_, diagnosis_, changes_);
+    auto [report, best] = diagnosis::look(fit_, state_, at_, noise_, tolerances_, diagnosis_, changes_);
     found.blocks = report.blocks;
     found.z_threshold = report.z_threshold;
     if (std::any_of(report.causes.begin(), report.causes.end(), [](const auto& c) { return c.implausible; })) {
-      return found;  // something stands in for what is not known
+      return std::nullopt;  // something stands in for what is not known
     }
+    best_ = std::move(best);
     for (const auto& cause : report.causes) found.causes.push_back(to_finding(cause));
+    if (!about_the_same(found.causes, measured_with_)) {
+      measured_with_ = found.causes;
+      others_found_ = true;
+    }
     // The offset follows already what the estimator saw slip.
     for (auto& finding : found.causes) finding.estimated = is_slip_at_change(finding);
     for (const auto& cause : report.estimated) {
@@ -124,7 +143,6 @@ class Window {
       found.causes.back().estimated = true;
     }
     for (const auto& f : found.causes) spdlog::debug("live diagnosis: {} (z {:.1f})", f.sentence, f.z);
-    found_ = found;
     return found;
   }
 
@@ -148,12 +166,15 @@ class Window {
     changes_.clear();
     log_.forget_before(INT64_MAX);
     at_.reset();
-    found_ = {};
+    best_.reset();
+    measured_with_.clear();
+    others_found_ = false;
   }
 
-  /// Measures what is new and moves what is known of the rest to the present estimate. False: there is nothing new.
+  /// Measures what is new and moves what is known of the rest to where all of it together has the robot: the estimator
+  /// follows the last pictures, whatever is wrong. False: there is nothing new.
   bool take(const Batch& batch) {
-    state_.set(batch.x);
+    best_ ? state_.set(*best_) : state_.set(batch.x);
     const auto newest = at_ ? at_->instants.back().utime : 0;
     for (const auto& frame : batch.frames) log_.add(frame);
     if (log_.pictures().empty() || log_.pictures().back().joints.utime <= newest) return false;
@@ -161,78 +182,97 @@ class Window {
     remember(batch.changes);
     log_.finish();
     fit_.weigh_parts();
-    std::vector<std::size_t> fresh;
-    for (std::size_t p = 0; p < log_.pictures().size(); ++p) {
-      if (log_.pictures()[p].joints.utime > newest) fresh.push_back(p);
-    }
-    linearise(fresh);
-    log_.drop_outlines();
+    linearise();
+    log_.drop_outlines(kOutlines_bytes);
     return true;
   }
 
-  void linearise(const std::vector<std::size_t>& fresh) {
-    auto measured = fit_.predict(state_.model(), joints_);
+  void linearise() {
+    auto measured = fit_.predict(best_ ? *best_ : state_.model(), joints_);
+    auto now = std::make_shared<LinearLog>(fit_.predict(state_.model(), all_));
+    std::vector<std::size_t> fresh;
+    for (std::size_t p = 0, old = 0; p < now->instants.size(); ++p) {
+      if (!keep_old(old, *now, p)) fresh.push_back(p);
+    }
+    others_found_ = false;
     bring_near(measured, fresh);
     measured.coordinates = all_;
     OutlineSearch search{.search_px = diagnosis::limits::kSearch_px, .spacing_px = diagnosis_.spacing_px};
     for (const auto& noise : noise_) search.robust_px = std::max(search.robust_px, noise.robust_px());
     fit_.measure(measured, search, fresh, [&](std::size_t p, std::span<const OutlinePoint> points) {
       const auto camera = log_.pictures()[p].camera;
-      noise_[camera].add(points, picture_unit(log_.rig().cameras[camera].intrinsics), kNoisePictures);
+      noise_[camera].add(points, unit_of(p), kNoisePictures);
     });
-    auto now = std::make_shared<LinearLog>(fit_.predict(state_.model(), all_));
-    for (const auto p : fresh) move(measured, p, *now, p);
-    if (at_) keep_old(*now);
+    for (const auto p : fresh) {
+      move(measured.evidence[p], measured.corrections[p], now->corrections[p], now->evidence[p]);
+    }
     at_ = std::move(now);
   }
 
-  /// Predictions of pictures as each of them has the arm's joints: outlines far off count little, and what pushes them
-  /// there, a latency or a gain, would hardly be seen. What they say is kept about the state all the same.
-  void bring_near(LinearLog& measured, const std::vector<std::size_t>& fresh) {
+  /// Predictions of pictures as each of them has the arm's joints, where these lie elsewhere: outlines far off count
+  /// little, and what pushes them there, a latency or a gain, would hardly be seen. What they say is kept about the
+  /// state all the same.
+  void bring_near(LinearLog& measured, std::vector<std::size_t> far) {
     constexpr double kSparse = 2.0;  // of the way there half the points tell
     for (const double search_px : {diagnosis::limits::kFrom_px, diagnosis::limits::kSearch_px}) {
+      if (far.empty()) break;
       fit_.measure(
           measured,
-          {.search_px = search_px, .spacing_px = kSparse * diagnosis_.spacing_px, .robust_px = 0.5 * search_px}, fresh);
-      for (const auto p : fresh) {
-        const auto& evidence = measured.evidence[p];
-        if (evidence.weight <= 0.0) continue;
-        const auto camera = log_.pictures()[p].camera;
-        const double variance =
-            noise_[camera].variance_px2() * std::pow(picture_unit(log_.rig().cameras[camera].intrinsics), 2);
-        Eigen::MatrixXd precision = evidence.A / variance;
-        precision.diagonal().array() += std::pow(diagnosis::limits::kOneFrame_rad, -2);
-        const Eigen::VectorXd step = precision.ldlt().solve(evidence.b / variance);
-        for (std::size_t i = 0; i < joints_.size(); ++i) {
-          fit_.coordinates()[joints_[i]].in(measured.corrections[p]) += step[static_cast<Eigen::Index>(i)];
-        }
-      }
+          {.search_px = search_px, .spacing_px = kSparse * diagnosis_.spacing_px, .robust_px = 0.5 * search_px}, far);
+      std::erase_if(far, [&](std::size_t p) { return !move_joints(measured, p); });
     }
   }
 
-  /// What earlier looks measured of pictures that are still in the window.
-  void keep_old(LinearLog& now) {
-    std::size_t old = 0;
-    for (std::size_t p = 0; p < now.instants.size(); ++p) {
-      const auto same = [&](std::size_t o) {
-        return at_->instants[o].utime == now.instants[p].utime && at_->instants[o].camera == now.instants[p].camera;
-      };
-      while (old < at_->instants.size() && !same(old)) ++old;
-      if (old == at_->instants.size()) return;  // what follows is new
-      move(*at_, old, now, p);
+  /// One step of a picture's own joints; false: its outlines lie near already.
+  bool move_joints(LinearLog& measured, std::size_t p) const {
+    const auto& evidence = measured.evidence[p];
+    if (evidence.weight <= 0.0) return false;
+    const double unit = unit_of(p), variance = noise_[log_.pictures()[p].camera].variance_px2() * unit * unit;
+    Eigen::MatrixXd precision = evidence.A / variance;
+    precision.diagonal().array() += std::pow(diagnosis::limits::kOneFrame_rad, -2);
+    const Eigen::VectorXd step = precision.ldlt().solve(evidence.b / variance);
+    if (step.dot(evidence.A * step) <= std::pow(kNear_px * unit, 2) * evidence.weight) return false;
+    for (std::size_t i = 0; i < joints_.size(); ++i) {
+      fit_.coordinates()[joints_[i]].in(measured.corrections[p]) += step[static_cast<Eigen::Index>(i)];
     }
+    return true;
   }
 
-  /// Evidence about one prediction, about another: quadratics keep their shape.
-  void move(LinearLog& from, std::size_t f, LinearLog& to, std::size_t t) {
+  /// What earlier looks measured of a picture, where that is still in the window. Evidence is a quadratic about the
+  /// place where it was measured, and ways there are bent: with other causes it is measured anew while its outlines are
+  /// kept.
+  /// @param old  position among the pictures of the last look, in order
+  bool keep_old(std::size_t& old, LinearLog& now, std::size_t p) {
+    if (!at_) return false;
+    const auto same = [&](const Instant& earlier) {
+      return earlier.utime == now.instants[p].utime && earlier.camera == now.instants[p].camera;
+    };
+    while (old < at_->instants.size() && !same(at_->instants[old])) ++old;
+    if (old == at_->instants.size()) return false;  // what follows is new
+    const bool again = others_found_ && !log_.pictures()[p].mask.empty();
+    if (!again) move(at_->evidence[old], at_->corrections[old], now.corrections[p], now.evidence[p]);
+    ++old;
+    return !again;
+  }
+
+  /// Pixels of a picture in one of 320x240.
+  [[nodiscard]] double unit_of(std::size_t p) const {
+    return picture_unit(log_.rig().cameras[log_.pictures()[p].camera].intrinsics);
+  }
+
+  [[nodiscard]] Eigen::VectorXd step_between(const Corrections& from, const Corrections& to) const {
     Eigen::VectorXd before(fit_.coordinates().size()), after(before.size());
-    auto& evidence = to.evidence[t] = std::move(from.evidence[f]);
-    fit_.coordinates().read(from.corrections[f], before);
-    fit_.coordinates().read(to.corrections[t], after);
-    const Eigen::VectorXd step = after - before;
-    const Eigen::VectorXd pull = evidence.A * step;
-    evidence.square += step.dot(pull) - 2.0 * step.dot(evidence.b);
-    evidence.b -= pull;
+    fit_.coordinates().read(from, before);
+    fit_.coordinates().read(to, after);
+    return after - before;
+  }
+
+  /// Evidence about one place, about another: quadratics keep their shape.
+  void move(OutlineEvidence& evidence, const Corrections& from, const Corrections& to, OutlineEvidence& moved) const {
+    const Eigen::VectorXd step = step_between(from, to), pull = evidence.A * step;
+    moved = std::move(evidence);
+    moved.square += step.dot(pull) - 2.0 * step.dot(moved.b);
+    moved.b -= pull;
   }
 
   DiagnosisOptions diagnosis_;
@@ -243,9 +283,11 @@ class Window {
   std::vector<std::uint32_t> all_, joints_;  ///< coordinates; those of the arm's joints
   std::vector<OutlineNoise> noise_;
   std::vector<Microseconds> changes_;
-  std::shared_ptr<LinearLog> at_;  ///< the window about the estimate at the last look
+  std::shared_ptr<LinearLog> at_;       ///< the window, about the state at the last look
+  std::optional<ErrorModel> best_;      ///< the state and what was found beside it, by the last look that could tell
+  std::vector<Finding> measured_with_;  ///< causes with which pictures were measured
+  bool others_found_ = false;           ///< since
   std::size_t looks_ = 0;
-  LiveFindings found_;  ///< by the last look
 };
 
 }  // namespace
@@ -324,14 +366,20 @@ struct LiveDiagnosis::Impl {
   bool answer(Microseconds now) {
     if (!looking.valid() || seconds(now - look_utime) < kAnswer_s) return false;
     if (!waits && looking.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
-    LiveFindings found = looking.get();
-    said = found;
+    auto found = looking.get();
+    if (!found) {
+      // Of pictures that are long gone nothing is said any more.
+      if (said.causes.empty() || seconds(now - said.utime) <= kWindow_s) return false;
+      said = {};
+      return true;
+    }
+    said = *found;
     std::erase_if(said.causes, [&](const Finding& f) {
       // What the estimator saw happen has been seen twice.
       const bool seen = f.estimated && f.effect == "slip";
       return !seen && std::none_of(last.begin(), last.end(), [&](const Finding& g) { return agree(f, g); });
     });
-    last = std::move(found.causes);
+    last = std::move(found->causes);
     return true;
   }
 
@@ -364,7 +412,7 @@ struct LiveDiagnosis::Impl {
   Microseconds kept_utime = 0, look_utime = 0, first_utime = 0, change_utime = 0;
   std::vector<Finding> last;  ///< by the last look
   LiveFindings said;
-  std::future<LiveFindings> looking;
+  std::future<std::optional<LiveFindings>> looking;
   BackgroundWorker worker;  ///< last: it ends before what it works on
 };
 

@@ -25,6 +25,15 @@ Belief wide_belief(const CauseName& cause, const JointRoles& roles) {
 namespace bodyschema::diagnosis {
 namespace {
 
+/// When it happened, which no fit changes.
+void set_timing(Effect& effect, const FoundCause& cause) {
+  const auto timing = effect_kind(cause.name.name).timing;
+  if (timing == EffectTiming::kFromATime) effect.parameters()[1].value = seconds(cause.from);
+  if (timing != EffectTiming::kOverTheLog) return;
+  effect.parameters()[1].value = cause.begin_s;
+  effect.parameters()[2].value = cause.duration_s;
+}
+
 /// A part of a log in which the robot is hardly found.
 struct LostPart {
   std::size_t split = 0;  ///< the first picture after it changed
@@ -150,25 +159,27 @@ State ModelSearch::state_with(const std::vector<FoundCause>& causes) const {
   State state(fit_.log().roles(), beliefs);
   for (const auto& cause : causes) {
     if (cause.generic()) continue;
-    auto* effect = state.model().find(cause.name.name, {cause.name.joint, cause.name.source});
-    const auto timing = effect_kind(cause.name.name).timing;
-    if (timing == EffectTiming::kFromATime) effect->parameters()[1].value = seconds(cause.from);
-    if (timing != EffectTiming::kOverTheLog) continue;
-    effect->parameters()[1].value = cause.begin_s;
-    effect->parameters()[2].value = cause.duration_s;
+    set_timing(*state.model().find(cause.name.name, {cause.name.joint, cause.name.source}), cause);
   }
   return state;
 }
 
-void ModelSearch::take_over(State& to, const State& from) {
-  Eigen::VectorXd x = to.x();
-  const Eigen::VectorXd values = from.x();
-  for (Eigen::Index i = 0; i < from.size(); ++i) {
-    const auto& ref = from.parameters()[static_cast<std::size_t>(i)].ref;
-    const auto& effect = from.model()[ref.effect];
-    if (const auto at = to.find(effect.name(), effect.target(), ref.parameter); at >= 0) x[at] = values[i];
+ErrorModel ModelSearch::best(const BlockRegression& regression) const {
+  const Eigen::VectorXd& step = regression.step();
+  State best = state_;
+  best.set(state_.x() + step.head(state_.size()));
+  for (std::size_t c = 0; c < causes_.size(); ++c) {
+    const auto& cause = causes_[c];
+    if (cause.generic() || in_state(cause)) continue;
+    auto& effect = best.model().add(cause.name.name, {cause.name.joint, cause.name.source});
+    set_timing(effect, cause);
+    const auto columns = columns_of(c);
+    std::size_t next = 0;
+    for (auto& parameter : effect.parameters()) {
+      if (parameter.fitted) parameter.value = std::max(step[columns[next++]], parameter.at_least);
+    }
   }
-  to.set(x);
+  return best.model();
 }
 
 std::optional<ModelSearch::Extended> ModelSearch::with(const FoundCause& cause, const Eigen::VectorXd& estimate,
@@ -179,7 +190,7 @@ std::optional<ModelSearch::Extended> ModelSearch::with(const FoundCause& cause, 
   State stepped = state_;
   stepped.set(state_.x() + estimate.head(state_.size()));
   State state = state_with(causes);
-  take_over(state, stepped);
+  state.set(stepped.model());
   Eigen::VectorXd x = state.x();
   const EffectTarget target{cause.name.joint, cause.name.source};
   Eigen::Index column = base;
@@ -218,7 +229,7 @@ void ModelSearch::drop(std::size_t cause) {
   causes_ = causes;
   if (beside) return;
   State state = state_with(causes);
-  take_over(state, state_);
+  state.set(state_.model());
   // A nuisance that was let loose is held by its belief again.
   cost_ = fit(state, 0.0);
   state_ = std::move(state);
@@ -341,6 +352,21 @@ void ModelSearch::group_blocks(LogAbout& log) const {
     last = q;
     log.block_of.push_back(log.blocks - 1);
   }
+  count_postures_once(log);
+}
+
+void ModelSearch::count_postures_once(LogAbout& log) const {
+  const auto& pictures = fit_.log().pictures();
+  std::vector<Microseconds> first(log.blocks, 0), last(log.blocks, 0);
+  for (std::size_t p = 0; p < pictures.size(); ++p) {
+    const auto b = log.block_of[p];
+    if (first[b] == 0) first[b] = pictures[p].joints.utime;
+    last[b] = pictures[p].joints.utime;
+  }
+  for (std::size_t p = 0; p < pictures.size(); ++p) {
+    const double span_s = seconds(last[log.block_of[p]] - first[log.block_of[p]]);
+    if (span_s > log.block_s) log.precision[p] *= log.block_s / span_s;
+  }
 }
 
 BlockRegression ModelSearch::regression(const LogAbout& log) const {
@@ -447,7 +473,7 @@ void ModelSearch::look_for_lost_part() {
                           .variable = {},
                           .from = pictures[part->split].joints.utime};
     State state = state_with({slip});
-    take_over(state, part->at_first ? there : state_);
+    state.set((part->at_first ? there : state_).model());
     Eigen::VectorXd x = state.x();
     const auto step = state.find("slip", {slip.name.joint, ""}, 0);
     if (step < 0) continue;

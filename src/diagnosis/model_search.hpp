@@ -50,6 +50,8 @@ class ModelSearch {
   /// The log about the present model, in blocks of at least `block_s`.
   [[nodiscard]] LogAbout about(double block_s);
   [[nodiscard]] BlockRegression regression(const LogAbout& log) const;
+  /// The state and all causes of the catalogue that were found, where a regression about the present model has them.
+  [[nodiscard]] ErrorModel best(const BlockRegression& regression) const;
 
   /// A model that may take the place of the present one.
   struct Extended {
@@ -91,11 +93,12 @@ class ModelSearch {
 
  private:
   [[nodiscard]] State state_with(const std::vector<FoundCause>& causes) const;
-  /// Values of the parameters that two states share.
-  static void take_over(State& to, const State& from);
   void add_causes(LogAbout& log) const;
   void add_considered(LogAbout& log) const;
   void group_blocks(LogAbout& log) const;
+  /// Pictures of an arm that stands err alike, however many there are: together they count as those of one shortest
+  /// block do.
+  void count_postures_once(LogAbout& log) const;
   /// About the present model, all pictures; not anew while that stays what it is.
   std::shared_ptr<const LinearLog> linearised(std::span<const std::uint32_t> coordinates);
   double fit(State& state, double from_px);

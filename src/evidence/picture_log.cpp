@@ -55,10 +55,16 @@ void PictureLog::forget_before(Microseconds utime) {
   encoders_.erase(encoders_.begin(), first);
 }
 
-void PictureLog::drop_outlines() {
-  for (auto& picture : pictures_) {
-    picture.mask = picture.valid = BinaryMask();
-    picture.coverage = {};
+void PictureLog::drop_outlines(std::size_t bytes) {
+  for (auto picture = pictures_.rbegin(); picture != pictures_.rend(); ++picture) {
+    const std::size_t own = picture->mask.bytes() + picture->valid.bytes() + picture->coverage.size();
+    if (own <= bytes) {
+      bytes -= own;
+      continue;
+    }
+    bytes = 0;
+    picture->mask = picture->valid = BinaryMask();
+    picture->coverage = {};
   }
 }
 

@@ -173,6 +173,16 @@ void State::set(const Eigen::VectorXd& x) {
   }
 }
 
+void State::set(const ErrorModel& model) {
+  Eigen::VectorXd x = this->x();
+  for (Eigen::Index i = 0; i < size(); ++i) {
+    const auto& ref = parameters_[static_cast<std::size_t>(i)].ref;
+    const Effect& own = model_[ref.effect];
+    if (const auto* other = model.find(own.name(), own.target())) x[i] = other->parameters()[ref.parameter].value;
+  }
+  set(x);
+}
+
 Considered Considered::beside(const State& state, const std::vector<Belief>& tolerances) {
   Considered result{ErrorModel(state.model().roles()), {}};
   for (const auto& belief : tolerances) result.effects.add(belief.effect, belief.target);

@@ -114,9 +114,13 @@ TEST_F(PictureLogOfOwnRobot, ForgetsWhatIsOldAndLetsGoOfOutlines) {
   ASSERT_EQ(log.pictures().size(), 2u);
   EXPECT_EQ(log.pictures()[0].joints.utime, 20'000'000);
   EXPECT_EQ(log.encoders().front().utime, 14'000'000) << "what has a memory begins before the first picture";
-  log.drop_outlines();
-  EXPECT_TRUE(log.pictures()[0].mask.empty());
-  EXPECT_TRUE(log.pictures()[0].coverage.empty());
+  const auto& newest = log.pictures()[1];
+  log.drop_outlines(newest.mask.bytes() + newest.valid.bytes() + newest.coverage.size());
+  EXPECT_TRUE(log.pictures()[0].mask.empty()) << "the oldest ones go first";
+  EXPECT_FALSE(log.pictures()[1].mask.empty());
+  log.drop_outlines(0);
+  EXPECT_TRUE(log.pictures()[1].mask.empty());
+  EXPECT_TRUE(log.pictures()[1].coverage.empty());
   log.forget_before(INT64_MAX);
   EXPECT_TRUE(log.pictures().empty());
   EXPECT_TRUE(log.encoders().empty());

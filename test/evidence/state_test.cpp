@@ -145,6 +145,16 @@ TEST(State, SetsTheModelAndKeepsEffectsBounds) {
   EXPECT_EQ(state.x().head(7), x.head(7));
 }
 
+TEST(State, TakesValuesFromAModelThatHoldsThem) {
+  State state(roles(), read("    joint_offset of elbow: {sd_deg: 5}\n    backlash of elbow: {sd_deg: 1}\n"));
+  state.set(Eigen::Vector2d(0.02, 0.003));
+  ErrorModel other(roles());
+  other.add("joint_offset", {"elbow", ""}).parameters()[0].value = 0.05;
+  other.add("latency", {"", ""}).parameters()[0].value = 0.04;
+  state.set(other);
+  EXPECT_EQ(state.x(), Eigen::VectorXd(Eigen::Vector2d(0.05, 0.003))) << "what the model does not hold stays";
+}
+
 /// Beliefs are about what lies beyond what is known already.
 TEST(State, BesideAKnownModelItsCentreIsWhatIsKnown) {
   ErrorModel known(roles());

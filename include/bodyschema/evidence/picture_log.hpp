@@ -38,8 +38,9 @@ class PictureLog {
   void set_encoders(std::vector<JointSample> encoders) { encoders_ = std::move(encoders); }
   /// Forgets pictures before a time, and the encoder samples before the first one left.
   void forget_before(Microseconds utime);
-  /// Lets go of the pictures' outlines, whose evidence somebody keeps; the rest stays.
-  void drop_outlines();
+  /// Lets go of the oldest pictures' outlines, whose evidence somebody keeps, so that the newest take at most so many
+  /// bytes; the rest stays.
+  void drop_outlines(std::size_t bytes);
   /// Of the same pictures, a robot whose cameras sit elsewhere.
   void replace_rig(std::shared_ptr<const RobotModel> robot, const StereoRig& rig);
   /// The masks come of a background that was learned from these pictures: what never left its place is part of it.

@@ -62,6 +62,8 @@ class State {
   [[nodiscard]] Eigen::VectorXd prior_sd() const;
   /// Effects' bounds are kept.
   void set(const Eigen::VectorXd& x);
+  /// Values that another model has for the same parameters; those that it does not hold stay.
+  void set(const ErrorModel& model);
   /// Position of a fitted parameter; -1: it is not estimated.
   [[nodiscard]] Eigen::Index find(const std::string& effect, const EffectTarget& target, std::size_t parameter) const;
 

@@ -20,6 +20,7 @@ class BinaryMask {
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] int words_per_row() const { return words_per_row_; }
   [[nodiscard]] bool empty() const { return words_.empty(); }
+  [[nodiscard]] std::size_t bytes() const { return words_.size() * sizeof(std::uint64_t); }
 
   [[nodiscard]] bool at(int u, int v) const { return (row(v)[u >> 6] >> (u & 63)) & 1u; }
   void set(int u, int v, bool value = true) {
