@@ -334,6 +334,16 @@ std::vector<OffsetSums> offset_sums(const LogAbout& log) {
   return sums;
 }
 
+/// A slip is an offset, with the opposite sign, of the pictures from a time on.
+void add_slipped(const LogAbout& log, const std::vector<OffsetSums>& sums, std::size_t picture, Eigen::Index joint,
+                 AddedColumns& slip) {
+  if (log.precision[picture] <= 0.0) return;
+  const auto b = log.block_of[picture];
+  slip.B[b] -= sums[picture].B.col(joint);
+  slip.C[b](0, 0) += sums[picture].C[joint];
+  slip.d[b][0] -= sums[picture].d[joint];
+}
+
 }  // namespace
 
 Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<NotTestable>& untestable,
@@ -347,17 +357,12 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
     const CauseName cause{"slip", parameters[static_cast<std::size_t>(j)].name, ""};
     if (is_excluded(untestable, cause) || std::find(log.found.begin(), log.found.end(), cause) != log.found.end())
       continue;
-    // A slip is an offset, with the opposite sign, of the pictures from a time on: from the last one back to the first.
+    // From the last picture back to the first.
     AddedColumns tail(log.blocks, n, 1);
     std::vector<AddedColumns> tails;
     std::vector<Microseconds> times;
     for (std::size_t p = pictures; p-- > 1;) {
-      if (log.precision[p] > 0.0) {
-        const auto b = log.block_of[p];
-        tail.B[b] -= sums[p].B.col(j);
-        tail.C[b](0, 0) += sums[p].C[j];
-        tail.d[b][0] -= sums[p].d[j];
-      }
+      add_slipped(log, sums, p, j, tail);
       if (log.at.instants[p].utime == log.at.instants[p - 1].utime || log.precision[p] <= 0.0) continue;
       if (!at_every_picture && log.block_of[p] == log.block_of[p - 1]) continue;
       tails.push_back(tail);
@@ -383,15 +388,19 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
   return result;
 }
 
-std::vector<Candidate> stated_slips(LogFit& fit, const LogAbout& log, const BlockRegression& base,
+std::vector<Candidate> stated_slips(const LogAbout& log, const BlockRegression& base,
                                     const std::vector<Microseconds>& times) {
+  const auto sums = offset_sums(log);
   std::vector<Candidate> list;
   for (const auto time : times) {
     for (Eigen::Index j = 0; j < log.state.joints(); ++j) {
       const CauseName cause{"slip", log.state.parameters()[static_cast<std::size_t>(j)].name, ""};
       if (std::find(log.found.begin(), log.found.end(), cause) != log.found.end()) continue;
       Candidate candidate{.cause = cause, .variable = {}, .parameters = {0}, .from = time, .stated = true};
-      candidate.columns = added_columns(log, directions_of(fit, log, candidate));
+      candidate.columns = AddedColumns(log.blocks, base.size(), 1);
+      for (std::size_t p = 0; p < sums.size(); ++p) {
+        if (log.at.instants[p].utime >= time) add_slipped(log, sums, p, j, candidate.columns);
+      }
       candidate.scores = base.score(candidate.columns);
       list.push_back(std::move(candidate));
     }

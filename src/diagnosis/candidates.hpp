@@ -96,7 +96,7 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
 
 /// A slip of every arm joint at times at which others saw that something happened, scored. Joints that are found
 /// already are left out.
-std::vector<Candidate> stated_slips(LogFit& fit, const LogAbout& log, const BlockRegression& base,
+std::vector<Candidate> stated_slips(const LogAbout& log, const BlockRegression& base,
                                     const std::vector<Microseconds>& times);
 
 /// The largest size of a parameter that is found on any robot, SI: a multiple of the typical one. How far a joint gives

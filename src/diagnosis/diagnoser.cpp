@@ -125,7 +125,7 @@ class Diagnoser {
   /// Slips that others saw happen, where they stand out for themselves.
   void add_stated(const LogAbout& log, const BlockRegression& base, std::vector<Candidate>& candidates) {
     if (changes_.empty()) return;
-    auto slips = stated_slips(fit_, log, base, changes_);
+    auto slips = stated_slips(log, base, changes_);
     if (stated_count_ == 0) stated_count_ = slips.size();
     for (auto& slip : slips) {
       if (slip.z() < threshold_of(true)) continue;

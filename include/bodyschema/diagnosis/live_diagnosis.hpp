@@ -12,11 +12,11 @@ namespace bodyschema {
 /// `bodyschema diagnose` over the same candidates and the same statistics of blocks, from the pictures' linearisation
 /// alone; no fit is repeated.
 ///
-/// Two frames a second are kept until the next look, then linearised over all coordinates about what is estimated by
-/// then; afterwards their evidence alone is kept, moved along with the estimate. All of it happens in a thread of its
-/// own, which the scheduler serves after the estimator's. What was found by two looks in a row is said. When looks
-/// begin and answers are said depends on the pictures' stamps, so that a log gives what the robot gave. All times are
-/// those of stamps.
+/// Two frames a second are kept until the next look, then linearised over all coordinates about what the last look
+/// found; afterwards their evidence moves along with what all of them ask for, and is measured anew where causes are
+/// others and outlines are kept. All of it happens in a thread of its own, which the scheduler serves after the
+/// estimator's. What was found by two looks in a row is said. When looks begin and answers are said depends on the
+/// pictures' stamps, so that a log gives what the robot gave. All times are those of stamps.
 class LiveDiagnosis {
  public:
   /// @param waits  true: every answer is waited for, so that it depends on the pictures alone (replay). false: one that
