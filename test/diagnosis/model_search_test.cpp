@@ -43,8 +43,8 @@ TEST(ModelSearch, PicturesOfAnArmThatMovesCountInFull) {
   const auto about = search.about(1.0);
   ASSERT_GT(about.blocks, 8u);
   const double most = *std::max_element(about.precision.begin(), about.precision.end());
-  const auto full = std::count_if(about.precision.begin(), about.precision.end(),
-                                  [&](double p) { return p > 0.7 * most; });
+  const auto full =
+      std::count_if(about.precision.begin(), about.precision.end(), [&](double p) { return p > 0.7 * most; });
   EXPECT_GT(full, 0.6 * static_cast<double>(about.precision.size()));
 }
 
