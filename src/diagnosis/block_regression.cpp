@@ -282,11 +282,15 @@ Eigen::MatrixXd BlockRegression::covariance() const {
   Eigen::MatrixXd with_beliefs = H_;
   with_beliefs.diagonal() += precision_;
   const Eigen::MatrixXd Q = symmetric_inverse(stiffened(with_beliefs));
-  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(size(), size());
-  for (const auto& u : left_) meat += u * u.transpose();
-  meat *= blocks_factor(blocks_.size());
-  meat.diagonal() += precision_;
-  Eigen::MatrixXd covariance = Q * meat * Q;
+  // A fit follows the blocks that know most, and what it leaves of them is too little: left out, each shows how it errs
+  // (jackknife).
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size(), size());
+  for (const auto& rest : rests()) {
+    const Eigen::VectorXd moved = rest.x - step_;
+    covariance += moved * moved.transpose();
+  }
+  covariance /= blocks_factor(blocks_.size());
+  covariance += Q * precision_.asDiagonal() * Q;
   for (Eigen::Index i = 0; i < size(); ++i) {
     const double least = Q(i, i), own = covariance(i, i);
     if (own >= least) continue;

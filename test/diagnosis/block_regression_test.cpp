@@ -179,6 +179,29 @@ TEST(BlockRegression, NoBlocksAgreeBetterThanWhiteNoise) {
 
 /// What the model lets vary anyway is a finding only where it departs from what is believed of it: so many standard
 /// deviations of the belief, however well the log knows it.
+/// A few blocks know most, and a base of many columns follows them: what is left of them there says little of how they
+/// err.
+TEST(BlockRegression, StandardDeviationsHoldWhereFewBlocksKnowMost) {
+  constexpr int kLogs = 400;
+  std::mt19937_64 random(test::seed());
+  std::normal_distribution<double> normal;
+  int outside = 0;
+  for (int i = 0; i < kLogs; ++i) {
+    auto rows = noise(random, 30, 8, 0, 0.0);
+    for (Eigen::Index b = 0; b < rows.blocks; ++b) {
+      auto own = rows.X.middleRows(b * rows.length(), rows.length());
+      own *= std::exp(normal(random));
+      rows.y.segment(b * rows.length(), rows.length()) +=
+          own * Eigen::VectorXd::NullaryExpr(8, [&] { return 0.3 * normal(random); });
+    }
+    const auto base = rows.regression();
+    const double sd = std::sqrt(base.covariance()(0, 0));
+    outside += std::abs(base.step()[0]) > 2.05 * sd;  // of 95 %, Student's with 29 degrees of freedom
+  }
+  EXPECT_LT(outside, 0.13 * kLogs);
+  EXPECT_GT(outside, 0.01 * kLogs) << "nor wider than they need to be";
+}
+
 TEST(BlockRegression, AColumnEqualToANuisanceIsJudgedByItsBelief) {
   for (const double departs : {0.5, 6.0}) {
     std::mt19937_64 random(test::seed());
