@@ -58,7 +58,8 @@ DIGITS = "r_(hand_)?(thumb|index|middle|ring|little)"
 START_US = 1_700_000_000_000_000
 DEG = math.pi / 180
 
-PLAIN = {"room": "wall", "wall": [0.36, 0.50, 0.44], "head": "still", "looks": "grey", "seconds": 30}
+PLAIN = {"room": "wall", "wall": [0.36, 0.50, 0.44], "head": "still", "looks": "grey", "seconds": 30, "hz": PICTURES_HZ,
+         "rest": 1.0}
 CONDITIONS = {
     "plain": {},
     "room": {"room": "kitchen"},
@@ -77,6 +78,34 @@ CONDITIONS = {
     "jpeg": {"room": "kitchen", "jpeg": 70},
     "all": {"room": "kitchen", "head": "gaze", "looks": "covers", "drift": 0.2, "flicker": 0.02, "box": True,
             "person": True, "k1": -0.3, "jpeg": 70},
+    # What laboratories have besides.
+    "exposure": {"room": "kitchen", "head": "gaze", "auto_exposure": True},  # each camera sets its own
+    "mirror": {"room": "kitchen", "reflectance": 0.45},  # a polished table
+    "sun": {"wall": [0.62, 0.61, 0.58], "near_wall": True, "sun": True},  # the arm's hard shadow on a wall close behind
+    "twin": {"wall": "twin"},  # pieces of the wall have the robot's own grays
+    "door": {"looks": "skin", "wall": "door"},  # half the wall has the hand's colour
+    "left_arm": {"room": "kitchen", "left_arm": True},  # the robot's own other arm, of the same make, at work too
+    "turns": {"room": "kitchen", "box": True, "turns": True},  # a box taken and laid down again
+    "tray": {"room": "kitchen", "box": [0.1, 0.012, 0.075]},  # larger than the hand
+    "enters": {"room": "kitchen", "away": [(0, 10), (17, 22)]},  # the arm comes after 10 s, and leaves for 5 s
+    "slow": {"room": "kitchen", "hz": 2, "seconds": 60},
+    "pauses": {"room": "kitchen", "rest": 10, "hz": 5, "seconds": 60},
+    "unfocused": {"room": "kitchen", "blur": 1.5},
+    "haze": {"room": "kitchen", "haze": 0.45, "gamma": 0.6},
+    "worn": {"room": "kitchen", "worn": True},  # a dark rim, a pattern that stands, dead pixels
+    "interlaced": {"room": "kitchen", "interlaced_ms": 20},
+    "unsynchronised": {"room": "kitchen", "right_late_ms": 25},
+    "encoders": {"room": "kitchen", "encoder_noise": 0.3, "encoder_step": 0.1},
+    "cable": {"room": "kitchen", "cable": True},
+    "screen": {"room": "kitchen", "screen": True},
+    "linear": {"room": "kitchen", "looks": "covers", "gamma_light": 2.2, "blur": 1.0},  # light mixes, levels do not
+    "window": {"wall": [1.0, 1.0, 1.0], "glows": True, "light": 0.55, "gamma_light": 2.2, "overexposed": 6},  # behind
+    "sharpened": {"room": "kitchen", "sharpened": 1.2},  # as webcams do
+    "trails": {"room": "kitchen", "trails": 0.4},  # noise averaged over time: what moves leaves a trail
+    "fringes": {"room": "kitchen", "fringes": 0.003},  # red larger, blue smaller
+    "fingers": {"room": "kitchen", "fingers_deg": 8},  # each finger somewhere else than its encoders say
+    "glove": {"room": "kitchen", "glove_mm": 2.0},
+    "stale": {"room": "kitchen", "right_late_ms": -100},  # the right picture is one behind
 }
 # What is wrong with the robot beside its offsets, for `bodyschema diagnose`.
 FAULTS = {
@@ -206,6 +235,24 @@ def plaster(random, colour, size=512):
             * (0.985 + 0.03 * smooth_noise(random, size, 160)))
 
 
+def patches(random, first, second, cells, size=1024):
+    """Two colours, or two lists of them, in smooth pieces of a wall."""
+    first, second = np.atleast_2d(first), np.atleast_2d(second)
+    choice = smooth_noise(random, size, cells)
+    share = np.clip(40 * (choice[..., 0] - 0.5) + 0.5, 0, 1)[..., None]
+    pick = (choice[..., 1] * 3.999).astype(int)
+    return ((share * first[pick % len(first)] + (1 - share) * second[pick % len(second)])
+            * (0.985 + 0.03 * smooth_noise(random, size, 160)))
+
+
+def wall_picture(random, wall):
+    if wall == "twin":  # what `looks_of` makes of gray links, as they look in the light
+        return patches(random, [[g, g, 1.02 * g] for g in (0.38, 0.5, 0.6)], [0.36, 0.50, 0.44], 40)
+    if wall == "door":
+        return patches(random, [0.86, 0.62, 0.5], [0.36, 0.50, 0.44], 22)
+    return plaster(random, wall)
+
+
 def add_texture(spec, name, picture, kind=mujoco.mjtTexture.mjTEXTURE_2D, repeat=(1, 1), **looks):
     texture = spec.add_texture(name=name, type=kind, width=picture.shape[1], height=picture.shape[0], nchannel=3)
     faces = 6 if kind == mujoco.mjtTexture.mjTEXTURE_CUBE else 1
@@ -240,6 +287,7 @@ class Scene:
         visual.global_.offwidth, visual.global_.offheight = 2048, 1536
         self.bodies = {}
         self.points = []  # of the arm: (link, points in its frame)
+        self.visuals = []  # (name, (link, its mesh, its looks))
         self.build(self.urdf.root, self.spec.worldbody, np.zeros(3), np.eye(3), None)
         self.add_cameras()
         self.add_lights()
@@ -291,6 +339,9 @@ class Scene:
         if self.condition.get("forearm_mm", 0) and link == "r_forearm":
             normals = trimesh.Trimesh(vertices, faces, process=False).vertex_normals
             vertices = vertices + normals * self.condition["forearm_mm"] * 1e-3
+        if self.condition.get("glove_mm", 0) and (link.startswith("r_hand") or re.match(DIGITS, link)):
+            normals = trimesh.Trimesh(vertices, faces, process=False).vertex_normals
+            vertices = vertices + normals * self.condition["glove_mm"] * 1e-3
         name = f"{link}_{k}"
         mesh = self.spec.add_mesh(name=name)
         mesh.uservert, mesh.userface = vertices.ravel().tolist(), faces.ravel().tolist()
@@ -299,6 +350,7 @@ class Scene:
         geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, contype=0, conaffinity=0, rgba=rgba)
         geom.material = material
         self.points.append((link, vertices[:: max(1, len(vertices) // 40)]))
+        self.visuals.append((name, (link, vertices, faces, rgba, material)))
 
     def looks_of(self, link):
         looks = self.condition["looks"]
@@ -343,6 +395,12 @@ class Scene:
         world = self.spec.worldbody
         directional = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         turn = self.random.uniform(-0.25, 0.25, 2)
+        if self.condition.get("sun"):
+            head.ambient = [0.18] * 3
+            world.add_light(name="window", type=directional, dir=[-0.85 + turn[0], -0.3 + turn[1], -0.4],
+                            pos=[1.6, 0.6, 0.9], diffuse=[1.15, 1.1, 1.0], ambient=[0.08] * 3, specular=[0.5] * 3,
+                            castshadow=True)
+            return
         world.add_light(name="window", type=directional, dir=[-0.45 + turn[0], -0.5 + turn[1], -0.75],
                         pos=[0.3, 0.9, 1.6], diffuse=[0.72, 0.72, 0.76], ambient=[0.08] * 3, specular=[0.5] * 3,
                         castshadow=True)
@@ -360,8 +418,10 @@ class Scene:
         spec, world = self.spec, self.spec.worldbody
         cube = mujoco.mjtTexture.mjTEXTURE_CUBE
         if not kitchen:
-            add_texture(spec, "plaster", plaster(self.random, self.condition["wall"]))
-            world.add_geom(type=plane, size=[4, 4, 0.1], pos=[-1.2, 0, 0], quat=quaternion(rotation([0, 90 * DEG, 0])),
+            add_texture(spec, "plaster", wall_picture(self.random, self.condition["wall"]),
+                        emission=1.0 if self.condition.get("glows") else 0.0)
+            behind = self.condition.get("behind", -1.2)
+            world.add_geom(type=plane, size=[4, 4, 0.1], pos=[behind, 0, 0], quat=quaternion(rotation([0, 90 * DEG, 0])),
                            material="plaster", contype=0, conaffinity=0)
             world.add_geom(type=plane, size=[4, 4, 0.1], pos=[0, 0, table_z - 0.4], material="plaster", contype=0,
                            conaffinity=0)
@@ -369,7 +429,12 @@ class Scene:
         add_texture(spec, "bricks", bricks(self.random), repeat=(3, 3))
         add_texture(spec, "posters", posters(self.random), repeat=(2, 2))
         add_texture(spec, "floor", cloth(self.random), repeat=(4, 4))
-        add_texture(spec, "wood", wood(self.random), kind=cube, specular=0.4, shininess=0.4)
+        add_texture(spec, "wood", wood(self.random), kind=cube, specular=0.4, shininess=0.4,
+                    reflectance=self.condition.get("reflectance", 0))
+        if self.condition.get("screen"):
+            add_texture(spec, "screen", posters(self.random, 256), emission=0.8)
+            world.add_geom(type=plane, contype=0, conaffinity=0, size=[0.7, 0.5, 0.1], pos=[-1.1, 0, table_z + 0.25],
+                           quat=quaternion(rotation([0, 90 * DEG, 0])), material="screen")
         for k in range(4):
             add_texture(spec, f"paper{k}", posters(self.random, 256), kind=cube)
         wall = dict(type=plane, contype=0, conaffinity=0)
@@ -499,13 +564,14 @@ def resting_posture(robot):
 
 
 class Motion:
-    """Reaches from posture to posture: a second of rest in each, minimum jerk between."""
+    """Reaches from posture to posture: some rest in each (a second, mostly), minimum jerk between."""
 
     def __init__(self, scene, robot, seed, seconds):
         self.scene, self.random = scene, np.random.default_rng(seed * 104729 + 1)
         self.rest = {name: value * DEG for name, value in resting_posture(robot).items()}
         self.arm = scene.own["estimated_joints"]
         self.follows = scene.condition["head"] == "gaze"
+        self.away = scene.condition.get("away", [])
         self.knots = []
         t, last = 0.0, None
         while t < seconds + 3:
@@ -514,8 +580,9 @@ class Motion:
                 move = max(0.8, 1.875 * max(abs(target[j] - last[j]) for j in self.arm) / (55 * DEG))
                 self.knots.append((t, t + move, last, target))
                 t += move
-            self.knots.append((t, t + 1.0, target, target))
-            t, last = t + 1.0, target
+            rest = scene.condition["rest"]
+            self.knots.append((t, t + rest, target, target))
+            t, last = t + rest, target
         self.postures = sum(1 for knot in self.knots if knot[2] is knot[3])
 
     def visible(self, angles):
@@ -566,6 +633,15 @@ class Motion:
         return angles
 
     def at(self, t):
+        """Angles, rad. While it is away the arm hangs beside the body; it takes 1.5 s to get there, and back."""
+        working = self.working(t)
+        out = max((min(1.0, max(0.0, (t - begin) / 1.5 if begin > 0 else 1.0), max(0.0, (end - t) / 1.5))
+                   for begin, end in self.away), default=0.0)
+        if out == 0:
+            return working
+        return between(working, {**working, **{j: 0.0 for j in self.arm}}, out * out * (3 - 2 * out))
+
+    def working(self, t):
         for begin, end, a, b in self.knots:
             if t < end:
                 s = max(0.0, (t - begin) / (end - begin))
@@ -590,6 +666,17 @@ def lowest(scene, motion, seconds):
     return low
 
 
+def furthest(scene, motion, seconds):
+    """The point of the arm that gets furthest from the robot's body, along -x of the root frame, m."""
+    far = 0.0
+    for t in np.arange(0, seconds, 0.25):
+        scene.set_joints(motion.at(t))
+        for link, points in scene.points:
+            X = scene.pose(link)
+            far = min(far, float((points @ X[:3, :3].T + X[:3, 3])[:, 0].min()))
+    return far
+
+
 # ---- things that are no robot --------------------------------------------------------------------
 
 def add_box(scene, motion):
@@ -607,7 +694,8 @@ def add_box(scene, motion):
     X = np.eye(4)
     X[:3, :3], X[:3, 3] = R, centre
     X = np.linalg.inv(hand) @ X
-    return dict(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.055, 0.02, 0.032], pos=X[:3, 3], quat=quaternion(X[:3, :3]),
+    size = scene.condition["box"] if isinstance(scene.condition["box"], list) else [0.055, 0.02, 0.032]
+    return dict(type=mujoco.mjtGeom.mjGEOM_BOX, size=size, pos=X[:3, 3], quat=quaternion(X[:3, :3]),
                 contype=0, conaffinity=0)
 
 
@@ -649,6 +737,129 @@ def second_arm_pose(scene, t):
                    0.07 + 0.05 * math.sin(0.7 * t)])
     R = rotation([0.4 * math.sin(0.6 * t), -0.25, math.pi - 0.6 + 0.25 * math.sin(0.8 * t)])
     return at, quaternion(R)
+
+
+def add_left_arm(scene, body):
+    """Hand and forearm of the other side, stiff as the right ones are at rest: mirrored in the plane between the eyes."""
+    scene.set_joints({})  # links as they hang, from one another
+    hand = np.linalg.inv(scene.pose(scene.own["hand_link"]))
+    mirror = np.array([1.0, -1.0, 1.0])
+    for name, visual in scene.visuals:
+        link, vertices, faces, rgba, material = visual
+        if not (link.startswith(("r_hand", "r_forearm", "r_wrist")) or re.match(DIGITS, link)):
+            continue
+        X = hand @ scene.pose(link)
+        mesh = scene.spec.add_mesh(name="left " + name)
+        mesh.uservert = ((vertices @ X[:3, :3].T + X[:3, 3]) * mirror).ravel().tolist()
+        mesh.userface = faces[:, ::-1].ravel().tolist()
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, contype=0, conaffinity=0, rgba=rgba)
+        geom.material = material
+
+
+def left_arm_pose(scene, motion, t):
+    """What the right hand did 3.3 s before, mirrored, and 4 cm nearer to the middle."""
+    scene.set_joints(motion.at(max(0.0, t - 3.3) if t > 3.3 else 6.6 - t))
+    X = scene.pose(scene.own["hand_link"])
+    S = np.diag([1.0, -1.0, 1.0])
+    p = S @ X[:3, 3]
+    return p + np.array([0, 0.04, 0]), quaternion(S @ X[:3, :3] @ S)
+
+
+def box_pose(scene, motion, box, t, table_z):
+    """Held from 5 to 11 s, from 17 to 23 s and so on; it is laid on the table, and fetched there, within half a second."""
+    in_turn = (t - 5) % 12
+    if t >= 5 and in_turn <= 6:
+        return held_pose(scene, motion, box, t)
+    let_go = 11 + 12 * math.floor((t - 11) / 12) if t > 11 else 5.0
+    taken = 5 + 12 * math.ceil((t - 5) / 12)
+    (p_A, q_A), (p_B, q_B) = held_pose(scene, motion, box, let_go), held_pose(scene, motion, box, taken)
+    lying = np.array([p_A[0], p_A[1], table_z + min(box["size"])])
+    flat = quaternion(rotation([90 * DEG, 0, 0]))
+    if t - let_go < 0.5 and t > 11:
+        return lying + (1 - (t - let_go) / 0.5) * (p_A - lying), flat
+    if taken - t < 0.5:
+        return lying + (1 - (taken - t) / 0.5) * (p_B - lying), q_B
+    return lying, flat
+
+
+def held_pose(scene, motion, box, t):
+    scene.set_joints(motion.at(t))
+    X = scene.pose(scene.own["hand_link"])
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, box["quat"])
+    return X[:3, :3] @ box["pos"] + X[:3, 3], quaternion(X[:3, :3] @ R.reshape(3, 3))
+
+
+def add_cable(scene):
+    """A black cable of 9 mm that hangs along the outside of the forearm, from its elbow end to the back of the hand."""
+    link = next(link for link, *_ in (visual for _, visual in scene.visuals) if "forearm" in link)
+    points = np.concatenate([v for _, (l, v, *_) in scene.visuals if l == link])
+    centre = points.mean(0)
+    along = np.linalg.svd(points - centre, full_matrices=False)[2][0]
+    side = np.linalg.svd(points - centre, full_matrices=False)[2][1]
+    s = (points - centre) @ along
+    radius = np.percentile(np.abs((points - centre) @ side), 90)
+    knots = [centre + along * a + side * radius * b
+             for a, b in zip(np.linspace(s.min(), s.max(), 6), (0.9, 1.25, 1.5, 1.55, 1.35, 1.0))]
+    for a, b in zip(knots, knots[1:]):
+        scene.bodies[link].add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[0.0045, 0, 0], fromto=[*a, *b],
+                                    rgba=[0.05, 0.05, 0.06, 1], contype=0, conaffinity=0)
+
+
+# ---- what cameras do to a picture ------------------------------------------------------------------
+
+class Exposure:
+    """Brings its own camera's mean to 105 levels, a third of the way from picture to picture, with its own white."""
+
+    def __init__(self, camera):
+        self.gain = 1.0
+        self.white = {"left": np.array([1.06, 1.0, 0.92])}.get(camera, np.array([0.92, 1.0, 1.1]))
+
+    def __call__(self, picture):
+        out = picture * self.gain * self.white
+        self.gain *= (105 / max(1.0, np.clip(out, 0, 255).mean())) ** 0.33
+        return out
+
+
+def to_light(picture, condition):
+    """Levels as light, of which what is white may have been far more than white."""
+    light = 255 * (picture / 255) ** condition["gamma_light"]
+    more = np.clip((picture.min(axis=-1, keepdims=True) - 225) / 30, 0, 1) * (condition.get("overexposed", 1) - 1)
+    return light * (1 + more)
+
+
+def to_levels(light, condition):
+    return 255 * np.clip(light / 255, 0, 1) ** (1 / condition["gamma_light"])
+
+
+def with_fringes(picture, share):
+    """Red is larger by this share than green, blue smaller."""
+    height, width = picture.shape[:2]
+    out = picture.copy()
+    for channel, scale in ((0, 1 + share), (2, 1 - share)):
+        M = np.array([[scale, 0, (1 - scale) * (width - 1) / 2], [0, scale, (1 - scale) * (height - 1) / 2]])
+        out[..., channel] = cv2.warpAffine(picture[..., channel], M, (width, height), flags=cv2.INTER_LINEAR,
+                                           borderMode=cv2.BORDER_REPLICATE)
+    return out
+
+
+class WornSensor:
+    """A rim at half the light, a pattern of 4 levels that stands, and one pixel in a thousand that is black or white."""
+
+    def __init__(self, random, size):
+        width, height = size
+        v, u = np.mgrid[0:height, 0:width]
+        r2 = ((u - width / 2) ** 2 + (v - height / 2) ** 2) / (width ** 2 / 4 + height ** 2 / 4)
+        self.rim = (1 - 0.5 * r2)[..., None]
+        self.pattern = random.normal(0, 4, (height, width, 3))
+        dead = random.random((height, width))
+        self.black, self.white = dead < 0.0005, dead > 0.9995
+
+    def __call__(self, picture):
+        out = picture * self.rim + self.pattern
+        out[self.black], out[self.white] = 5, 250
+        return out
 
 
 # ---- a log ---------------------------------------------------------------------------------------
@@ -699,6 +910,9 @@ class Player:
         self.seconds = self.condition["seconds"]
         self.motion = Motion(bare, robot, seed, self.seconds)
         table_z = lowest(bare, self.motion, self.seconds) - 0.025
+        self.table_z, self.bare = table_z, bare
+        if self.condition.get("near_wall"):
+            self.condition["behind"] = furthest(bare, self.motion, self.seconds) - 0.04
         self.scene = Scene.__new__(Scene)
         self.held = add_box(bare, self.motion) if self.condition.get("box") else None
         self.build(robot, table_z)
@@ -709,10 +923,14 @@ class Player:
         self.gains = {"r_elbow": gain, "r_shoulder_roll": 1.0}
         self.lenses = {name: Lens(k, self.scene.wide(k), self.condition.get("k1", 0))
                        for name, k in self.scene.cameras.items()}
+        self.before = {}  # the last picture, by camera
+        self.exposures = {name: Exposure(name) for name in self.scene.cameras}
+        self.worn = {name: WornSensor(self.random, (k["width"], k["height"]))
+                     for name, k in self.scene.cameras.items()} if self.condition.get("worn") else {}
 
     def build(self, robot, table_z):
         """The scene again, with its room and what moves in it."""
-        held, condition = self.held, self.condition
+        held, condition, bare = self.held, self.condition, self.bare
 
         class Furnished(Scene):
             def add_room(self, table_z):
@@ -720,25 +938,39 @@ class Player:
                 if held is not None:
                     picture = posters(self.random, 128)
                     add_texture(self.spec, "held", picture, kind=mujoco.mjtTexture.mjTEXTURE_CUBE)
-                    self.bodies[self.own["hand_link"]].add_geom(material="held", **held)
+                    if condition.get("turns"):
+                        free = {k: v for k, v in held.items() if k not in ("pos", "quat")}
+                        self.spec.worldbody.add_body(name="box", mocap=True).add_geom(material="held", **free)
+                    else:
+                        self.bodies[self.own["hand_link"]].add_geom(material="held", **held)
+                if condition.get("cable"):
+                    add_cable(self)
                 if condition.get("person"):
                     person_parts(self.spec.worldbody.add_body(name="person", mocap=True, pos=[9, 9, 9]))
                 if condition.get("second_arm"):
                     other = self.spec.worldbody.add_body(name="second_arm", mocap=True, pos=[9, 9, 9])
                     person_parts(other, (0.55, 0.55, 0.56))
+                if condition.get("left_arm"):
+                    bare.spec = self.spec
+                    add_left_arm(bare, self.spec.worldbody.add_body(name="left_arm", mocap=True, pos=[9, 9, 9]))
 
         self.scene = Furnished(robot, self.condition, self.seed, table_z)
 
     def encoders(self, t):
-        """@return names and what the encoders say, rad: true + offset, noise of 0.02 deg, steps of 2^-12 turns."""
+        """@return names and what the encoders say, rad: true + offset, noise of 0.02 deg, steps of 2^-12 turns, or so."""
         true = self.motion.at(t)
         names = [n for n, j in self.scene.urdf.joints.items()
                  if j.get("type") in ("revolute", "continuous") and n not in self.scene.urdf.mimics]
-        step = 2 * math.pi / 4096
+        wrong = self.condition.get("fingers_deg", 0) * DEG
+        fingers = np.random.default_rng(self.seed * 6151).uniform(-wrong, wrong, 5)
+        step = self.condition["encoder_step"] * DEG if "encoder_step" in self.condition else 2 * math.pi / 4096
         values = []
         for name in names:
             value = true.get(name, 0.0) * self.gains.get(name, 1.0) + self.offsets.get(name, 0.0) * DEG
-            noisy = value + self.random.normal(0, 0.02 * DEG)
+            finger = re.search("thumb|index|middle|ring|pinky|little", name)
+            if finger and wrong:
+                value += fingers[["thumb", "index", "middle", "ring", "pinky", "little"].index(finger[0]) % 5]
+            noisy = value + self.random.normal(0, self.condition.get("encoder_noise", 0.02) * DEG)
             values.append(value if self.condition.get("exact") else round(noisy / step) * step)
         return names, values
 
@@ -754,12 +986,38 @@ class Player:
         model.light_diffuse[:], model.light_ambient[:] = diffuse * gain, ambient * gain
         model.vis.headlight.ambient[:] = 0.28 * gain
         mujoco.mj_forward(self.scene.model, self.scene.data)
-        picture = self.lenses[camera](self.scene.draw(camera))
-        picture = cv2.GaussianBlur(picture, (0, 0), 0.45)
+        drawn = self.scene.draw(camera)
+        if "gamma_light" in self.condition:
+            drawn = to_light(drawn, self.condition)
+        picture = self.lenses[camera](drawn)
+        picture = cv2.GaussianBlur(picture, (0, 0), self.condition.get("blur", 0.45))
+        if "gamma_light" in self.condition:
+            picture = to_levels(picture, self.condition)
+        picture = self.as_the_camera_has_it(camera, picture)
         # Shot noise and read noise: bright pixels are noisier.
         sd = self.condition.get("noise", 1) * np.sqrt(1.2**2 + 0.03 * picture)
         picture = picture + sd * self.random.normal(0, 1, picture.shape)
-        return np.clip(np.round(picture), 0, 255).astype(np.uint8)
+        picture = np.clip(self.as_the_camera_sends_it(camera, picture), 0, 255)
+        return np.round(picture).astype(np.uint8)
+
+    def as_the_camera_has_it(self, camera, picture):
+        if self.condition.get("auto_exposure"):
+            picture = self.exposures[camera](picture)
+        if camera in self.worn:
+            picture = self.worn[camera](picture)
+        haze = self.condition.get("haze", 0)
+        if haze:  # little contrast, and bright tones close together
+            picture = 255 * (haze + (1 - haze) * np.clip(picture / 255, 0, 1) ** self.condition["gamma"])
+        return with_fringes(picture, self.condition["fringes"]) if "fringes" in self.condition else picture
+
+    def as_the_camera_sends_it(self, camera, picture):
+        sharpened, trails = self.condition.get("sharpened", 0), self.condition.get("trails", 0)
+        if sharpened:
+            picture = picture + sharpened * (picture - cv2.GaussianBlur(picture, (0, 0), 1.2))
+        if trails:
+            picture = picture + trails * (self.before.get(camera, picture) - picture)
+            self.before[camera] = picture
+        return picture
 
     def place(self, t):
         """What moves besides, then the robot itself."""
@@ -767,10 +1025,46 @@ class Player:
         for name, pose in (("person", lambda: person_pose(scene, self.motion, t, self.seed)),
                            ("second_arm", lambda: second_arm_pose(scene, t))):
             if self.condition.get(name):
-                at, q = pose()
-                k = scene.model.body(name).mocapid[0]
-                scene.data.mocap_pos[k], scene.data.mocap_quat[k] = at, q
+                self.put(name, *pose())
+        if self.condition.get("left_arm"):
+            self.put("left_arm", *left_arm_pose(scene, self.motion, t))
+        if self.condition.get("turns"):
+            self.put("box", *box_pose(scene, self.motion, self.held, t, self.table_z))
+        if self.condition.get("screen"):
+            self.show(t)
         scene.set_joints(self.motion.at(t))
+
+    def put(self, name, at, q):
+        k = self.scene.model.body(name).mocapid[0]
+        self.scene.data.mocap_pos[k], self.scene.data.mocap_quat[k] = at, q
+
+    def show(self, t):
+        """A film: another picture every 0.7 s, which slides, and flickers by 10 %."""
+        model = self.scene.model
+        k = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXTURE, "screen")
+        film = np.roll(posters(np.random.default_rng(self.seed * 977 + int(t / 0.7)), 256), int(60 * t), axis=1)
+        film = np.clip(film * self.random.uniform(0.9, 1.1), 0, 1)
+        size = model.tex_height[k] * model.tex_width[k] * 3
+        model.tex_data[model.tex_adr[k]:model.tex_adr[k] + size] = (film * 255).astype(np.uint8).ravel()
+        for renderer in self.scene.renderers.values():
+            if renderer._gl_context:
+                renderer._gl_context.make_current()
+            mujoco.mjr_uploadTexture(model, renderer._mjr_context, k)
+
+    def pictures(self, t):
+        """Of both cameras: at once, or as `interlaced_ms` and `right_late_ms` say, every second row or one camera later."""
+        later = {"right": self.condition.get("right_late_ms", 0) * 1e-3}
+        field = self.condition.get("interlaced_ms", 0) * 1e-3
+        pictures = []
+        for camera in self.scene.cameras:
+            at = t + later.get(camera, 0)
+            self.place(at)
+            picture = self.picture(camera, at)
+            if field:
+                self.place(at + field)
+                picture[1::2] = self.picture(camera, at + field)[1::2]
+            pictures.append(picture)
+        return pictures
 
     def hand_poses(self):
         hand = self.scene.pose(self.scene.own["hand_link"])
@@ -782,7 +1076,8 @@ class Player:
         truth = {"offsets_deg": self.offsets, "postures": self.motion.postures, "frames": []}
         prefix = "ICUB"
         sheet = []
-        steps = ENCODERS_HZ // PICTURES_HZ
+        hz = self.condition["hz"]
+        steps = ENCODERS_HZ // hz
         late = self.condition.get("late_ms", 0) * 1e-3
         for k in range(int(self.seconds * ENCODERS_HZ)):
             t = k / ENCODERS_HZ
@@ -790,13 +1085,13 @@ class Player:
             log.write_event(utime, f"{prefix}_JOINT_STATE", joint_message(*self.encoders(t), utime))
             if k % steps:
                 continue
+            pictures = self.pictures(max(0.0, t - late))
             self.place(max(0.0, t - late))
-            pictures = [self.picture(camera, t) for camera in self.scene.cameras]
             truth["frames"].append({"utime": utime, **{f"hand_in_{n}_camera": X.tolist()
                                                        for n, X in self.hand_poses().items()}})
             log.write_event(utime + 4000, f"{prefix}_CAMERAS", picture_message(pictures, utime,
                                                                               self.condition.get("jpeg", 0)))
-            if k % (steps * max(1, self.seconds * PICTURES_HZ // 12)) == 0:
+            if k % (steps * max(1, self.seconds * hz // 12)) == 0:
                 sheet.append(np.hstack(pictures))
         log.close()
         rows = [np.hstack(sheet[i:i + 3]) for i in range(0, len(sheet) - len(sheet) % 3, 3)]
@@ -924,7 +1219,7 @@ def main():
     one.add_argument("condition", choices=sorted({**CONDITIONS, **FAULTS}))
     one.add_argument("seed", type=int)
     one.add_argument("folder", type=pathlib.Path)
-    one.add_argument("--seconds", type=int, default=30)
+    one.add_argument("--seconds", type=int, help="length of the log; what the condition says")
     outline = commands.add_parser("check")
     outline.add_argument("robot")
     outline.add_argument("folder", type=pathlib.Path)
@@ -945,7 +1240,9 @@ def main():
     arguments = parser.parse_args()
     if arguments.command == "play":
         condition = {**CONDITIONS, **FAULTS}[arguments.condition]
-        player = Player(arguments.robot, {**condition, "seconds": arguments.seconds}, arguments.seed)
+        if arguments.seconds:
+            condition = {**condition, "seconds": arguments.seconds}
+        player = Player(arguments.robot, condition, arguments.seed)
         player.play(arguments.folder / f"{arguments.condition}-{arguments.robot}-{arguments.seed}")
         return 0
     return {"table": table, "diagnose": diagnose, "check": check}[arguments.command](arguments)
