@@ -182,12 +182,13 @@ class Window {
     remember(batch.changes);
     log_.finish();
     fit_.weigh_parts();
-    linearise();
+    linearise(batch.x);
     log_.drop_outlines(kOutlines_bytes);
     return true;
   }
 
-  void linearise() {
+  /// @param x  what the estimator believes
+  void linearise(const Eigen::VectorXd& x) {
     auto measured = fit_.predict(best_ ? *best_ : state_.model(), joints_);
     auto now = std::make_shared<LinearLog>(fit_.predict(state_.model(), all_));
     std::vector<std::size_t> fresh;
@@ -195,7 +196,7 @@ class Window {
       if (!keep_old(old, *now, p)) fresh.push_back(p);
     }
     others_found_ = false;
-    bring_near(measured, fresh);
+    bring_near(measured, fresh, x);
     measured.coordinates = all_;
     OutlineSearch search{.search_px = diagnosis::limits::kSearch_px, .spacing_px = diagnosis_.spacing_px};
     for (const auto& noise : noise_) search.robust_px = std::max(search.robust_px, noise.robust_px());
@@ -212,30 +213,54 @@ class Window {
   /// Predictions of pictures as each of them has the arm's joints, where these lie elsewhere: outlines far off count
   /// little, and what pushes them there, a latency or a gain, would hardly be seen. What they say is kept about the
   /// state all the same.
-  void bring_near(LinearLog& measured, std::vector<std::size_t> far) {
-    constexpr double kSparse = 2.0;  // of the way there half the points tell
+  /// @param x  what the estimator believes
+  void bring_near(LinearLog& measured, std::vector<std::size_t> far, const Eigen::VectorXd& x) {
     for (const double search_px : {diagnosis::limits::kFrom_px, diagnosis::limits::kSearch_px}) {
-      if (far.empty()) break;
-      fit_.measure(
-          measured,
-          {.search_px = search_px, .spacing_px = kSparse * diagnosis_.spacing_px, .robust_px = 0.5 * search_px}, far);
-      std::erase_if(far, [&](std::size_t p) { return !move_joints(measured, p); });
+      if (!far.empty()) fit_.measure(measured, coarse(search_px), far);
+      std::erase_if(far, [&](std::size_t p) { return is_near(measured, p, own_step(measured, p)); });
+      if (search_px == diagnosis::limits::kFrom_px) take_estimate_where_better(measured, far, x);
+      for (const auto p : far) {
+        const Eigen::VectorXd step = own_step(measured, p);
+        for (std::size_t i = 0; i < joints_.size(); ++i) {
+          fit_.coordinates()[joints_[i]].in(measured.corrections[p]) += step[static_cast<Eigen::Index>(i)];
+        }
+      }
     }
   }
 
-  /// One step of a picture's own joints; false: its outlines lie near already.
-  bool move_joints(LinearLog& measured, std::size_t p) const {
+  [[nodiscard]] OutlineSearch coarse(double search_px) const {
+    constexpr double kSparse = 2.0;  // of the way there half the points tell
+    return {.search_px = search_px, .spacing_px = kSparse * diagnosis_.spacing_px, .robust_px = 0.5 * search_px};
+  }
+
+  /// The estimator may have found the arm elsewhere since the last look.
+  void take_estimate_where_better(LinearLog& measured, const std::vector<std::size_t>& far, const Eigen::VectorXd& x) {
+    if (!best_ || far.empty()) return;
+    State believed = state_;
+    believed.set(x);
+    auto there = fit_.predict(believed.model(), joints_);
+    fit_.measure(there, coarse(diagnosis::limits::kFrom_px), far);
+    const auto mean_cost = [](const OutlineEvidence& e) { return e.sampled > 0.0 ? e.cost / e.sampled : 1e300; };
+    for (const auto p : far) {
+      if (mean_cost(there.evidence[p]) >= mean_cost(measured.evidence[p])) continue;
+      measured.corrections[p] = there.corrections[p];
+      measured.evidence[p] = std::move(there.evidence[p]);
+    }
+  }
+
+  /// Where a picture by itself has the arm's joints, from where they are predicted.
+  [[nodiscard]] Eigen::VectorXd own_step(const LinearLog& measured, std::size_t p) const {
     const auto& evidence = measured.evidence[p];
-    if (evidence.weight <= 0.0) return false;
-    const double unit = unit_of(p), variance = noise_[log_.pictures()[p].camera].variance_px2() * unit * unit;
+    const double variance = noise_[log_.pictures()[p].camera].variance_px2() * std::pow(unit_of(p), 2);
     Eigen::MatrixXd precision = evidence.A / variance;
     precision.diagonal().array() += std::pow(diagnosis::limits::kOneFrame_rad, -2);
-    const Eigen::VectorXd step = precision.ldlt().solve(evidence.b / variance);
-    if (step.dot(evidence.A * step) <= std::pow(kNear_px * unit, 2) * evidence.weight) return false;
-    for (std::size_t i = 0; i < joints_.size(); ++i) {
-      fit_.coordinates()[joints_[i]].in(measured.corrections[p]) += step[static_cast<Eigen::Index>(i)];
-    }
-    return true;
+    return precision.ldlt().solve(evidence.b / variance);
+  }
+
+  /// Whether that moves outlines so little that they are measured where they are predicted.
+  [[nodiscard]] bool is_near(const LinearLog& measured, std::size_t p, const Eigen::VectorXd& step) const {
+    const auto& evidence = measured.evidence[p];
+    return evidence.weight > 0.0 && step.dot(evidence.A * step) <= std::pow(kNear_px * unit_of(p), 2) * evidence.weight;
   }
 
   /// What earlier looks measured of a picture, where that is still in the window. Evidence is a quadratic about the

@@ -112,6 +112,15 @@ TEST(LiveDiagnosis, SaysWhatTheEstimatorSawSlip) {
   EXPECT_GT(finding.from, 0);
 }
 
+/// Pictures are measured about what the last look found; where the arm has been found elsewhere since, about that.
+TEST(LiveDiagnosis, FollowsAnArmThatIsFoundElsewhere) {
+  const auto said = listen("slip:joint=r_shoulder_yaw,value=15,at=22", 50.0);
+  ASSERT_TRUE(named(said.news.back(), "slip")) << said.per_frame.back();
+  const auto& finding = said.news.back().causes.front();
+  EXPECT_EQ(finding.joint, "r_shoulder_yaw");
+  EXPECT_NEAR(finding.parameters.at(0).value, 15.0, 0.3);
+}
+
 /// Other joints of the head and the arm's offsets make up for most of it, which makes it no smaller.
 TEST(LiveDiagnosis, SaysWhatTheStateHasTakenUp) {
   const auto said = listen("head_offset:joint=neck_pitch,value=4", 40.0);
