@@ -100,13 +100,13 @@ Scores BlockRegression::score(const AddedColumns& added) const {
   return std::move(score(std::span(&added, 1)).front());
 }
 
-std::vector<Scores> BlockRegression::score(std::span<const AddedColumns> list) const {
+std::vector<Scores> BlockRegression::score(std::span<const AddedColumns> list, bool evenly) const {
   std::vector<const AddedColumns*> pointers;
   for (const auto& added : list) pointers.push_back(&added);
-  return score(std::span<const AddedColumns* const>(pointers));
+  return score(std::span<const AddedColumns* const>(pointers), evenly);
 }
 
-std::vector<Scores> BlockRegression::score(std::span<const AddedColumns* const> list) const {
+std::vector<Scores> BlockRegression::score(std::span<const AddedColumns* const> list, bool evenly) const {
   Eigen::Index columns = 0;
   for (const auto* added : list) columns += added->size();
   Eigen::MatrixXd B = Eigen::MatrixXd::Zero(size(), columns);
@@ -125,14 +125,15 @@ std::vector<Scores> BlockRegression::score(std::span<const AddedColumns* const> 
   std::vector<Scores> result;
   first = 0;
   for (const auto* added : list) {
-    result.push_back(score(*added, Y.middleCols(first, added->size()), quadratic.middleRows(first, added->size())));
+    result.push_back(
+        score(*added, Y.middleCols(first, added->size()), quadratic.middleRows(first, added->size()), evenly));
     first += added->size();
   }
   return result;
 }
 
-Scores BlockRegression::score(const AddedColumns& added, const Eigen::MatrixXd& Y,
-                              const Eigen::MatrixXd& quadratic) const {
+Scores BlockRegression::score(const AddedColumns& added, const Eigen::MatrixXd& Y, const Eigen::MatrixXd& quadratic,
+                              bool evenly) const {
   const auto k = added.size();
   const auto n = static_cast<Eigen::Index>(blocks_.size());
   Eigen::MatrixXd B = Eigen::MatrixXd::Zero(size(), k), C = Eigen::MatrixXd::Zero(k, k);
@@ -169,7 +170,7 @@ Scores BlockRegression::score(const AddedColumns& added, const Eigen::MatrixXd& 
     s.sd[i] = std::sqrt(std::max(scatter, whole) + s.beliefs.row(i).squaredNorm());
     s.even_t[i] = s.total[i] / std::max(1e-300, s.sd[i]);
     s.even_dof[i] = s.dof[i];
-    if (std::abs(s.even_t[i]) < kStandsOut) continue;
+    if (!evenly || std::abs(s.even_t[i]) < kStandsOut) continue;
     Weighed even{s.u.row(i), share.row(i).cwiseMax(0.0)};
     for (int round = 0; round < kRounds; ++round) even = weigh(added, i, even_weights(even.u, even.share));
     s.even_t[i] = even.t;

@@ -75,8 +75,9 @@ class BlockRegression {
   [[nodiscard]] const Eigen::VectorXd& step() const { return step_; }
   [[nodiscard]] Scores score(const AddedColumns& added) const;
   /// Of several, each beside the base alone.
-  [[nodiscard]] std::vector<Scores> score(std::span<const AddedColumns> list) const;
-  [[nodiscard]] std::vector<Scores> score(std::span<const AddedColumns* const> list) const;
+  /// @param evenly  false: `even_t` and `even_dof` stay as t() and `dof`, which is much quicker
+  [[nodiscard]] std::vector<Scores> score(std::span<const AddedColumns> list, bool evenly = true) const;
+  [[nodiscard]] std::vector<Scores> score(std::span<const AddedColumns* const> list, bool evenly = true) const;
   [[nodiscard]] Heldout heldout(const AddedColumns& added = {}) const;
   /// Covariance of the base's parameters from how blocks differ, never below that of white noise.
   [[nodiscard]] Eigen::MatrixXd covariance() const;
@@ -91,8 +92,8 @@ class BlockRegression {
   };
   /// Found when first asked for, and kept: added columns are eliminated against them.
   [[nodiscard]] const std::vector<Rest>& rests() const;
-  [[nodiscard]] Scores score(const AddedColumns& added, const Eigen::MatrixXd& Y,
-                             const Eigen::MatrixXd& quadratic) const;
+  [[nodiscard]] Scores score(const AddedColumns& added, const Eigen::MatrixXd& Y, const Eigen::MatrixXd& quadratic,
+                             bool evenly) const;
   /// One added column beside the base, fitted with weights of the blocks.
   struct Weighed {
     Eigen::RowVectorXd u, share;  ///< per block as in Scores, before they are weighed

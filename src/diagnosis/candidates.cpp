@@ -368,7 +368,7 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
       tails.push_back(tail);
       times.push_back(log.at.instants[p].utime);
     }
-    auto scores = base.score(tails);
+    auto scores = base.score(tails, false);
     // When it was is where it explains most (maximum likelihood): how far it stands out hardly says.
     std::optional<std::size_t> best;
     double most = -1.0;
@@ -380,8 +380,8 @@ Slips slips(const LogAbout& log, const BlockRegression& base, const std::vector<
     }
     if (best) {
       result.best.push_back(Candidate{.cause = cause, .variable = {}, .parameters = {0}, .from = times[*best]});
+      result.best.back().scores = base.score(tails[*best]);
       result.best.back().columns = std::move(tails[*best]);
-      result.best.back().scores = scores[*best];
     }
     std::move(scores.begin(), scores.end(), std::back_inserter(result.all));
   }
