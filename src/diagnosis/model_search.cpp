@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <spdlog/spdlog.h>
 #include <utility>
 
@@ -356,16 +357,24 @@ void ModelSearch::group_blocks(LogAbout& log) const {
 }
 
 void ModelSearch::count_postures_once(LogAbout& log) const {
+  struct Block {
+    Microseconds first = 0, last = 0;
+    std::map<std::size_t, double> pictures;  ///< by camera
+  };
   const auto& pictures = fit_.log().pictures();
-  std::vector<Microseconds> first(log.blocks, 0), last(log.blocks, 0);
+  std::vector<Block> blocks(log.blocks);
   for (std::size_t p = 0; p < pictures.size(); ++p) {
-    const auto b = log.block_of[p];
-    if (first[b] == 0) first[b] = pictures[p].joints.utime;
-    last[b] = pictures[p].joints.utime;
+    auto& block = blocks[log.block_of[p]];
+    if (block.first == 0) block.first = pictures[p].joints.utime;
+    block.last = pictures[p].joints.utime;
+    ++block.pictures[pictures[p].camera];
   }
   for (std::size_t p = 0; p < pictures.size(); ++p) {
-    const double span_s = seconds(last[log.block_of[p]] - first[log.block_of[p]]);
-    if (span_s > log.block_s) log.precision[p] *= log.block_s / span_s;
+    const auto& block = blocks[log.block_of[p]];
+    const double span_s = seconds(block.last - block.first);
+    if (span_s > log.block_s) {
+      log.precision[p] *= std::max(log.block_s / span_s, 1.0 / block.pictures.at(pictures[p].camera));
+    }
   }
 }
 

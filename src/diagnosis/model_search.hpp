@@ -97,7 +97,7 @@ class ModelSearch {
   void add_considered(LogAbout& log) const;
   void group_blocks(LogAbout& log) const;
   /// Pictures of an arm that stands err alike, however many there are: together they count as those of one shortest
-  /// block do.
+  /// block do, and as one picture at least.
   void count_postures_once(LogAbout& log) const;
   /// About the present model, all pictures; not anew while that stays what it is.
   std::shared_ptr<const LinearLog> linearised(std::span<const std::uint32_t> coordinates);

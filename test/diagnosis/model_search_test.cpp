@@ -10,11 +10,11 @@
 namespace bodyschema::diagnosis {
 namespace {
 
-/// An arm that stands shows the same posture in all its pictures, which err alike: they weigh as much as those of one
-/// block of the shortest length, however long it stands.
-TEST(ModelSearch, PicturesOfOnePostureCountAsOneBlock) {
+/// How much less pictures of one posture weigh than if each were a witness of its own.
+double weight_of_one_posture(double rate_hz, double& span_s, double& pictures_per_camera) {
   test::Simulated what;
   what.seconds = 10.0;
+  what.rate_hz = rate_hz;
   test::SimulatedLog log(what);
   DiagnosisOptions options;
   options.block_s = 0.5;
@@ -27,9 +27,21 @@ TEST(ModelSearch, PicturesOfOnePostureCountAsOneBlock) {
     return std::accumulate(about.precision.begin(), about.precision.end(), 0.0);
   };
   const auto pictures = log.pictures().pictures();
-  const double span_s = seconds(pictures.back().joints.utime - pictures.front().joints.utime);
+  span_s = seconds(pictures.back().joints.utime - pictures.front().joints.utime);
+  pictures_per_camera = 0.5 * static_cast<double>(pictures.size());
+  return sum(1.0) / sum(20.0);
+}
+
+/// An arm that stands shows the same posture in all its pictures, which err alike: they weigh as much as those of one
+/// block of the shortest length, however long it stands. Photographs that are further apart weigh as one.
+TEST(ModelSearch, PicturesOfOnePostureCountAsOneBlock) {
+  double span_s = 0.0, pictures = 0.0;
+  const double many = weight_of_one_posture(5.0, span_s, pictures);
   ASSERT_GT(span_s, 9.0);
-  EXPECT_NEAR(sum(1.0) * span_s, sum(20.0), 1e-6 * sum(20.0));
+  EXPECT_NEAR(many, 1.0 / span_s, 1e-6);
+  const double few = weight_of_one_posture(0.5, span_s, pictures);
+  ASSERT_LT(pictures, span_s);
+  EXPECT_NEAR(few, 1.0 / pictures, 1e-6);
 }
 
 /// What moves is told as before.
