@@ -292,7 +292,9 @@ void register_all() {
   for (const Size size : {Size{320, 240}, Size{1280, 720}}) add_played(kOurs, size, 200);
   const char* data = std::getenv("BODYSCHEMA_DATA");
   if (data == nullptr || !std::filesystem::exists(std::filesystem::path(data) / "real/robots/g1")) return;
-  for (const Size size : {Size{320, 240}, Size{640, 480}, Size{1280, 720}}) add(kG1, "contour", "best", size, 200);
+  for (const std::string engine : {"contour", "atlas"}) {
+    for (const Size size : {Size{320, 240}, Size{640, 480}, Size{1280, 720}}) add(kG1, engine, "best", size, 200);
+  }
   for (const Size size : {Size{320, 240}, Size{1280, 720}}) add_played(kG1, size, 200);
 }
 

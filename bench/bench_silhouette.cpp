@@ -74,6 +74,7 @@ std::unique_ptr<SilhouetteScorer> make(const std::string& engine, const Silhouet
   auto context = gl::Context::create(gl_platform());
   if (engine == "naive") return make_naive_scorer(model, cameras, std::move(context));
   AtlasOptions options;
+  options.threads = 0;
   if (engine == "atlas_raster") options.pass = AtlasPass::kRaster;
   return make_atlas_scorer(model, cameras, std::move(context), options);
 }

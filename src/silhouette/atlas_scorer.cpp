@@ -11,16 +11,35 @@
 #include "contour_model.hpp"
 #include "near_plane.hpp"
 #include "observation_masks.hpp"
+#include "worker_pool.hpp"
 
 namespace bodyschema {
 namespace {
 
 using contour::View;
 
-// Invocations of a workgroup of the compute pass: one vector of llvmpipe's, four warps of a GPU's.
-constexpr int kLocalSoftware = 8;
-constexpr int kLocalGpu = 128;
-constexpr int kSharedWords = 7168;  // 28 KiB of the 32 KiB every driver gives
+// How the compute pass divides its work.
+struct Division {
+  int local;          ///< invocations of a workgroup
+  int shared_bytes;   ///< that it takes
+  int queue;          ///< contour edges that may wait; 0: each is drawn by whoever finds it
+  int tests_between;  ///< two emptyings of the queue, an invocation
+  /// Words of the deltas: what the queue, a sum an invocation and three counters leave.
+  [[nodiscard]] int delta_words() const { return shared_bytes / 4 - queue - local - 4; }
+};
+// The most invocations that every OpenGL 4.3 gives: what bounds a GPU is how fast it reads edges, all of them for each
+// workgroup, and two such fill a multiprocessor.
+constexpr Division kOnGpu{1024, 48 << 10, 1024, 4};
+constexpr int kLeastSharedBytes = 32 << 10;  // what every OpenGL 4.3 gives
+
+// One vector of llvmpipe's, and more for more edges: llvmpipe leaves a loop after 65,535 rounds, those of inner loops
+// counted, whatever has been done by then. A quarter of them for the edges leaves three columns a contour edge.
+Division on_software(std::size_t edges) {
+  constexpr std::size_t kVector = 8, kRounds = 65535 / 4;
+  const std::size_t vectors = std::clamp<std::size_t>((edges / kRounds + kVector - 1) / kVector, 1, 128);
+  return {static_cast<int>(vectors * kVector), kLeastSharedBytes, 0, 0};
+}
+
 constexpr int kMaxCameras = 32;
 
 // A GL buffer that grows and never shrinks.
@@ -121,12 +140,12 @@ class AtlasScorer final : public SilhouetteScorer {
  public:
   AtlasScorer(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras,
               std::unique_ptr<gl::Context> context, const AtlasOptions& options)
-      : model_(model), masks_(cameras), options_(options), context_(std::move(context)) {
+      : model_(model), masks_(cameras), options_(options), context_(std::move(context)), pool_(options.threads) {
     for (const auto& intrinsics : cameras) cameras_.emplace_back(intrinsics);
     const gl::Context::Current current(*context_);
     if (!current.ok()) throw gl::ContextError("cannot make " + context_->description() + " current");
-    gl_ = std::make_unique<Objects>(context_->functions(), context_->is_software());
     read_limits();
+    gl_ = std::make_unique<Objects>(context_->functions(), division_);
     upload_model(model);
     upload_masks();
     max_tiles_ = std::clamp<std::size_t>(max_texels_ / (4 * model_.parts().size()), 1,
@@ -146,8 +165,7 @@ class AtlasScorer final : public SilhouetteScorer {
 
   void score(std::span<const Eigen::Isometry3f> X_CB, std::span<SilhouetteCounts> counts,
              std::uint32_t camera_mask) override {
-    const std::size_t parts = model_.parts().size();
-    assert(counts.size() % cameras_.size() == 0 && X_CB.size() == counts.size() * parts);
+    assert(counts.size() % cameras_.size() == 0 && X_CB.size() == counts.size() * model_.parts().size());
     const gl::Context::Current current(*context_);
     if (!current.ok()) lost();
     if (masks_changed_) upload_masks();
@@ -158,13 +176,10 @@ class AtlasScorer final : public SilhouetteScorer {
     }
     for (std::size_t next = 0; next < counts.size();) {
       tiles_.clear();
-      placements_.clear();
-      while (next < counts.size() && tiles_.size() < max_tiles_) {
-        if (((camera_mask >> (next % cameras_.size())) & 1u) != 0) {
-          add_tile(next, X_CB.subspan(next * parts, parts));
-        }
-        ++next;
+      for (; next < counts.size() && tiles_.size() < max_tiles_; ++next) {
+        if (((camera_mask >> (next % cameras_.size())) & 1u) != 0) tiles_.push_back({next, {}, false});
       }
+      place_tiles(X_CB);
       draw_tiles(false);
       for (std::size_t t = 0; t < tiles_.size(); ++t) {
         counts[tiles_[t].image].intersection = tile_counts_[t].intersection;
@@ -180,10 +195,7 @@ class AtlasScorer final : public SilhouetteScorer {
     const gl::Context::Current current(*context_);
     if (!current.ok()) lost();
     if (masks_changed_) upload_masks();
-    tiles_.clear();
-    placements_.clear();
-    add_tile(camera, X_CB);
-    if (tiles_.empty()) return mask;
+    place_one(X_CB, camera);
     std::vector<std::uint32_t> words(static_cast<std::size_t>(2 * mask.words_per_row() * k.height));
     gl_->rendered.write<std::uint32_t>(words);
     draw_tiles(true);
@@ -209,14 +221,14 @@ class AtlasScorer final : public SilhouetteScorer {
 
  private:
   struct Objects {
-    Objects(const gl::Functions& functions, bool software)
+    Objects(const gl::Functions& functions, const Division& division)
         : gl(functions), placements(gl), windows(gl), jobs(gl), masks(gl), counts(gl), rendered(gl), planes(gl),
           ends(gl), edge_ends(gl), vertices(gl), indices(gl), masks_texture(gl, GL_RG32UI),
           placements_texture(gl, GL_RGBA32F), planes_texture(gl, GL_RGBA32F), ends_texture(gl, GL_RGBA32F),
           raster(gl, "atlas raster",
                  {{GL_VERTEX_SHADER, atlas::kRasterVertex}, {GL_FRAGMENT_SHADER, atlas::kRasterFragment}}),
           reduce(gl, "atlas reduce", {{GL_COMPUTE_SHADER, atlas::kReduce}}),
-          contour(gl, "atlas contour", {{GL_COMPUTE_SHADER, contour_source(software)}}) {
+          contour(gl, "atlas contour", {{GL_COMPUTE_SHADER, contour_source(division)}}) {
       gl.GenVertexArrays(1, &vertex_array);
       gl.GenFramebuffers(1, &framebuffer);
     }
@@ -228,9 +240,12 @@ class AtlasScorer final : public SilhouetteScorer {
     Objects(const Objects&) = delete;
     Objects& operator=(const Objects&) = delete;
 
-    static std::string contour_source(bool software) {
-      return "#version 430 core\n#define kLocal " + std::to_string(software ? kLocalSoftware : kLocalGpu) +
-             "\n#define kSharedWords " + std::to_string(kSharedWords) + "\n" + atlas::kContour;
+    static std::string contour_source(const Division& division) {
+      const auto define = [](const char* name, int value) {
+        return std::string("#define ") + name + " " + std::to_string(value) + "\n";
+      };
+      return "#version 430 core\n" + define("kLocal", division.local) + define("kDeltaWords", division.delta_words()) +
+             define("kQueue", division.queue) + define("kTestsBetween", division.tests_between) + atlas::kContour;
     }
 
     const gl::Functions& gl;
@@ -246,16 +261,20 @@ class AtlasScorer final : public SilhouetteScorer {
   };
 
   void read_limits() {
-    const auto& gl = gl_->gl;
+    const auto& gl = context_->functions();
     GLint texture = 0, viewport[2] = {0, 0}, distances = 0, shared = 0;
     gl.GetIntegerv(GL_MAX_TEXTURE_SIZE, &texture);
     gl.GetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport);
     gl.GetIntegerv(GL_MAX_CLIP_DISTANCES, &distances);
     gl.GetIntegerv(GL_MAX_COMPUTE_SHARED_MEMORY_SIZE, &shared);
     if (distances < 4) throw gl::ContextError("the driver has fewer than 4 clip distances");
-    if (shared < 4 * kSharedWords + 16) {
+    if (shared < kLeastSharedBytes) {
       throw gl::ContextError("the driver gives compute shaders less than 32 KiB of shared memory");
     }
+    std::size_t edges = 0;
+    for (const auto& part : model_.parts()) edges += part.ends.size();
+    division_ = context_->is_software() && !options_.as_on_gpu ? on_software(edges) : kOnGpu;
+    division_.shared_bytes = std::min(division_.shared_bytes, static_cast<int>(shared));
     max_side_ = std::min({options_.max_side_px, texture, viewport[0], viewport[1]});
     for (const auto& camera : cameras_) {
       const int needed = std::max((camera.intrinsics.width + 31) / 32 * 32, camera.intrinsics.height);
@@ -299,7 +318,7 @@ class AtlasScorer final : public SilhouetteScorer {
           planes.push_back({{b.right_nx[k], b.right_ny[k], b.right_nz[k], b.right_d[k]}});
           const contour::EdgeEnds& edge = run.ends[e];
           ends.push_back({{edge.from[0], edge.from[1], edge.from[2], kind}});
-          ends.push_back({{edge.to[0], edge.to[1], edge.to[2], 0.0f}});
+          ends.push_back({{edge.to[0], edge.to[1], edge.to[2], static_cast<float>(p)}});
         }
       }
       edge_ends.push_back(static_cast<std::int32_t>(planes.size() / 2));
@@ -355,29 +374,48 @@ class AtlasScorer final : public SilhouetteScorer {
     masks_changed_ = false;
   }
 
-  // Places the parts of one picture; nothing is added where nothing can be seen.
-  void add_tile(std::size_t image, std::span<const Eigen::Isometry3f> X_CB) {
-    const contour::Camera& camera = cameras_[image % cameras_.size()];
+  // Places the parts of every tile's picture, with all threads: on a GPU that takes as long as drawing them.
+  void place_tiles(std::span<const Eigen::Isometry3f> X_CB) {
+    const std::size_t parts = model_.parts().size();
+    placements_.resize(tiles_.size() * parts);
+    auto body = [&](int, std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t < end; ++t) {
+        place(X_CB.subspan(tiles_[t].image * parts, parts), tiles_[t],
+              std::span(placements_).subspan(t * parts, parts));
+      }
+    };
+    constexpr std::size_t kGrain = 16;
+    pool_.run(tiles_.size(), kGrain, body);
+  }
+
+  // One picture of one camera as the only tile.
+  void place_one(std::span<const Eigen::Isometry3f> X_CB, std::size_t camera) {
+    tiles_.assign(1, Tile{camera, {}, false});
+    placements_.resize(model_.parts().size());
+    place(X_CB, tiles_[0], placements_);
+  }
+
+  // Places the parts of one picture. The crop stays empty where nothing can be seen.
+  void place(std::span<const Eigen::Isometry3f> X_CB, Tile& tile, std::span<Placement> placements) const {
+    const contour::Camera& camera = cameras_[tile.image % cameras_.size()];
     const auto& k = camera.intrinsics;
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     float u_min = kInfinity, v_min = kInfinity, u_max = -kInfinity, v_max = -kInfinity;
-    Tile tile{image, {}, options_.pass == AtlasPass::kRaster};
-    const std::size_t first = placements_.size();
+    tile.raster = options_.pass == AtlasPass::kRaster;
     bool seen = false;
     for (std::size_t p = 0; p < model_.parts().size(); ++p) {
       const contour::Part& part = model_.parts()[p];
       const contour::PlacedPart placed = contour::place(part, camera, X_CB[p]);
-      Placement placement{};
+      Placement& placement = placements[p];
+      placement = {};
       if (placed.view == View::kInvisible) {
         placement.P[11] = -1.0f;  // behind the camera, wherever the vertex is
-        placements_.push_back(placement);
         continue;
       }
       seen = true;
       std::copy_n(placed.P, 12, placement.P);
       std::copy_n(placed.camera_B, 3, placement.camera);
       placement.in_front = placed.view == View::kInFront ? 1.0f : 0.0f;
-      placements_.push_back(placement);
       if (placed.view == View::kCut) {
         tile.raster = true;
         u_min = v_min = -1.0f;
@@ -411,16 +449,12 @@ class AtlasScorer final : public SilhouetteScorer {
     const auto pixel = [](float x, int size) {
       return static_cast<int>(std::clamp(x, 0.0f, static_cast<float>(size)));
     };
+    if (!seen) return;
     Crop& crop = tile.crop;
     crop.u_begin = pixel(std::floor(u_min) - 1.0f, k.width) / 32 * 32;
     crop.v_begin = pixel(std::floor(v_min) - 1.0f, k.height);
     crop.u_end = (pixel(std::ceil(u_max) + 2.0f, k.width) + 31) / 32 * 32;
     crop.v_end = pixel(std::ceil(v_max) + 2.0f, k.height);
-    if (!seen || crop.empty()) {
-      placements_.resize(first);
-      return;
-    }
-    tiles_.push_back(tile);
   }
 
   // Scores tiles_ into tile_counts_.
@@ -441,12 +475,13 @@ class AtlasScorer final : public SilhouetteScorer {
     jobs_.clear();
     for (std::size_t t = 0; t < tiles_.size(); ++t) {
       const Tile& tile = tiles_[t];
+      if (tile.crop.empty()) continue;
       if (tile.raster) {
         raster_tiles_.push_back(t);
         continue;
       }
       const auto camera = static_cast<std::int32_t>(tile.image % cameras_.size());
-      const int strip = std::max(4, kSharedWords / (tile.crop.height() + 1) * 4);
+      const int strip = std::max(4, division_.delta_words() / (tile.crop.height() + 1) * 4);
       const int strips = (tile.crop.width() + strip - 1) / strip;
       const int columns = ((tile.crop.width() + strips - 1) / strips + 3) / 4 * 4;
       for (int u = tile.crop.u_begin; u < tile.crop.u_end; u += columns) {
@@ -604,9 +639,7 @@ class AtlasScorer final : public SilhouetteScorer {
                                         Eigen::Isometry3f(Eigen::Translation3f(0.0f, 0.0f, 1.0f)));
     for (const auto warmed : {AtlasPass::kRaster, pass}) {
       options_.pass = warmed;
-      tiles_.clear();
-      placements_.clear();
-      add_tile(0, X_CB);
+      place_one(X_CB, 0);
       draw_tiles(false);
     }
     options_.pass = pass;
@@ -628,6 +661,8 @@ class AtlasScorer final : public SilhouetteScorer {
   AtlasOptions options_;
   std::unique_ptr<gl::Context> context_;
   std::unique_ptr<Objects> gl_;
+  WorkerPool pool_;
+  Division division_{};
   int max_side_ = 0;
   std::size_t max_texels_ = 0;  // of a buffer texture
   std::size_t max_tiles_ = 0;   // in flight at once

@@ -22,6 +22,8 @@ struct AtlasOptions {
   AtlasPass pass = AtlasPass::kCompute;
   int max_side_px = 8192;  ///< of the framebuffer; less where the driver's limits are lower
   int max_tiles = 4096;    ///< in flight at once; more particles take several passes
+  int threads = 1;         ///< that place parts before cameras; 0: one a core
+  bool as_on_gpu = false;  ///< the compute pass divided as on a GPU where OpenGL draws in software: slow, for tests
 };
 
 /// The GL engine: every particle and camera has a tile of one atlas, cropped to where the model can

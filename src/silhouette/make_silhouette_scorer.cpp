@@ -16,6 +16,7 @@ std::unique_ptr<SilhouetteScorer> make_silhouette_scorer(const SilhouetteModel& 
   };
   const auto atlas = [&](std::unique_ptr<gl::Context> context) {
     AtlasOptions atlas_options;
+    atlas_options.threads = options.threads;
     if (options.gl_pass == "raster") atlas_options.pass = AtlasPass::kRaster;
     return with_contour_to_fall_back_on(make_atlas_scorer(model, cameras, std::move(context), atlas_options), model,
                                         cameras, options.threads);

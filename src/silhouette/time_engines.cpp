@@ -34,14 +34,30 @@ std::vector<Eigen::Isometry3f> poses_before(std::span<const PinholeIntrinsics> c
   return X_CB;
 }
 
+// Engines round outlines differently, by far less than this.
+constexpr double kOtherwiseShare = 0.01, kOtherwise_px = 8.0;
+
 }  // namespace
+
+std::string disagreement(std::span<const SilhouetteCounts> counts, std::span<const SilhouetteCounts> expected) {
+  const auto apart = [](std::uint32_t a, std::uint32_t b) {
+    return std::abs(static_cast<double>(a) - b) > std::max(kOtherwise_px, kOtherwiseShare * std::max(a, b));
+  };
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const auto &a = counts[i], &b = expected[i];
+    wrong += apart(a.predicted, b.predicted) || apart(a.intersection, b.intersection) ? 1 : 0;
+  }
+  if (wrong == 0) return "";
+  return "counts " + std::to_string(wrong) + " of " + std::to_string(expected.size()) + " silhouettes wrongly";
+}
 
 std::vector<EngineTiming> time_engines(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras,
                                        const SilhouetteOptions& options, std::size_t silhouettes, double seconds) {
   using Clock = std::chrono::steady_clock;
   silhouettes = std::max<std::size_t>(1, silhouettes / cameras.size()) * cameras.size();
   const auto X_CB = poses_before(cameras, model, silhouettes);
-  std::vector<SilhouetteCounts> counts(silhouettes);
+  std::vector<SilhouetteCounts> counts(silhouettes), expected;
   std::vector<EngineTiming> timings{
       {"contour", "", 0.0, "", ""}, {"atlas", "raster", 0.0, "", ""}, {"atlas", "compute", 0.0, "", ""}};
   for (auto& timing : timings) {
@@ -66,6 +82,8 @@ std::vector<EngineTiming> time_engines(const SilhouetteModel& model, std::span<c
         if (since(begin) > seconds / static_cast<double>(timings.size())) break;
       }
       timing.description = scorer->description();
+      if (expected.empty()) expected = counts;  // contour, the first, needs no driver
+      timing.error = disagreement(counts, expected);
     } catch (const std::runtime_error& error) {  // no GL, or too little of it
       if (timing.engine == "contour") throw;
       timing.error = error.what();

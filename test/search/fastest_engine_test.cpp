@@ -98,6 +98,24 @@ TEST_F(FastestEngine, WithoutAGpuNothingIsMeasuredAndContourIsTaken) {
   EXPECT_FALSE(fs::exists(cache_ / "bodyschema")) << "there was nothing to keep";
 }
 
+TEST_F(FastestEngine, AnEngineThatCountsOtherPixelsIsNotTimed) {
+  const std::vector<SilhouetteCounts> expected{{500, 1000, 800}, {0, 0, 800}, {20, 40, 800}};
+  EXPECT_EQ(disagreement(expected, expected), "");
+  auto rounded = expected;
+  rounded[0].predicted = 1009;
+  rounded[2].intersection = 25;
+  EXPECT_EQ(disagreement(rounded, expected), "");
+  auto wrong = expected;
+  wrong[0] = {0, 0, 800};
+  wrong[2].intersection = 40;
+  EXPECT_EQ(disagreement(wrong, expected), "counts 2 of 3 silhouettes wrongly");
+  std::string reason;
+  auto timings = figures(5.0, 3.0, 1.0);
+  timings[2].error = disagreement(wrong, expected);
+  EXPECT_EQ(fastest_of(timings, {}, reason).gl_pass, "raster");
+  EXPECT_THAT(reason, HasSubstr("atlas compute counts 2 of 3 silhouettes wrongly"));
+}
+
 TEST_F(FastestEngine, ATableHasAllThree) {
   const SilhouetteModel hand = synthetic::hand(2000);
   const std::vector<PinholeIntrinsics> cameras{synthetic::camera(64, 48), synthetic::camera(64, 48)};

@@ -160,6 +160,15 @@ TEST_P(Engine, OddSizesAndDifferentCameras) {
   expect_scores(*scorer, model, cameras, observe(model, cameras, 5), synthetic::stereo_particles(10, 2, 6));
 }
 
+// llvmpipe leaves a loop after 65,535 rounds: a workgroup of eight invocations saw nothing of so many edges.
+TEST_P(Engine, MeshesOfManyTriangles) {
+  const auto model = synthetic::hand(300000);
+  const std::vector cameras{synthetic::camera(160, 120)};
+  const auto observed = observe(model, cameras, 31);
+  const auto scorer = make(model, cameras);
+  expect_scores(*scorer, model, cameras, observed, synthetic::stereo_particles(1, 1, 32));
+}
+
 TEST_P(Engine, TinyPicture) {
   const auto model = synthetic::hand(500);
   const std::vector cameras{synthetic::camera(1, 1), synthetic::camera(65, 3)};
@@ -478,7 +487,12 @@ INSTANTIATE_TEST_SUITE_P(
         atlas_engine("atlas_raster_osmesa", "osmesa", AtlasPass::kRaster),
         // Room for a single tile or two, and few tiles at once: many passes.
         EngineChoice{"atlas_raster_many_passes", {"atlas", "egl_surfaceless", 0}, "", {AtlasPass::kRaster, 384, 33}},
-        EngineChoice{"atlas_compute_many_passes", {"atlas", "egl_surfaceless", 0}, "", {AtlasPass::kCompute, 384, 33}}),
+        EngineChoice{"atlas_compute_many_passes", {"atlas", "egl_surfaceless", 0}, "", {AtlasPass::kCompute, 384, 33}},
+        // What a GPU runs, on llvmpipe.
+        EngineChoice{"atlas_compute_as_on_gpu",
+                     {"atlas", "egl_surfaceless", 0},
+                     "",
+                     {AtlasPass::kCompute, 8192, 4096, 2, true}}),
     [](const auto& param_info) { return param_info.param.name; });
 
 TEST(Contour, ResultsDoNotDependOnThreads) {

@@ -96,10 +96,14 @@ struct EngineTiming {
 };
 
 /// Measures engine contour and both passes of atlas on this machine with this model: parts are turned at random, where
-/// the largest fills a third of the picture. None is given more than its share of `seconds`, but for what one scoring
-/// of all silhouettes takes. Throws as make_silhouette_scorer for an unusable model.
+/// the largest fills a third of the picture. A pass whose counts are not those of contour (a driver's fault) has an
+/// error instead of a time. None is given more than its share of `seconds`, but for what one scoring of all silhouettes
+/// takes. Throws as make_silhouette_scorer for an unusable model.
 /// @param silhouettes  to be scored at once
 std::vector<EngineTiming> time_engines(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras,
                                        const SilhouetteOptions& options, std::size_t silhouettes, double seconds);
+
+/// Empty where `counts` are those `expected` but for rounding along outlines; otherwise what is wrong, for people.
+std::string disagreement(std::span<const SilhouetteCounts> counts, std::span<const SilhouetteCounts> expected);
 
 }  // namespace bodyschema
