@@ -10,7 +10,7 @@
 
 #include "agreed_motion.hpp"
 #include "bodyschema/evidence/distributions.hpp"
-#include "encoder_noise.hpp"
+#include "bodyschema/evidence/encoder_noise.hpp"
 #include "left_over.hpp"
 #include "limits.hpp"
 #include "surplus.hpp"
@@ -227,13 +227,12 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
 }
 
 Eigen::VectorXd Findings::encoder_variance() const {
-  constexpr double kInterpolated = 2.0 / 3.0;  // between two readings, in the mean over where a picture falls
   const Eigen::VectorXd sd = encoder_noise(fit_.log().encoders());
   const auto& coordinates = fit_.coordinates();
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(coordinates.size());
   for (Eigen::Index joint = 0; joint < sd.size(); ++joint) {
     if (const auto at = coordinates.find({Coordinate::Kind::kJoint, joint}); at >= 0)
-      variance[at] = kInterpolated * sd[joint] * sd[joint];
+      variance[at] = kInterpolatedVariance * sd[joint] * sd[joint];
   }
   return variance;
 }
@@ -256,11 +255,20 @@ void Findings::name_causes(const LogAbout& log, const std::vector<Candidate>& ca
   name_estimated(log, all, candidates);
 }
 
+/// Under which kind an effect of the state is asked for: what all its targets do alike, where that is in the state too.
+const std::string& Findings::kind_asked(const std::string& effect) const {
+  const auto& of_all = effect_kind(effect).each_of;
+  const auto& parameters = search_.state().parameters();
+  const bool both = std::any_of(parameters.begin(), parameters.end(),
+                                [&](const auto& p) { return search_.state().model()[p.ref.effect].name() == of_all; });
+  return both ? of_all : effect_kind(effect).name;
+}
+
 void Findings::name_estimated(const LogAbout& log, const BlockRegression& all,
                               const std::vector<Candidate>& candidates) {
   std::vector<std::string> kinds;
   for (const auto& p : search_.state().parameters()) {
-    const auto& kind = search_.state().model()[p.ref.effect].name();
+    const auto& kind = kind_asked(search_.state().model()[p.ref.effect].name());
     const bool found = std::any_of(search_.causes().begin(), search_.causes().end(),
                                    [&](const FoundCause& cause) { return cause.name.name == kind; });
     if (kind == "joint_offset" || found || std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) continue;
@@ -344,14 +352,15 @@ Bounds Findings::room_of(const BlockRegression& all, const std::vector<Eigen::In
 void Findings::add_estimated(const LogAbout& log, const BlockRegression& all, const std::string& kind,
                              const std::vector<Candidate>& candidates) {
   const auto& state = search_.state();
-  std::vector<EffectTarget> targets;
+  std::vector<CauseName> targets;
   std::vector<std::vector<Eigen::Index>> columns;
   std::vector<Eigen::Index> out;
   for (Eigen::Index i = state.joints(); i < state.size(); ++i) {
     const auto& effect = state.model()[state.parameters()[static_cast<std::size_t>(i)].ref.effect];
-    if (effect.name() != kind) continue;
-    if (targets.empty() || !(targets.back() == effect.target())) {
-      targets.push_back(effect.target());
+    if (kind_asked(effect.name()) != kind) continue;
+    const CauseName name{effect.name(), effect.target().joint, effect.target().source};
+    if (targets.empty() || !(targets.back() == name)) {
+      targets.push_back(name);
       columns.emplace_back();
     }
     columns.back().push_back(i);
@@ -377,7 +386,7 @@ void Findings::add_estimated(const LogAbout& log, const BlockRegression& all, co
   if (best == targets.size()) return;
   const auto scores = reduced.base.score(own);
   DiagnosedCause cause;
-  cause.cause = {kind, targets[best].joint, targets[best].source};
+  cause.cause = targets[best];
   cause.z = scores.z();
   if (cause.z < report_.z_threshold) return;
   const Eigen::VectorXd estimate = scores.estimate();

@@ -64,6 +64,7 @@ class Findings {
   /// How far parameters of the state can go from where they are, within what is believed of each but in one of
   /// 1 / `level` robots; offsets anywhere.
   [[nodiscard]] Bounds room_of(const BlockRegression& all, const std::vector<Eigen::Index>& kept) const;
+  [[nodiscard]] const std::string& kind_asked(const std::string& effect) const;
   /// Which of the effects that are estimated anyway stand out (report.estimated).
   void name_estimated(const LogAbout& log, const BlockRegression& all, const std::vector<Candidate>& candidates);
   /// An effect of the state against a model that knows no effect of its kind: of joints of one kind that move the

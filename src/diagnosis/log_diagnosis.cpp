@@ -199,7 +199,7 @@ class LogDiagnosis {
           "eyes and a common shift of the pictures look nearly alike; move the head by 20 to 30 deg");
     }
     if (!roles.fingers.empty() && range_of(roles.fingers) < kStill_rad) {
-      report.warnings.push_back("the fingers stood still: of their encoders only a common error shows");
+      report.warnings.push_back("the fingers stood still: of their encoders only an offset shows");
     }
     double speed = 0.0;
     for (const auto& picture : watched_.pictures.pictures()) {

@@ -25,6 +25,12 @@ class FingerJoints {
     }
   }
 
+  [[nodiscard]] std::vector<Eigen::Index> all() const {
+    std::vector<Eigen::Index> all;
+    for (const auto& joint : joints_) all.push_back(joint.index);
+    return all;
+  }
+
   [[nodiscard]] std::vector<Eigen::Index> curling() const {
     constexpr double kParallel = 0.7;
     std::vector<Eigen::Index> curling;
@@ -278,7 +284,9 @@ JointRoles JointRoles::of(std::shared_ptr<const RobotModel> model, const RobotSe
       roles.right_pan = joint;
     }
   }
-  roles.fingers = FingerJoints(model, setup, roles.arm).curling();
+  const FingerJoints fingers(model, setup, roles.arm);
+  roles.fingers = fingers.curling();
+  roles.hand = fingers.all();
   const ArmAnatomy anatomy(model, setup, cameras, roles.arm);
   roles.segments = anatomy.segments();
   roles.links = anatomy.links();

@@ -10,6 +10,7 @@
 #include "convergence.hpp"
 #include "hand_uncertainty.hpp"
 #include "search_renders.hpp"
+#include "reading_noise.hpp"
 #include "stage_timer.hpp"
 
 namespace bodyschema {
@@ -41,7 +42,7 @@ struct Estimator::Impl {
         fitter(model, scorer, options, rig.cameras.size(), search_renders(options, rig.intrinsics())),
         occlusion(model, scorer, rig, setup.hand_link),
         known(model.state(), memory_layout(model.state(), considered), options.memory, options.least_postures),
-        tracker(model, scorer, particles, fitter, occlusion, known, options),
+        tracker(model, scorer, particles, fitter, occlusion, known, options), readings(options.memory.encoder_sd_rad),
         shape(Eigen::MatrixXd::Zero(model.state().size(), model.state().size())) {
     for (Eigen::Index k = 0; k < model.state().joints(); ++k) joint_names.push_back(parameter(k).name);
   }
@@ -50,6 +51,7 @@ struct Estimator::Impl {
 
   Estimate step(const Observation& observation) {
     frame = model.take(observation, known.x);
+    readings.read(observation.encoders, observation.encoders_begin_anew);
     outcome = {};
     if (!particles_only()) tracker.begin_frame(frame);
     const bool in_view = scorer.observe(frame, options.min_mask_share);
@@ -175,7 +177,7 @@ struct Estimator::Impl {
     }
     if (!particles_only()) estimate.hand_sd_limit_m = options.converged_hand_sd_m;
     if (frame.exposed()) {
-      const auto hand = hand_uncertainty(model, frame.exposures[0], known, shape);
+      const auto hand = hand_uncertainty(model, frame.exposures[0], known, shape_and_readings());
       estimate.hand_sd_m = hand.sd_m();
       if (!particles_only()) {
         const std::size_t camera = frame.exposures[0].at.camera;
@@ -185,6 +187,17 @@ struct Estimator::Impl {
       }
     }
     tracker.hand_known_to(estimate.hand_sd_m);
+  }
+
+  /// What moves the hand of one picture beside what is known of the state: covariance over it.
+  [[nodiscard]] Eigen::MatrixXd shape_and_readings() const {
+    Eigen::MatrixXd covariance = shape;
+    for (Eigen::Index k = 0; k < covariance.rows() && !particles_only(); ++k) {
+      const auto& effect = model.state().model()[parameter(k).ref.effect];
+      if (effect.name() != "joint_offset" && effect.name() != "head_offset") continue;
+      covariance(k, k) += readings.beyond_belief_rad2(model.roles().index(effect.target().joint));
+    }
+    return covariance;
   }
 
   [[nodiscard]] const StateParameter& parameter(Eigen::Index k) const {
@@ -243,6 +256,7 @@ struct Estimator::Impl {
   ArmTracker tracker;
   Frame frame;  ///< the last one; its observation is gone once `step` has returned
   FrameOutcome outcome;
+  ReadingNoise readings;
   Eigen::MatrixXd shape;                 ///< covariance of the state by what outlines get wrong alike in all postures
   std::vector<std::string> joint_names;  ///< in the state's order: the configuration may list them in another
   StageTimes times;
@@ -304,7 +318,7 @@ Pose Estimator::hand_pose(const Exposure& exposure, const Estimate& estimate) {
 }
 
 Eigen::Matrix3d Estimator::hand_covariance_m2(const Exposure& exposure) {
-  return hand_uncertainty(impl_->model, exposure, impl_->known, impl_->shape).covariance_m2;
+  return hand_uncertainty(impl_->model, exposure, impl_->known, impl_->shape_and_readings()).covariance_m2;
 }
 
 std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& exposure, bool corrected) {

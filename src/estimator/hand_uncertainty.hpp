@@ -22,7 +22,7 @@ struct HandUncertainty {
   [[nodiscard]] double described_sd_m(const State& state) const;
 };
 
-/// @param shape  shape_covariance of what is known
+/// @param shape  shape_covariance of what is known, and what else errs in this frame: over the state
 HandUncertainty hand_uncertainty(FrameModel& model, const Exposure& exposure, const FusedState& known,
                                  const Eigen::MatrixXd& shape);
 

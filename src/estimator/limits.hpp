@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 /// Every limit of the estimator that no configuration sets, with its unit and its kind: `physical`, a bound that
 /// follows from what robots and pictures are; `statistical`, a quantile of a stated distribution.
 namespace bodyschema::limits {
@@ -49,6 +51,9 @@ inline constexpr double kClearlyBetter = 23.0;
 inline constexpr double kNearer = 0.8;
 /// Statistical. What one more free parameter must be better by: ln of prior over posterior variance, usually.
 inline constexpr double kPerParameter = 9.0;
+
+/// Statistical. Encoder readings after which their noise is told anew, from twice as many.
+inline constexpr std::size_t kReadings = 200;
 
 /// Statistical. Postures after which what one showed of the parts' shapes has faded to 1/e: the estimate that left its
 /// residuals is no longer held.

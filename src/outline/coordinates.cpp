@@ -49,7 +49,7 @@ double Coordinate::in(const Corrections& corrections) const {
 
 Coordinates::Coordinates(const JointRoles& roles) {
   const auto add = [&](Kind kind, Eigen::Index index) { all_.push_back({kind, index}); };
-  for (const auto* group : {&roles.arm, &roles.head, &roles.fingers}) {
+  for (const auto* group : {&roles.arm, &roles.head, &roles.hand}) {
     for (const auto joint : *group) add(Kind::kJoint, joint);
   }
   for (const auto joint : roles.arm) {

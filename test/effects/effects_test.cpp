@@ -53,7 +53,7 @@ double size_of(const Corrections& c) {
 
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
-  EXPECT_EQ(shipped_effects().size(), 30u);
+  EXPECT_EQ(shipped_effects().size(), 31u);
   auto at = instant(r);
   at.q.setConstant(0.7);
   at.encoder.setConstant(0.8);
@@ -331,6 +331,13 @@ TEST(Geometry, LengthTiltAndHeadGoWhereTheyBelong) {
   const auto fingers = corrections(*make_effect("finger_posture", {}, r), 5.0, at);
   EXPECT_NEAR(dq_deg(fingers, 13), 5.0, 1e-12);
   EXPECT_NEAR(dq_deg(fingers, 14), 5.0, 1e-12);
+  EXPECT_EQ(dq_deg(fingers, 15), 0.0);
+  for (const auto joint : r.hand) {
+    const auto& name = r.names[static_cast<std::size_t>(joint)];
+    const auto one = corrections(*make_effect("finger_offset", {name, ""}, r), 2.0, at);
+    EXPECT_NEAR(dq_deg(one, joint), 2.0, 1e-12) << name;
+    EXPECT_NEAR(one.dq.cwiseAbs().sum(), radians(2.0), 1e-12) << name;
+  }
 }
 
 TEST(Cameras, CorrectionsReachTheRightEye) {

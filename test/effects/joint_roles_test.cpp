@@ -39,6 +39,9 @@ const Names kCurl = {"r_index_distal", "r_index_proximal", "r_middle_distal", "r
 TEST(JointRoles, OfOurOwnRobot) {
   const auto r = robot("icub_right/robot.yaml");
   EXPECT_EQ(r.names(r.roles.fingers), kCurl);  // the thumb's opposition turns it sideways
+  auto hand = kCurl;
+  hand.insert(hand.begin() + 6, "r_thumb_oppose");
+  EXPECT_EQ(r.names(r.roles.hand), hand);
   EXPECT_EQ(r.names(r.roles.neck), (Names{"eyes_tilt", "neck_pitch", "neck_roll", "neck_yaw"}));
   EXPECT_EQ(name_of(r, r.roles.left_pan), "l_eye_pan");
   EXPECT_EQ(name_of(r, r.roles.right_pan), "r_eye_pan");
@@ -154,6 +157,7 @@ TEST(JointRoles, OfTheOfficialIcub) {
   const auto fingers = r.names(r.roles.fingers);
   EXPECT_GE(fingers.size(), 11u);
   for (const auto& name : fingers) EXPECT_EQ(name.find("_0_joint"), std::string::npos) << name;
+  EXPECT_EQ(r.roles.hand.size(), fingers.size() + 5);
   EXPECT_EQ(r.roles.neck.size(), 4u);
   EXPECT_TRUE(r.roles.has_pans());
   // The joint that turns the forearm sits aside of the elbow, 37 deg off its own axis: a shorter forearm lies along

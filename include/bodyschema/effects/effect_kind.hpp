@@ -56,6 +56,9 @@ struct EffectKind {
   EffectHome home = EffectHome::kNowhere;
   /// No diagnosis looks for it of its own accord: it is estimated where a configuration believes it to be uncertain.
   bool where_believed = false;
+  /// The kind that does to all targets alike what this one does to each: both are asked for together, and the fewest
+  /// that will do are named.
+  std::string each_of{};
   std::string remark{};  ///< what to do about it where no file can hold it
 };
 

@@ -52,6 +52,7 @@ struct JointRoles {
   Eigen::Index left_pan = -1;
   Eigen::Index right_pan = -1;        ///< the same of the right camera
   std::vector<Eigen::Index> fingers;  ///< joints that curl a finger when they grow
+  std::vector<Eigen::Index> hand;     ///< those and the ones that spread the fingers or oppose the thumb
   std::vector<BodySegment> segments;  ///< every rendered part is in one
   std::vector<ArmLink> links;         ///< from the root outwards
   std::vector<Mount> mounts;          ///< of each arm whose hand is fixed to its last link

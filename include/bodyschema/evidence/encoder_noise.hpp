@@ -5,11 +5,14 @@
 
 #include "bodyschema/observation/observation.hpp"
 
-namespace bodyschema::diagnosis {
+namespace bodyschema {
+
+/// Variance of what lies between two readings, of theirs: in the mean over where a picture falls.
+constexpr double kInterpolatedVariance = 2.0 / 3.0;
 
 /// How far single readings of each joint's encoder err, rad (standard deviation): their noise and their steps, told
 /// from how readings that follow each other differ beyond any motion of a robot. 0 where readings come too seldom to
 /// tell.
 Eigen::VectorXd encoder_noise(std::span<const JointSample> encoders);
 
-}  // namespace bodyschema::diagnosis
+}  // namespace bodyschema

@@ -1,4 +1,4 @@
-#include "encoder_noise.hpp"
+#include "bodyschema/evidence/encoder_noise.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "bodyschema/geometry/pose.hpp"
 #include "random_seed.hpp"
 
-namespace bodyschema::diagnosis {
+namespace bodyschema {
 namespace {
 
 constexpr double kDegree = kPi / 180.0;
@@ -52,4 +52,4 @@ TEST(EncoderNoise, BearsJumps) {
 }
 
 }  // namespace
-}  // namespace bodyschema::diagnosis
+}  // namespace bodyschema

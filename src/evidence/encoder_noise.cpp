@@ -1,4 +1,4 @@
-#include "encoder_noise.hpp"
+#include "bodyschema/evidence/encoder_noise.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,12 +6,12 @@
 
 #include "bodyschema/core/order_statistics.hpp"
 
-namespace bodyschema::diagnosis {
+namespace bodyschema {
 namespace {
 
 /// Fourth differences of slower readings hold motion: one of 1 rad in 1 s leaves less than 0.02 deg at 20 Hz.
 constexpr double kSlowest_s = 0.05;
-constexpr std::size_t kFewest = 50;
+constexpr std::size_t kFewestReadings = 50;
 constexpr double kOfFourth = 8.3666;   ///< sqrt(70): fourth differences of white noise over its standard deviation
 constexpr double kMostShare = 0.9;     ///< of the differences: the rest may be lost or stalled readings
 constexpr double kMostNormal = 1.645;  ///< ... which lie within so many standard deviations
@@ -31,7 +31,7 @@ double median_period(std::span<const JointSample> encoders) {
 Eigen::VectorXd encoder_noise(std::span<const JointSample> encoders) {
   if (encoders.empty()) return {};
   Eigen::VectorXd noise = Eigen::VectorXd::Zero(encoders.front().q.size());
-  if (encoders.size() < kFewest || median_period(encoders) > kSlowest_s) return noise;
+  if (encoders.size() < kFewestReadings || median_period(encoders) > kSlowest_s) return noise;
   for (Eigen::Index j = 0; j < noise.size(); ++j) {
     std::vector<double> fourth, changes;
     for (std::size_t i = 1; i < encoders.size(); ++i) {
@@ -49,4 +49,4 @@ Eigen::VectorXd encoder_noise(std::span<const JointSample> encoders) {
   return noise;
 }
 
-}  // namespace bodyschema::diagnosis
+}  // namespace bodyschema

@@ -1,0 +1,26 @@
+#include "reading_noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bodyschema/evidence/encoder_noise.hpp"
+#include "limits.hpp"
+
+namespace bodyschema {
+
+void ReadingNoise::read(std::span<const JointSample> encoders, bool begin_anew) {
+  if (begin_anew) last_.clear();
+  last_.insert(last_.end(), encoders.begin(), encoders.end());
+  fresh_ += encoders.size();
+  if (fresh_ < limits::kReadings) return;
+  fresh_ = 0;
+  if (last_.size() > 2 * limits::kReadings) last_.erase(last_.begin(), last_.end() - 2 * limits::kReadings);
+  sd_rad_ = encoder_noise(last_);
+}
+
+double ReadingNoise::beyond_belief_rad2(Eigen::Index joint) const {
+  if (joint < 0 || joint >= sd_rad_.size()) return 0.0;
+  return std::max(0.0, kInterpolatedVariance * sd_rad_[joint] * sd_rad_[joint] - believed_rad2_);
+}
+
+}  // namespace bodyschema
