@@ -15,7 +15,8 @@ void ReadingNoise::read(std::span<const JointSample> encoders, bool begin_anew) 
   if (fresh_ < limits::kReadings) return;
   fresh_ = 0;
   if (last_.size() > 2 * limits::kReadings) last_.erase(last_.begin(), last_.end() - 2 * limits::kReadings);
-  sd_rad_ = encoder_noise(last_);
+  constexpr double kCalmShare = 0.5;  // of the time no robot is jerked
+  sd_rad_ = encoder_noise(last_, kCalmShare);
 }
 
 double ReadingNoise::beyond_belief_rad2(Eigen::Index joint) const {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bodyschema/core/order_statistics.hpp"
+#include "bodyschema/evidence/distributions.hpp"
 
 namespace bodyschema {
 namespace {
@@ -13,11 +14,10 @@ namespace {
 constexpr double kSlowest_s = 0.05;
 constexpr std::size_t kFewestReadings = 50;
 constexpr double kOfFourth = 8.3666;   ///< sqrt(70): fourth differences of white noise over its standard deviation
-constexpr double kMostShare = 0.9;     ///< of the differences: the rest may be lost or stalled readings
-constexpr double kMostNormal = 1.645;  ///< ... which lie within so many standard deviations
 /// Of the changes. Readings in steps never change by less than one, and often by just that: the smallest changes are
 /// alike. Without steps they are as small as one cares to look.
 constexpr double kSmallest = 0.01, kSmall = 0.05, kAlike = 1.5;
+constexpr std::size_t kFewestChanges = 100;  ///< of which one in a hundred is one
 
 double median_period(std::span<const JointSample> encoders) {
   std::vector<double> periods;
@@ -28,10 +28,11 @@ double median_period(std::span<const JointSample> encoders) {
 
 }  // namespace
 
-Eigen::VectorXd encoder_noise(std::span<const JointSample> encoders) {
+Eigen::VectorXd encoder_noise(std::span<const JointSample> encoders, double share) {
   if (encoders.empty()) return {};
   Eigen::VectorXd noise = Eigen::VectorXd::Zero(encoders.front().q.size());
   if (encoders.size() < kFewestReadings || median_period(encoders) > kSlowest_s) return noise;
+  const double within = normal_quantile(1.0 - share);  // standard deviations that hold this share
   for (Eigen::Index j = 0; j < noise.size(); ++j) {
     std::vector<double> fourth, changes;
     for (std::size_t i = 1; i < encoders.size(); ++i) {
@@ -42,9 +43,10 @@ Eigen::VectorXd encoder_noise(std::span<const JointSample> encoders) {
                                 4.0 * encoders[i - 3].q[j] + encoders[i - 4].q[j]));
     }
     // A reading is off by up to half a step, also while it does not change.
+    const bool enough = changes.size() >= kFewestChanges;
     const double smallest = quantile(changes, kSmallest), small = quantile(std::move(changes), kSmall);
-    const double step = small < kAlike * smallest ? small : 0.0;
-    noise[j] = std::max(step / std::sqrt(12.0), quantile(std::move(fourth), kMostShare) / kMostNormal / kOfFourth);
+    const double step = enough && small < kAlike * smallest ? small : 0.0;
+    noise[j] = std::max(step / std::sqrt(12.0), quantile(std::move(fourth), share) / within / kOfFourth);
   }
   return noise;
 }

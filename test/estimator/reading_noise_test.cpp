@@ -40,6 +40,18 @@ TEST_F(ReadingNoiseTest, IsNoneWhileThereAreFewReadings) {
   EXPECT_EQ(noise_.beyond_belief_rad2(-1), 0.0);
 }
 
+/// An arm that is jerked from posture to posture: of a recording so made half of the frames lost their `converged`.
+TEST_F(ReadingNoiseTest, IsNoMotion) {
+  std::vector<JointSample> list;
+  double angle = 0.0;
+  for (int i = 0; i < 1200; ++i, time_ += 10'000) {
+    angle += 0.15 * ((i / 100 % 2 == 0 ? 0.3 : -0.3) - angle);
+    list.push_back({time_, Eigen::VectorXd::Constant(1, angle), {}});
+  }
+  noise_.read(list, true);
+  EXPECT_EQ(noise_.beyond_belief_rad2(0), 0.0);
+}
+
 TEST_F(ReadingNoiseTest, FollowsAnEncoderThatGetsBetter) {
   for (int frame = 0; frame < 50; ++frame) noise_.read(readings(10, 0.3), frame == 0);
   for (int frame = 0; frame < 60; ++frame) noise_.read(readings(10, 0.02), false);

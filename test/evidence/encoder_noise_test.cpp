@@ -44,6 +44,14 @@ TEST(EncoderNoise, IsNotToldBySlowReadings) {
   EXPECT_EQ(encoder_noise({}).size(), 0);
 }
 
+/// An arm that goes from posture to posture changes seldom, and then by about as much: that is no encoder's step. Of a
+/// recording so made half of the frames lost their `converged`.
+TEST(EncoderNoise, TakesFewMovesForNoSteps) {
+  std::vector<JointSample> list;
+  for (int i = 0; i < 400; ++i) list.push_back({10'000 * i, Eigen::VectorXd::Constant(1, 0.02 * (i / 50)), {}});
+  EXPECT_NEAR(encoder_noise(list)[0], 0.0, 1e-9);
+}
+
 /// Readings that stall and jump now and then say nothing of the others.
 TEST(EncoderNoise, BearsJumps) {
   auto list = readings(0.02 * kDegree, 0.0);
