@@ -23,7 +23,7 @@ class ReadingNoise {
  private:
   double believed_rad2_;
   std::vector<JointSample> last_;
-  std::size_t fresh_ = 0;    ///< readings that the noise was not told from
+  std::size_t fresh_ = 0;  ///< readings that the noise was not told from
   Eigen::VectorXd sd_rad_;
 };
 

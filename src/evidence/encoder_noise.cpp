@@ -13,7 +13,7 @@ namespace {
 /// Fourth differences of slower readings hold motion: one of 1 rad in 1 s leaves less than 0.02 deg at 20 Hz.
 constexpr double kSlowest_s = 0.05;
 constexpr std::size_t kFewestReadings = 50;
-constexpr double kOfFourth = 8.3666;   ///< sqrt(70): fourth differences of white noise over its standard deviation
+constexpr double kOfFourth = 8.3666;  ///< sqrt(70): fourth differences of white noise over its standard deviation
 /// Of the changes. Readings in steps never change by less than one, and often by just that: the smallest changes are
 /// alike. Without steps they are as small as one cares to look.
 constexpr double kSmallest = 0.01, kSmall = 0.05, kAlike = 1.5;
