@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "bodyschema/bus/messages.hpp"
+#include "bodyschema/camera/picture_reduction.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/simulator/simulator.hpp"
 
@@ -95,21 +96,34 @@ const Reach& reach(const Robot& robot, Size size) {
   return all.emplace(key, made()).first->second;
 }
 
+/// Pictures as they come out of messages, which takes what `jpeg/SIZE` says.
+void as_read(const Pipeline& pipeline, Observation& observation) {
+  for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
+    const int n = pipeline.rig().cameras[c].intrinsics.reduction;
+    if (n > 1 && observation.cameras[c]) observation.cameras[c]->image = reduced(observation.cameras[c]->image, n);
+  }
+}
+
 /// Frames of the reach in turn, as the service gets them.
 void whole_frame(benchmark::State& state, const Robot& robot, const std::string& engine, const std::string& mode,
                  Size size, int particles, bool ahead) {
-  Pipeline pipeline(configuration(robot, engine, mode, size, particles));
-  for (Observation observation : reach(robot, size).background) pipeline.process(observation);
+  Pipeline pipeline(configuration(robot, engine, mode, size, particles), std::nullopt, PictureReading::kAsNeeded);
+  for (Observation observation : reach(robot, size).background) {
+    as_read(pipeline, observation);
+    pipeline.process(observation);
+  }
   // The first frames search; what counts is the frame of a running service.
   constexpr std::size_t kWarmUp = 30;
   const auto& motion = reach(robot, size).motion;
   for (std::size_t i = 0; i < kWarmUp; ++i) {
     Observation observation = motion[i];
+    as_read(pipeline, observation);
     pipeline.process(observation);
   }
   std::size_t at = kWarmUp;
   const auto next_observation = [&] {
     Observation observation = motion[at];
+    as_read(pipeline, observation);
     at = at + 1 < motion.size() ? at + 1 : kWarmUp;
     return observation;
   };
@@ -215,10 +229,12 @@ void played(benchmark::State& state, const Robot& robot, Size size, int particle
   std::vector<double> until_out_ms, all_ms;
   std::size_t converged = 0;
   for (auto _ : state) {
-    Pipeline pipeline(configuration(robot, "contour", "best", size, particles));
+    Pipeline pipeline(configuration(robot, "contour", "best", size, particles), std::nullopt,
+                      PictureReading::kAsNeeded);
     ToAndFro frames(reach(robot, size));
     for (std::size_t i = 0; i < kLaps * frames.frames(); ++i) {
       Observation observation = frames.next();
+      as_read(pipeline, observation);
       const double begin_ms = processor_ms();
       const Estimate estimate = pipeline.process(
           observation, nullptr, [&](const Estimate&) { until_out_ms.push_back(processor_ms() - begin_ms); });
@@ -245,7 +261,7 @@ void jpeg(benchmark::State& state, Size size) {
   for (auto _ : state) {
     for (const auto& m : messages) {
       const ImageView view{0, 0, m.width, m.height, m.row_stride, m.pixelformat, m.data};
-      if (!unpack(view, out).ok()) return state.SkipWithError("a JPEG did not decode");
+      if (!unpack(view, out, {}, picture_reduction(size.width, size.height)).ok()) return state.SkipWithError("a JPEG did not decode");
     }
   }
 }

@@ -107,7 +107,7 @@ bool write_pixels(jpeg_compress_struct& jpeg, Reporter& reporter, const Image& i
 
 }  // namespace
 
-DecodeResult decompress_jpeg(Bytes file, int width, int height, Image& out) {
+DecodeResult decompress_jpeg(Bytes file, int width, int height, int reduction, Image& out) {
   if (file.empty()) return {MessageFault::kBrokenPicture, "JPEG of no bytes"};
   jpeg_decompress_struct jpeg{};
   jpeg_progress_mgr progress{};
@@ -115,11 +115,13 @@ DecodeResult decompress_jpeg(Bytes file, int width, int height, Image& out) {
   jpeg.err = reporter.install();
   Step step = read_header(jpeg, reporter, file, width, height);
   if (step == Step::kDone) {
-    out.width = width;
-    out.height = height;
+    jpeg.scale_num = 1;
+    jpeg.scale_denom = static_cast<unsigned>(reduction);
+    out.width = width / reduction;
+    out.height = height / reduction;
     out.channels = jpeg.out_color_space == JCS_GRAYSCALE ? 1 : 3;
-    const auto row_bytes = static_cast<std::size_t>(width) * static_cast<std::size_t>(out.channels);
-    out.data.resize(row_bytes * static_cast<std::size_t>(height));
+    const auto row_bytes = static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.channels);
+    out.data.resize(row_bytes * static_cast<std::size_t>(out.height));
     step = read_pixels(jpeg, reporter, progress, out.data.data(), row_bytes);
   }
   DecodeResult result;

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
+#include "bodyschema/camera/picture_reduction.hpp"
 #include "jpeg.hpp"
 #include "wire_reader.hpp"
 
@@ -223,7 +223,7 @@ DecodeResult decode(Bytes message, offsets_status_t& out, const DecodeLimits& gi
   return in.finish();
 }
 
-DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limits) {
+DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limits, int reduction) {
   using bot_core::image_t;
   if (view.width <= 0 || view.height <= 0) {
     return {MessageFault::kWrongSize, "picture of " + size_text(view.width, view.height)};
@@ -232,7 +232,7 @@ DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limit
     return {MessageFault::kTooLarge, "picture of " + size_text(view.width, view.height)};
   }
   if (view.pixelformat == image_t::PIXEL_FORMAT_MJPEG) {
-    return decompress_jpeg(view.data, view.width, view.height, out);
+    return decompress_jpeg(view.data, view.width, view.height, reduction, out);
   }
   const bool gray = view.pixelformat == image_t::PIXEL_FORMAT_GRAY;
   const bool bgr = view.pixelformat == image_t::PIXEL_FORMAT_BGR;
@@ -250,17 +250,9 @@ DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limit
     return {MessageFault::kWrongSize, std::to_string(held) + " bytes for " + size_text(view.width, view.height) +
                                           " with rows of " + std::to_string(view.row_stride) + " bytes"};
   }
-  out.width = view.width;
-  out.height = view.height;
-  out.channels = channels;
-  out.data.resize(row_bytes * static_cast<std::size_t>(view.height));
-  for (int v = 0; v < view.height; ++v) {
-    const std::uint8_t* from = view.data.data() + static_cast<std::size_t>(v) * static_cast<std::size_t>(stride);
-    std::uint8_t* to = out.data.data() + static_cast<std::size_t>(v) * row_bytes;
-    std::memcpy(to, from, row_bytes);
-    if (bgr) {
-      for (std::size_t i = 0; i < row_bytes; i += 3) std::swap(to[i], to[i + 2]);
-    }
+  reduce(view.data.data(), static_cast<std::size_t>(stride), view.width, view.height, channels, reduction, out);
+  if (bgr) {
+    for (std::size_t i = 0; i < out.data.size(); i += 3) std::swap(out.data[i], out.data[i + 2]);
   }
   return {};
 }

@@ -118,7 +118,7 @@ ObservationStream::ObservationStream(const std::vector<std::string>& joint_names
       throw ConfigurationError("cameras: '" + camera.name +
                                "': a rig is one camera or two, the one with the smaller number in messages first");
     }
-    cameras_.push_back({camera.name, camera.number(), camera.intrinsics.width, camera.intrinsics.height, 0, false, 0});
+    cameras_.push_back({camera.name, camera.number(), camera.intrinsics.width, camera.intrinsics.height, 1, 0, false, 0});
   }
 }
 
@@ -215,7 +215,7 @@ void ObservationStream::receive_images(Bytes message, std::int64_t arrival_us) {
                                                   std::to_string(view.height) + ", configured are " +
                                                   std::to_string(camera.width) + "x" + std::to_string(camera.height)};
       } else {
-        unpacked = unpack(view, image.image, options_.limits);
+        unpacked = unpack(view, image.image, options_.limits, camera.reduction);
         if (unpacked.ok()) unpacked = admit_kind(camera, image.image.channels);
       }
       if (!unpacked.ok()) {
@@ -271,6 +271,10 @@ void ObservationStream::receive_masks(Bytes message, std::int64_t arrival_us) {
 void ObservationStream::expect_channels(std::size_t camera, int channels) {
   cameras_.at(camera).channels = channels;
   cameras_.at(camera).channels_given = true;
+}
+
+void ObservationStream::reduce(std::size_t camera, int reduction) {
+  cameras_.at(camera).reduction = reduction;
 }
 
 /// Backgrounds are learned of one kind of picture. A stray picture of another kind must not end that; a

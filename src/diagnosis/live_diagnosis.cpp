@@ -56,7 +56,8 @@ double thread_time_s() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-Finding to_finding(const DiagnosedCause& cause) {
+/// @param reduction  of the pictures that were measured; what is said is in pixels of those that were sent
+Finding to_finding(const DiagnosedCause& cause, int reduction) {
   const bool unexplained = cause.cause.name == "unexplained";
   Finding finding{cause.cause.name,
                   cause.cause.joint,
@@ -65,7 +66,7 @@ Finding to_finding(const DiagnosedCause& cause) {
                   {},
                   cause.z,
                   cause.hand_mm,
-                  cause.outline_px};
+                  cause.outline_px * reduction};
   for (const auto& p : cause.parameters) {
     finding.parameters.push_back({p.parameter, p.unit, p.estimate, p.sd});
     if (p.from && !p.duration_s) finding.from = *p.from;
@@ -131,7 +132,7 @@ class Window {
       return std::nullopt;  // something stands in for what is not known
     }
     best_ = std::move(best);
-    for (const auto& cause : report.causes) found.causes.push_back(to_finding(cause));
+    for (const auto& cause : report.causes) found.causes.push_back(to_finding(cause, reduction()));
     if (!about_the_same(found.causes, measured_with_)) {
       measured_with_ = found.causes;
       others_found_ = true;
@@ -139,7 +140,7 @@ class Window {
     // The offset follows already what the estimator saw slip.
     for (auto& finding : found.causes) finding.estimated = is_slip_at_change(finding);
     for (const auto& cause : report.estimated) {
-      found.causes.push_back(to_finding(cause));
+      found.causes.push_back(to_finding(cause, reduction()));
       found.causes.back().estimated = true;
     }
     for (const auto& f : found.causes) spdlog::debug("live diagnosis: {} (z {:.1f})", f.sentence, f.z);
@@ -279,6 +280,9 @@ class Window {
     ++old;
     return !again;
   }
+
+  /// Of both cameras, whose pictures are alike but for odd rigs: of the first.
+  [[nodiscard]] int reduction() const { return log_.rig().cameras.front().intrinsics.reduction; }
 
   /// Pixels of a picture in one of 320x240.
   [[nodiscard]] double unit_of(std::size_t p) const {

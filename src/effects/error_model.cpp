@@ -322,8 +322,8 @@ StereoRig ErrorModel::corrected(const StereoRig& rig) const {
     auto& camera = result.cameras[c];
     camera.intrinsics.fx *= 1.0 + corrections.camera.focal_scale;
     camera.intrinsics.fy *= 1.0 + corrections.camera.focal_scale;
-    camera.intrinsics.cx += corrections.camera.cx_px;
-    camera.intrinsics.cy += corrections.camera.cy_px;
+    camera.intrinsics.cx += corrections.camera.cx_px / camera.intrinsics.reduction;
+    camera.intrinsics.cy += corrections.camera.cy_px / camera.intrinsics.reduction;
     camera.distortion[0] += corrections.camera.k1;
   }
   return result;

@@ -16,7 +16,12 @@ FrameModel::FrameModel(std::shared_ptr<const RobotModel> robot, const RobotSetup
       track_(robot, setup), probes_(state_.model(), state_.refs(), measurement_.coordinates()),
       beside_(beside, fitted_parameters(beside), measurement_.coordinates()),
       settled_(rig.cameras.size(), roles.no_corrections()), scratch_(roles.no_corrections()), nothing_(scratch_),
-      position_(static_cast<std::size_t>(measurement_.coordinates().size()), -1) {
+      position_(static_cast<std::size_t>(measurement_.coordinates().size()), -1), questions_(rig.cameras.size()) {
+  for (auto& question : questions_) question.corrections = nothing_;
+  for (std::size_t c = 1; c < rig.cameras.size(); ++c) {
+    more_measurements_.emplace_back(robot, setup, rig, roles, measurement_);
+    worker_ = std::make_unique<BackgroundWorker>();
+  }
   for (std::size_t e = 0; e < state_.model().size(); ++e) {
     sags_ = sags_ || std::as_const(state_).model()[e].follows_gravity();
     remembers_ = remembers_ || std::as_const(state_).model()[e].has_memory();
@@ -176,8 +181,8 @@ Pose FrameModel::nominal_hand_pose(const Exposure& exposure) {
   return project_nominal(exposure).hand();
 }
 
-/// Leaves what the parameters do to the coordinates in `J_`, and these in `active_`.
-void FrameModel::find_directions(const Exposure& exposure, const Eigen::VectorXd& x, bool with_beside) {
+/// Leaves what the parameters do to the coordinates in `out.J`, and these in `out.active`.
+void FrameModel::find_directions(const Exposure& exposure, const Eigen::VectorXd& x, bool with_beside, Question& out) {
   state_.set(x);
   probes_.follow(state_.model());
   probes_.directions(exposure.at, directions_);
@@ -186,18 +191,42 @@ void FrameModel::find_directions(const Exposure& exposure, const Eigen::VectorXd
     directions_.insert(directions_.end(), more_directions_.begin(), more_directions_.end());
   }
   std::fill(position_.begin(), position_.end(), -1);
-  active_.clear();
+  out.active.clear();
   for (const auto& direction : directions_) {
     for (const auto& step : direction) {
       if (position_[step.coordinate] >= 0) continue;
-      position_[step.coordinate] = static_cast<Eigen::Index>(active_.size());
-      active_.push_back(step.coordinate);
+      position_[step.coordinate] = static_cast<Eigen::Index>(out.active.size());
+      out.active.push_back(step.coordinate);
     }
   }
-  J_.setZero(static_cast<Eigen::Index>(active_.size()), state_.size() + beside_count());
+  out.J.setZero(static_cast<Eigen::Index>(out.active.size()), state_.size() + beside_count());
   for (std::size_t k = 0; k < directions_.size(); ++k) {
-    for (const auto& step : directions_[k]) J_(position_[step.coordinate], static_cast<Eigen::Index>(k)) = step.amount;
+    const auto parameter = static_cast<Eigen::Index>(k);
+    for (const auto& step : directions_[k]) out.J(position_[step.coordinate], parameter) = step.amount;
   }
+}
+
+void FrameModel::ask(const Frame& frame, std::span<const OutlineSearch> search) {
+  const auto ask_camera = [&](std::size_t c) {
+    Question& question = questions_[c];
+    if (!question.asked) return;
+    OutlineSearch beside = search[c];
+    if (c < frame.covered.size()) beside.covered = &frame.covered[c];
+    measurement_of(c).linearise(ObservedEdges(*frame.seen[c], rig_.cameras[c].intrinsics),
+                                frame.exposures[c].at.encoder, question.corrections, c, question.active, beside,
+                                question.answer);
+  };
+  std::future<void> second;
+  if (worker_ != nullptr && questions_[1].asked) second = worker_->begin([&] { ask_camera(1); });
+  std::exception_ptr failed;
+  try {
+    ask_camera(0);
+  } catch (...) {
+    failed = std::current_exception();  // the other thread is still at work on what is ours
+  }
+  if (second.valid()) second.wait();
+  if (failed) std::rethrow_exception(failed);
+  if (second.valid()) second.get();
 }
 
 void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::span<const OutlineSearch> search,
@@ -209,42 +238,48 @@ void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::sp
   out.sampled = out.matched = out.square = out.weight = out.odd = out.covered = 0.0;
   out.samples.assign(with_beside ? frame.seen.size() : 0, {});
   for (std::size_t c = 0; c < frame.seen.size(); ++c) {
+    Question& question = questions_[c];
+    question.asked = frame.seen[c] != nullptr && !frame.seen[c]->mask.empty();
+    if (!question.asked) continue;
+    find_directions(frame.exposures[c], x, with_beside, question);
+    corrections(frame.exposures[c], x, question.corrections);
+  }
+  ask(frame, search);
+  for (std::size_t c = 0; c < frame.seen.size(); ++c) {
     auto& evidence = out.cameras[c];
     evidence.A.setZero(n, n);
     evidence.b.setZero(n);
     evidence.square = evidence.weight = 0.0;
-    const auto* seen = frame.seen[c];
-    if (seen == nullptr || seen->mask.empty()) continue;
-    const auto& k = rig_.cameras[c].intrinsics;
-    const auto& exposure = frame.exposures[c];
-    find_directions(exposure, x, with_beside);
-    corrections(exposure, x, scratch_);
-    OutlineSearch beside = search[c];
-    if (c < frame.covered.size()) beside.covered = &frame.covered[c];
-    measurement_.linearise(ObservedEdges(*seen, k), exposure.at.encoder, scratch_, c, active_, beside, evidence_);
-    if (with_beside) out.samples[c].assign(measurement_.samples().begin(), measurement_.samples().end());
-    out.odd += evidence_.odd;
-    out.covered += evidence_.covered;
-    out.sampled += evidence_.sampled;
-    out.matched += evidence_.matched;
-    const double unit2 = picture_unit(k) * picture_unit(k);
-    out.cost[c] = evidence_.cost / unit2;
-    if (evidence_.weight <= 0.0) continue;
-    evidence.A = J_.transpose() * evidence_.A * J_ / unit2;
-    evidence.b = J_.transpose() * evidence_.b / unit2;
-    evidence.square = evidence_.square / unit2;
-    evidence.weight = evidence_.weight;
+    const auto& [active, J, corrections, answer, asked] = questions_[c];
+    if (!asked) continue;
+    const OutlineMeasurement& measurement = measurement_of(c);
+    if (with_beside) out.samples[c].assign(measurement.samples().begin(), measurement.samples().end());
+    out.odd += answer.odd;
+    out.covered += answer.covered;
+    out.sampled += answer.sampled;
+    out.matched += answer.matched;
+    const double unit = picture_unit_px(c), unit2 = unit * unit;
+    out.cost[c] = answer.cost / unit2;
+    if (answer.weight <= 0.0) continue;
+    evidence.A = J.transpose() * answer.A * J / unit2;
+    evidence.b = J.transpose() * answer.b / unit2;
+    evidence.square = answer.square / unit2;
+    evidence.weight = answer.weight;
     out.square += evidence.square;
     out.weight += evidence.weight;
-    if (look) look(c, measurement_.points());
+    if (look) look(c, measurement.points());
   }
 }
 
 Eigen::MatrixXd FrameModel::hand_jacobian(const Exposure& exposure, const Eigen::VectorXd& x) {
-  find_directions(exposure, x, true);
-  corrections(exposure, x, scratch_);
+  Question& question = questions_[exposure.at.camera];
+  find_directions(exposure, x, true, question);
+  corrections(exposure, x, question.corrections);
   const auto link = measurement_.projection().hand_link();
-  return measurement_.link_jacobian(exposure.at.encoder, scratch_, exposure.at.camera, active_, link).topRows<3>() * J_;
+  return measurement_
+             .link_jacobian(exposure.at.encoder, question.corrections, exposure.at.camera, question.active, link)
+             .topRows<3>() *
+         question.J;
 }
 
 }  // namespace bodyschema

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "bodyschema/core/background_worker.hpp"
 #include "bodyschema/effects/encoder_track.hpp"
 #include "bodyschema/estimator/exposure.hpp"
 #include "bodyschema/evidence/log_fit.hpp"
@@ -89,7 +90,20 @@ class FrameModel {
   RobotProjection& project_nominal(const Exposure& exposure);
 
  private:
-  void find_directions(const Exposure& exposure, const Eigen::VectorXd& x, bool with_beside);
+  /// What one camera is asked, and answers.
+  struct Question {
+    std::vector<std::uint32_t> active;  ///< coordinates that parameters move
+    Eigen::MatrixXd J;                  ///< what the parameters do to these
+    Corrections corrections;
+    OutlineEvidence answer;
+    bool asked = false;
+  };
+  void find_directions(const Exposure& exposure, const Eigen::VectorXd& x, bool with_beside, Question& out);
+  [[nodiscard]] OutlineMeasurement& measurement_of(std::size_t camera) {
+    return camera == 0 ? measurement_ : more_measurements_[camera - 1];
+  }
+  /// Asks all cameras at once, each with a thread of its own.
+  void ask(const Frame& frame, std::span<const OutlineSearch> search);
   void expose(const JointSample& joints, std::size_t camera, const Eigen::VectorXd& x, Exposure& out);
   void find_still_parts(const Eigen::VectorXd& q);
 
@@ -99,6 +113,8 @@ class FrameModel {
   bool sags_ = false;       ///< some effect follows gravity
   bool remembers_ = false;  ///< some effect has a memory
   OutlineMeasurement measurement_;
+  std::vector<OutlineMeasurement> more_measurements_;  ///< of further cameras
+  std::unique_ptr<BackgroundWorker> worker_;           ///< asks the second camera; null: there is one
   std::vector<bool> still_parts_;
   EncoderTrack track_;
   EffectProbes probes_, beside_;
@@ -107,10 +123,8 @@ class FrameModel {
   Corrections scratch_;
   const Corrections nothing_;
   std::vector<Direction> directions_, more_directions_;
-  std::vector<std::uint32_t> active_;
   std::vector<Eigen::Index> position_;  ///< of a coordinate among the active; -1: it is none
-  OutlineEvidence evidence_;
-  Eigen::MatrixXd J_;
+  std::vector<Question> questions_;     ///< per camera
 };
 
 }  // namespace bodyschema

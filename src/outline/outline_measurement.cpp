@@ -66,6 +66,11 @@ OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, 
     : coordinates_(roles), projection_(robot, setup, rig, roles), moved_(robot, setup, rig, roles),
       extractor_(drawn, rig.intrinsics()), probe_(roles.no_corrections()), X_CB_(projection_.part_count()) {}
 
+OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
+                                       const StereoRig& rig, const JointRoles& roles, const OutlineMeasurement& other)
+    : coordinates_(roles), projection_(robot, setup, rig, roles), moved_(robot, setup, rig, roles),
+      extractor_(other.extractor_), probe_(roles.no_corrections()), X_CB_(projection_.part_count()) {}
+
 void OutlineMeasurement::linearise(const ObservedEdges& edges, const Eigen::Ref<const Eigen::VectorXd>& q,
                                    const Corrections& corrections, std::size_t camera,
                                    std::span<const std::uint32_t> active, const OutlineSearch& search,
@@ -143,7 +148,7 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
           (1.0 + k1 * x.squaredNorm()) * Eigen::Matrix2d::Identity() + 2.0 * k1 * x * x.transpose();
       point.normal = (bend.inverse().transpose() * point.normal).normalized();
     }
-    point.pixel += corrections.shapes[projection_.segment_of(point.part)].dilation_px * point.normal;
+    point.pixel += corrections.shapes[projection_.segment_of(point.part)].dilation_px / k.reduction * point.normal;
     const bool covered = is_covered(search.covered, point.pixel);
     const auto distance =
         edges != nullptr ? edges->find(point.pixel, point.normal, reach_px) : std::optional<double>(0.0);
@@ -238,8 +243,8 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
       double g = 0.0;
       switch (coordinate.kind) {
         case Kind::kFocal: g = bent * n_f.dot(x) / (1.0 + corrections.camera.focal_scale); break;
-        case Kind::kCx: g = point.normal.x(); break;
-        case Kind::kCy: g = point.normal.y(); break;
+        case Kind::kCx: g = point.normal.x() / k.reduction; break;
+        case Kind::kCy: g = point.normal.y() / k.reduction; break;
         case Kind::kReadout:
           if (!shutter_.empty()) g = by_p.dot(shutter_[point.part] * p_C) * row_time(point.pixel.y(), k);
           break;
@@ -255,7 +260,7 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
                          (point.p_C - projection_.origin(point.part)) / (1.0 + size));
           }
           break;
-        case Kind::kDilation: g = own ? 1.0 : 0.0; break;
+        case Kind::kDilation: g = own ? 1.0 / k.reduction : 0.0; break;
         default:
           g = by_p.dot(motion_[i * links_.size() + point.part] * p_C);
           if (size != 0.0) g += size * by_p.dot(motion_of_size(i, point.part));

@@ -38,8 +38,8 @@ void RobotProjection::place(const Eigen::Ref<const Eigen::VectorXd>& q, const Co
   shapes_ = corrections.shapes;
   const auto& k = intrinsics_[camera];
   warp_(0, 0) = warp_(1, 1) = 1.0 + corrections.camera.focal_scale;
-  warp_(0, 2) = corrections.camera.cx_px / k.fx;
-  warp_(1, 2) = corrections.camera.cy_px / k.fy;
+  warp_(0, 2) = corrections.camera.cx_px / (k.reduction * k.fx);
+  warp_(1, 2) = corrections.camera.cy_px / (k.reduction * k.fy);
 }
 
 void RobotProjection::parts(std::span<Eigen::Isometry3f> X_CB) const {

@@ -12,7 +12,7 @@ HandError hand_error(const Pose& X_CP_estimated, const TruthInstant& truth, std:
     const Eigen::Vector3d real = X_CP * p_P;
     const Eigen::Vector3d estimated = X_CP_estimated * p_P;
     error.fingertip_m += (real - estimated).norm();
-    error.fingertip_px += (intrinsics.project(real) - intrinsics.project(estimated)).norm();
+    error.fingertip_px += intrinsics.reduction * (intrinsics.project(real) - intrinsics.project(estimated)).norm();
   }
   if (!truth.fingertips_P.empty()) {
     error.fingertip_m /= static_cast<double>(truth.fingertips_P.size());

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "bodyschema/camera/lens_knowledge.hpp"
+#include "bodyschema/camera/picture_reduction.hpp"
 #include "bodyschema/camera/shutter.hpp"
 #include "bodyschema/imports/joint_mapping.hpp"
 #include "bodyschema/imports/yarp_import.hpp"
@@ -27,6 +28,18 @@ std::optional<ErrorModel> load_error_model(const RobotSetup& setup, const std::s
 
 StereoRig corrected(const StereoRig& rig, const std::optional<ErrorModel>& model) {
   return model ? model->corrected(rig) : rig;
+}
+
+StereoRig as_read(StereoRig rig, PictureReading reading, const VisionSetup& vision, EstimatorMode mode) {
+  const bool reduces = reading == PictureReading::kAsNeeded && vision.reduces_pictures &&
+                       mode != EstimatorMode::kPaper && vision.edges != EdgeKind::kHard &&
+                       vision.method != SegmentationMethod::kGiven &&
+                       vision.method != SegmentationMethod::kBackgroundPicture;
+  for (auto& camera : rig.cameras) {
+    const int n = picture_reduction(camera.intrinsics.width, camera.intrinsics.height);
+    if (reduces && n > 1) camera.intrinsics = reduced(camera.intrinsics, n);
+  }
+  return rig;
 }
 
 std::vector<double> readouts_of(const Configuration& cameras, const StereoRig& rig) {
@@ -70,13 +83,14 @@ VisionSetup by(std::optional<SegmentationMethod> method, VisionSetup vision) {
 
 }  // namespace
 
-Pipeline::Pipeline(const Configuration& configuration, std::optional<SegmentationMethod> method)
+Pipeline::Pipeline(const Configuration& configuration, std::optional<SegmentationMethod> method,
+                   PictureReading reading)
     : setup_(RobotSetup::from(configuration.section("robot"))),
       vision_(by(method, VisionSetup::from(configuration.section("vision")))),
       bus_(BusOptions::from(configuration.section("bus"))), options_(EstimatorOptions::from(configuration)),
-      robot_(load_robot(setup_, StereoRig::from(configuration.section("cameras")))),
-      error_model_(load_error_model(setup_, robot_, StereoRig::from(configuration.section("cameras")))),
-      rig_(corrected(StereoRig::from(configuration.section("cameras")), error_model_)),
+      sent_(StereoRig::from(configuration.section("cameras"))), robot_(load_robot(setup_, sent_)),
+      error_model_(load_error_model(setup_, robot_, sent_)),
+      rig_(corrected(as_read(sent_, reading, vision_, options_.mode), error_model_)),
       beliefs_(Beliefs::from(configuration, JointRoles::of(robot_, setup_, rig_), rig_, options_)),
       readouts_s_(readouts_of(configuration.section("cameras"), rig_)), background_watch_(robot_, links_of(rig_)),
       background_turned_rad_(rig_.cameras.size(), 0.0),
@@ -115,7 +129,8 @@ ErrorModel Pipeline::known_effects() const {
 ObservationStream Pipeline::make_stream() const {
   BusOptions bus = bus_;
   bus.synchroniser.masks = vision_.method == SegmentationMethod::kGiven;
-  ObservationStream stream(robot_, setup_, rig_, bus);
+  ObservationStream stream(robot_, setup_, sent_, bus);
+  for (std::size_t c = 0; c < eyes_.size(); ++c) stream.reduce(c, rig_.cameras[c].intrinsics.reduction);
   if (vision_.method == SegmentationMethod::kBackgroundPicture) {
     for (std::size_t c = 0; c < eyes_.size(); ++c) {
       stream.expect_channels(c, eyes_[c].segmenter.background().channels);

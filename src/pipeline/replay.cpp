@@ -82,7 +82,7 @@ void write_overlay(Pipeline& pipeline, const Observation& observation, const Est
 class Replay {
  public:
   Replay(const Configuration& configuration, const ReplayOptions& options)
-      : options_(options), pipeline_(configuration) {
+      : options_(options), pipeline_(configuration, std::nullopt, PictureReading::kAsNeeded) {
     configuration.reject_unknown_keys();
     require_places(pipeline_.rig(), "a replay");
     make_folder(options.out);
@@ -116,7 +116,8 @@ class Replay {
       if (statistics_.faults[static_cast<std::size_t>(MessageFault::kWrongSize)] > 0) {
         throw DataError(fmt::format(
             "{}: no picture of camera '{}' has the configured size {}x{} (cameras.{}.width, .height)",
-            options_.log.string(), camera.name, camera.intrinsics.width, camera.intrinsics.height, camera.name));
+            options_.log.string(), camera.name, camera.intrinsics.width * camera.intrinsics.reduction,
+            camera.intrinsics.height * camera.intrinsics.reduction, camera.name));
       }
       spdlog::warn("{}: no usable picture of camera '{}'; estimated from the other one", options_.log.string(),
                    camera.name);

@@ -118,9 +118,9 @@ void try_to_create(const std::filesystem::path& file) {
 std::size_t room_to_wait(const StereoRig& rig) {
   std::size_t instant = 0;
   for (const auto& camera : rig.cameras) {
-    const auto pixels =
-        static_cast<std::size_t>(camera.intrinsics.width) * static_cast<std::size_t>(camera.intrinsics.height);
-    instant += 3 * pixels;
+    const auto& k = camera.intrinsics;  // pictures are recorded as they are sent
+    const auto along = [&](int size) { return static_cast<std::size_t>(size * k.reduction); };
+    instant += 3 * along(k.width) * along(k.height);
   }
   return Recorder::kWaiting_bytes + 2 * instant;
 }
@@ -213,7 +213,7 @@ class Daemon {
 
   static std::unique_ptr<Pipeline> load(const std::function<Configuration()>& load_configuration) {
     const Configuration configuration = load_configuration();
-    auto pipeline = std::make_unique<Pipeline>(configuration);
+    auto pipeline = std::make_unique<Pipeline>(configuration, std::nullopt, PictureReading::kAsNeeded);
     configuration.reject_unknown_keys();
     require_places(pipeline->rig(), "the service");
     return pipeline;

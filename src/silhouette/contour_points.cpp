@@ -43,12 +43,17 @@ struct Crossing {
 // leaves or reaches zero. A segment is sampled by the family of lines it is steeper to.
 struct ContourExtractor::Impl {
   Impl(const SilhouetteModel& silhouette_model, std::span<const PinholeIntrinsics> intrinsics)
-      : model(silhouette_model), kernel(contour::best_kernel()), found(model.max_edges() + contour::kLanes),
-        vertices(model.max_vertices()) {
+      : shared_model(std::make_shared<const contour::Model>(silhouette_model)), model(*shared_model),
+        kernel(contour::best_kernel()), found(model.max_edges() + contour::kLanes), vertices(model.max_vertices()) {
     for (const auto& k : intrinsics) cameras.emplace_back(k);
   }
+  /// With the same meshes, and room of its own to work in.
+  Impl(const Impl& other)
+      : shared_model(other.shared_model), model(*shared_model), cameras(other.cameras), kernel(other.kernel),
+        found(other.found.size()), vertices(other.vertices.size()) {}
 
-  contour::Model model;
+  std::shared_ptr<const contour::Model> shared_model;
+  const contour::Model& model;
   std::vector<contour::Camera> cameras;
   const contour::Kernel& kernel;
   std::vector<std::uint32_t> found;
@@ -207,6 +212,7 @@ ContourExtractor::ContourExtractor(const SilhouetteModel& model, std::span<const
   impl_ = std::make_unique<Impl>(model, cameras);
 }
 
+ContourExtractor::ContourExtractor(const ContourExtractor& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}
 ContourExtractor::~ContourExtractor() = default;
 ContourExtractor::ContourExtractor(ContourExtractor&&) noexcept = default;
 

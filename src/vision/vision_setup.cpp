@@ -17,6 +17,7 @@ VisionSetup VisionSetup::from(const Configuration& vision) {
   setup.edges =
       vision.choice_or("edges", "blurred", {"blurred", "hard"}) == "hard" ? EdgeKind::kHard : EdgeKind::kBlurred;
 
+  setup.reduces_pictures = vision.choice_or("picture_size", "as_needed", {"as_needed", "as_sent"}) == "as_needed";
   setup.noise_levels = vision.number_or("noise_levels", setup.noise_levels, 0.0, 64.0);
   setup.threshold_sigma = vision.number_or("threshold_sigma", setup.threshold_sigma, 1.0, 100.0);
   setup.threshold_levels = vision.number_or("threshold_levels", setup.threshold_levels, 0.0, 254.0);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <random>
 
+#include "bodyschema/camera/picture_reduction.hpp"
 #include "bodyschema/core/error.hpp"
 
 namespace bodyschema {
@@ -449,6 +450,38 @@ TEST(Unpack, ReadsJpegInColourAndGray) {
     double sum = 0.0;
     for (std::size_t i = 0; i < out.data.size(); ++i) sum += std::abs(int(out.data[i]) - int(image.data[i]));
     EXPECT_LT(sum / static_cast<double>(out.data.size()), 4.0);  // red and blue swapped would be 80
+  }
+}
+
+/// Means of n x n pixels, whatever the format.
+TEST(Unpack, ReducesPicturesThatHaveMorePixelsThanAreNeeded) {
+  for (const int channels : {1, 3}) {
+    const Image image = gradient(64, 48, channels);
+    for (const int n : {2, 4}) {
+      const Image expected = reduced(image, n);
+      Image out;
+      ASSERT_TRUE(unpack(view_of(to_message(image, 5)), out, {}, n).ok());
+      EXPECT_EQ(out.width, 64 / n);
+      EXPECT_EQ(out.height, 48 / n);
+      EXPECT_EQ(out.data, expected.data);
+      ASSERT_TRUE(unpack(view_of(to_jpeg_message(image, 5, 95)), out, {}, n).ok());
+      EXPECT_EQ(out.width, 64 / n);
+      EXPECT_EQ(out.channels, channels);
+      ASSERT_EQ(out.data.size(), expected.data.size());
+      double sum = 0.0;
+      for (std::size_t i = 0; i < out.data.size(); ++i) sum += std::abs(int(out.data[i]) - int(expected.data[i]));
+      EXPECT_LT(sum / static_cast<double>(out.data.size()), 4.0);
+    }
+  }
+}
+
+TEST(Unpack, RefusesAReducedJpegCutShortAtEveryByte) {
+  const auto whole = to_jpeg_message(gradient(32, 24, 3), 5, 80);
+  for (std::size_t n = 0; n < whole.data.size(); ++n) {
+    auto message = whole;
+    message.data.resize(n);
+    Image out;
+    EXPECT_EQ(unpack(view_of(message), out, {}, 4).fault, MessageFault::kBrokenPicture) << "at byte " << n;
   }
 }
 

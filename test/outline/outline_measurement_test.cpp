@@ -24,7 +24,7 @@ bool moves_no_link(Kind kind) {
 
 class OutlineOfOwnRobot : public OwnRobot {
  protected:
-  OutlineOfOwnRobot() {
+  explicit OutlineOfOwnRobot(int reduction = 1) : OwnRobot(reduction) {
     all_.resize(static_cast<std::size_t>(measurement_.coordinates().size()));
     std::iota(all_.begin(), all_.end(), 0u);
   }
@@ -56,8 +56,11 @@ class OutlineOfOwnRobot : public OwnRobot {
     const auto& k = rig_.cameras[camera].intrinsics;
     const Eigen::Vector2d bent = (1.0 + c.camera.k1 * x.squaredNorm()) * x;
     const double f = 1.0 + c.camera.focal_scale;
-    return {k.fx * f * bent.x() + k.cx + c.camera.cx_px, k.fy * f * bent.y() + k.cy + c.camera.cy_px};
+    return {k.fx * f * bent.x() + k.cx + c.camera.cx_px / k.reduction,
+            k.fy * f * bent.y() + k.cy + c.camera.cy_px / k.reduction};
   }
+
+  void derivatives_are_those_of_the_projection();
 
   [[nodiscard]] std::uint32_t position(Kind kind, Eigen::Index index) const {
     return static_cast<std::uint32_t>(measurement_.coordinates().find({kind, index}));
@@ -76,10 +79,17 @@ class OutlineOfOwnRobot : public OwnRobot {
   OutlineEvidence evidence_;
 };
 
+/// Of pictures that are read at half their size.
+class OutlineOfReducedPictures : public OutlineOfOwnRobot {
+ protected:
+  OutlineOfReducedPictures() : OutlineOfOwnRobot(2) {}
+};
+
 /// Every derivative against differences of a projection that is written out, at a state where nothing is zero.
-TEST_F(OutlineOfOwnRobot, DerivativesAreThoseOfTheProjection) {
+void OutlineOfOwnRobot::derivatives_are_those_of_the_projection() {
   const Corrections c = all_at_once();
   constexpr double kStep = 1e-6;
+  const int reduction = rig_.cameras[0].intrinsics.reduction;
   for (const std::size_t camera : {0u, 1u}) {
     measurement_.expect(q_, c, camera, all_, {.spacing_px = 6.0}, evidence_);
     const std::vector<OutlinePoint> points(measurement_.points().begin(), measurement_.points().end());
@@ -99,14 +109,14 @@ TEST_F(OutlineOfOwnRobot, DerivativesAreThoseOfTheProjection) {
       const Eigen::Vector3d p_B =
           links[point.part].linear().transpose() * (point.p_C - origins[point.part]) / scales[point.part];
       // The point is where it is said to be.
-      const Eigen::Vector2d own = appears(p_B, point.part, c, camera) + c.shapes[segment].dilation_px * point.normal;
+      const Eigen::Vector2d own = appears(p_B, point.part, c, camera) + c.shapes[segment].dilation_px / reduction * point.normal;
       ASSERT_LT((own - point.pixel).norm(), 0.02);
       ASSERT_NEAR(point.normal.norm(), 1.0, 1e-6);
       for (std::size_t i = 0; i < all_.size(); ++i) {
         const auto& coordinate = measurement_.coordinates()[i];
         double g = 0.0;
         if (coordinate.kind == Kind::kDilation) {
-          g = coordinate.index == static_cast<Eigen::Index>(segment) ? 1.0 : 0.0;
+          g = coordinate.index == static_cast<Eigen::Index>(segment) ? 1.0 / reduction : 0.0;
         } else {
           Corrections plus = c, minus = c;
           coordinate.in(plus) += kStep;
@@ -130,6 +140,14 @@ TEST_F(OutlineOfOwnRobot, DerivativesAreThoseOfTheProjection) {
     EXPECT_GT(A.diagonal()[position(Kind::kCameraTurn, 1)], 0.0);
     EXPECT_GT(A.diagonal()[position(Kind::kJoint, roles_.head[0])], 0.0);
   }
+}
+
+TEST_F(OutlineOfOwnRobot, DerivativesAreThoseOfTheProjection) {
+  derivatives_are_those_of_the_projection();
+}
+
+TEST_F(OutlineOfReducedPictures, DerivativesAreThoseOfTheProjection) {
+  derivatives_are_those_of_the_projection();
 }
 
 TEST_F(OutlineOfOwnRobot, AtTheTruthNothingPulls) {

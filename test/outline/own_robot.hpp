@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "bodyschema/camera/picture_reduction.hpp"
 #include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/core/configuration.hpp"
 #include "bodyschema/robot/robot_model.hpp"
@@ -15,11 +16,16 @@ namespace bodyschema {
 /// Our own robot with its arm before its eyes.
 class OwnRobot : public ::testing::Test {
  protected:
-  OwnRobot()
+  /// @param reduction  of the pictures (picture_reduction)
+  explicit OwnRobot(int reduction = 1)
       : configuration_(
             Configuration::load(std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "config/icub_right/robot.yaml")),
         setup_(RobotSetup::from(configuration_.section("robot"))), robot_(setup_.load()),
-        rig_(StereoRig::from(configuration_.section("cameras"))) {}
+        rig_(StereoRig::from(configuration_.section("cameras"))) {
+    for (auto& camera : rig_.cameras) {
+      if (reduction > 1) camera.intrinsics = reduced(camera.intrinsics, reduction);
+    }
+  }
 
   /// The offsets of the paper's Table I.
   [[nodiscard]] static Eigen::VectorXd paper_offsets_rad() {

@@ -7,6 +7,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "bodyschema/bus/messages.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/simulator/simulator.hpp"
@@ -206,6 +207,54 @@ TEST_F(PipelineWithAGivenBackground, MissesTheOneOfACameraByItsKey) {
   EXPECT_THAT([&] { Pipeline(configuration("background_picture", {"vision.background_pictures.left=" + file()})); },
               testing::ThrowsMessage<ConfigurationError>(
                   HasSubstr("key 'vision.background_pictures.right' is missing; expected a file for each camera")));
+}
+
+/// Cameras of 1280x720.
+std::vector<std::string> high_definition(std::vector<std::string> more = {}) {
+  for (const std::string camera : {"left", "right"}) {
+    for (const std::string value : {"width=1280", "height=720", "fx=1029.4", "fy=1029.4", "cx=639.5", "cy=359.5"}) {
+      more.push_back("cameras." + camera + "." + value);
+    }
+  }
+  return more;
+}
+
+TEST(Pipeline, ReadsNoMorePixelsThanAreNeeded) {
+  const auto c = configuration("auto", high_definition());
+  const Pipeline all(c), needed(c, std::nullopt, PictureReading::kAsNeeded);
+  const PinholeIntrinsics sent = all.rig().cameras[0].intrinsics, read = needed.rig().cameras[0].intrinsics;
+  EXPECT_EQ(sent.width, 1280);
+  EXPECT_EQ(read.width, 640);
+  EXPECT_EQ(read.height, 360);
+  EXPECT_EQ(read.reduction, 2);
+  EXPECT_NEAR(2.0 * read.cx + 0.5, sent.cx, 1e-12);
+
+  // Messages are as large as the cameras' own pictures.
+  for (const Pipeline* pipeline : {&all, &needed}) {
+    auto stream = pipeline->make_stream();
+    bot_core::images_t message;
+    message.utime = 1;
+    message.n_images = 1;
+    message.image_types = {0};
+    message.images = {to_message(Image(1280, 720, 3), 1)};
+    stream.receive(stream.channels().cameras, encode(message));
+    EXPECT_EQ(stream.statistics().images_malformed, 0u);
+    message.images = {to_message(Image(640, 360, 3), 1)};
+    stream.receive(stream.channels().cameras, encode(message));
+    EXPECT_EQ(stream.statistics().images_malformed, 1u);
+  }
+}
+
+TEST(Pipeline, ReadsAllPixelsWhereThatIsAskedForOrComparedWithWhatOthersMade) {
+  const auto width = [](const std::string& method, std::vector<std::string> overrides) {
+    const auto c = configuration(method, high_definition(std::move(overrides)));
+    return Pipeline(c, std::nullopt, PictureReading::kAsNeeded).rig().cameras[0].intrinsics.width;
+  };
+  EXPECT_EQ(width("learned_background", {}), 640);
+  EXPECT_EQ(width("auto", {"vision.picture_size=as_sent"}), 1280);
+  EXPECT_EQ(width("auto", {"vision.edges=hard"}), 1280);
+  EXPECT_EQ(width("auto", {"estimator.mode=paper"}), 1280);
+  EXPECT_EQ(width("given", {}), 1280);
 }
 
 TEST(Pipeline, LeavesOutAPictureThatStaysTheSameWhileTheArmMoves) {

@@ -99,7 +99,9 @@ struct ImagesView {
 
 /// A received picture as 8-bit gray or RGB. A JPEG's own size is read and compared with the
 /// message's before it is decompressed.
-[[nodiscard]] DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limits = {});
+/// @param reduction  1, 2, 4 or 8, dividing the message's width and height: `out` is so much smaller (picture_reduction)
+[[nodiscard]] DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limits = {},
+                                  int reduction = 1);
 
 /// Turns a picture into a mask of exactly the values of geometry/image.hpp, in place: gray, or RGB that is gray; up to
 /// 63 is background, from 192 on robot, unknown between. A mask whose largest value is one of 1 to 63 is none (0 and 1,

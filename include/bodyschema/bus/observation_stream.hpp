@@ -63,6 +63,9 @@ class ObservationStream {
   /// Otherwise its first picture decides; another kind is refused, unless it comes for some ten seconds
   /// (300 pictures in a row), which is another camera.
   void expect_channels(std::size_t camera, int channels);
+  /// Pictures of this camera are reduced as they are unpacked (picture_reduction). Masks are not.
+  /// @param reduction  1, 2, 4 or 8, dividing both sides of its pictures
+  void reduce(std::size_t camera, int reduction);
 
   /// @param arrival_us  the caller's clock, handed through to ArrivedObservation
   /// @return whether the channel is one of our inputs
@@ -85,6 +88,7 @@ class ObservationStream {
     int type;  ///< bot_core::images_t
     int width;
     int height;
+    int reduction = 1;
     int channels = 0;  ///< of its pictures; 0: none came yet
     bool channels_given = false;
     int other_kind_in_a_row = 0;

@@ -17,6 +17,8 @@ struct PinholeIntrinsics {
   double fy = 0.0;  ///< px
   double cx = 0.0;  ///< px, OpenCV convention
   double cy = 0.0;  ///< px, OpenCV convention
+  /// So many pixels of the camera's own pictures, along each axis, are one pixel here.
+  int reduction = 1;
 
   /// Projects a point in camera coordinates (metres, z > 0) to pixels.
   [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& p_C) const {

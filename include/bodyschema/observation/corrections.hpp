@@ -15,8 +15,8 @@ struct CameraCorrection {
   Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();
   double focal_scale = 0.0;  ///< fx and fy are multiplied by 1 + this
-  double cx_px = 0.0;        ///< principal point, px
-  double cy_px = 0.0;        ///< principal point, px
+  double cx_px = 0.0;        ///< principal point, px of the camera's own pictures (PinholeIntrinsics::reduction)
+  double cy_px = 0.0;        ///< principal point, the same
   double k1 = 0.0;           ///< radial distortion, added to the camera's own
   double readout_s = 0.0;    ///< the last row of a picture is exposed this much later than the first
 };
@@ -45,7 +45,8 @@ struct ShapeCorrection {
   /// Of a segment with joints within: its core and what these joints move are 1 + this times as large, the places of
   /// the joints with them, about the core's frame.
   double size = 0.0;
-  double dilation_px = 0.0;  ///< the observed outline lies this far outside the predicted one
+  /// The observed outline lies this far outside the predicted one, px of the camera's own pictures.
+  double dilation_px = 0.0;
 };
 
 /// Everything in which the prediction of one camera's picture at one instant departs from what URDF

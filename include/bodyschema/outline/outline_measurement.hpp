@@ -78,6 +78,9 @@ class OutlineMeasurement {
   /// @param drawn  the rendered links' meshes as outlines are taken from, one per mesh of the robot
   OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
                      const JointRoles& roles, const SilhouetteModel& drawn);
+  /// For another thread: of the same robot and cameras, shares the meshes with `other`.
+  OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
+                     const JointRoles& roles, const OutlineMeasurement& other);
 
   [[nodiscard]] const Coordinates& coordinates() const { return coordinates_; }
   [[nodiscard]] RobotProjection& projection() { return projection_; }

@@ -14,7 +14,7 @@ struct HandError {
   double position_m = 0.0;    ///< distance of the hand bases
   double rotation_rad = 0.0;  ///< equation (8)
   double fingertip_m = 0.0;   ///< mean distance of the fingertips; 0 without fingertips
-  double fingertip_px = 0.0;  ///< mean distance of their projections in this camera
+  double fingertip_px = 0.0;  ///< mean distance of their projections, px of this camera's own pictures
 };
 
 /// Fingertips are those of the truth, carried by the true and by the estimated hand base, so that

@@ -24,6 +24,12 @@
 
 namespace bodyschema {
 
+/// At which size pictures are read.
+enum class PictureReading {
+  kAsSent,
+  kAsNeeded,  ///< reduced where they have more pixels than are needed (picture_reduction), as a service does
+};
+
 /// From configuration to estimates: robot, cameras, segmentation and estimator wired together.
 /// The daemon, replay and evaluation run this same object, so that a recorded log gives what the
 /// live robot gave. Called by one thread, beside which it has one of its own.
@@ -31,7 +37,10 @@ class Pipeline {
  public:
   /// Reads the whole configuration, robot and meshes, opens the silhouette engine. Throws Error.
   /// @param method  instead of the configured one, where that proved to be of no use
-  explicit Pipeline(const Configuration& configuration, std::optional<SegmentationMethod> method = std::nullopt);
+  /// @param reading  as needed: not in mode paper, nor where pictures are compared as they are with what others made
+  ///   (masks, a background picture) or have hard edges, nor with `vision.picture_size: as_sent`
+  explicit Pipeline(const Configuration& configuration, std::optional<SegmentationMethod> method = std::nullopt,
+                    PictureReading reading = PictureReading::kAsSent);
 
   /// A fresh decoder and synchroniser for this robot and rig.
   [[nodiscard]] ObservationStream make_stream() const;
@@ -81,7 +90,7 @@ class Pipeline {
   [[nodiscard]] const RobotModel& robot() const { return *robot_; }
   [[nodiscard]] std::shared_ptr<const RobotModel> shared_robot() const { return robot_; }
   [[nodiscard]] const RobotSetup& setup() const { return setup_; }
-  /// With the extended model's intrinsics, where there is one.
+  /// The cameras of the pictures as they are read, with the extended model's intrinsics, where there is one.
   [[nodiscard]] const StereoRig& rig() const { return rig_; }
   /// The extended model (robot.extended_model), if any.
   [[nodiscard]] const std::optional<ErrorModel>& error_model() const { return error_model_; }
@@ -152,6 +161,7 @@ class Pipeline {
   VisionSetup vision_;
   BusOptions bus_;
   EstimatorOptions options_;
+  StereoRig sent_;  ///< the cameras as configured
   std::shared_ptr<const RobotModel> robot_;
   std::optional<ErrorModel> error_model_;
   StereoRig rig_;

@@ -28,6 +28,9 @@ struct ContourPoint {
 class ContourExtractor {
  public:
   ContourExtractor(const SilhouetteModel& model, std::span<const PinholeIntrinsics> cameras);
+  /// For another thread: shares the meshes.
+  ContourExtractor(const ContourExtractor& other);
+  ContourExtractor& operator=(const ContourExtractor&) = delete;
   ~ContourExtractor();
   ContourExtractor(ContourExtractor&&) noexcept;
 

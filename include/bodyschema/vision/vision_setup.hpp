@@ -31,6 +31,9 @@ struct VisionSetup {
   SegmentationMethod method = SegmentationMethod::kLearnedBackground;
   EdgeKind edges = EdgeKind::kBlurred;
 
+  /// Whether a service reduces pictures with more pixels than it needs (picture_reduction).
+  bool reduces_pictures = true;
+
   /// Standard deviation of the image noise, levels; 0: estimated from the frames.
   double noise_levels = 0.0;
   /// A difference counts from this many standard deviations of the noise ...
