@@ -261,7 +261,8 @@ void jpeg(benchmark::State& state, Size size) {
   for (auto _ : state) {
     for (const auto& m : messages) {
       const ImageView view{0, 0, m.width, m.height, m.row_stride, m.pixelformat, m.data};
-      if (!unpack(view, out, {}, picture_reduction(size.width, size.height)).ok()) return state.SkipWithError("a JPEG did not decode");
+      if (!unpack(view, out, {}, picture_reduction(size.width, size.height)).ok())
+        return state.SkipWithError("a JPEG did not decode");
     }
   }
 }

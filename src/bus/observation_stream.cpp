@@ -118,7 +118,8 @@ ObservationStream::ObservationStream(const std::vector<std::string>& joint_names
       throw ConfigurationError("cameras: '" + camera.name +
                                "': a rig is one camera or two, the one with the smaller number in messages first");
     }
-    cameras_.push_back({camera.name, camera.number(), camera.intrinsics.width, camera.intrinsics.height, 1, 0, false, 0});
+    cameras_.push_back(
+        {camera.name, camera.number(), camera.intrinsics.width, camera.intrinsics.height, 1, 0, false, 0});
   }
 }
 

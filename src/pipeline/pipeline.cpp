@@ -83,8 +83,7 @@ VisionSetup by(std::optional<SegmentationMethod> method, VisionSetup vision) {
 
 }  // namespace
 
-Pipeline::Pipeline(const Configuration& configuration, std::optional<SegmentationMethod> method,
-                   PictureReading reading)
+Pipeline::Pipeline(const Configuration& configuration, std::optional<SegmentationMethod> method, PictureReading reading)
     : setup_(RobotSetup::from(configuration.section("robot"))),
       vision_(by(method, VisionSetup::from(configuration.section("vision")))),
       bus_(BusOptions::from(configuration.section("bus"))), options_(EstimatorOptions::from(configuration)),

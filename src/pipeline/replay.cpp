@@ -114,10 +114,10 @@ class Replay {
       if (seen) continue;
       const auto& camera = pipeline_.rig().cameras[c];
       if (statistics_.faults[static_cast<std::size_t>(MessageFault::kWrongSize)] > 0) {
-        throw DataError(fmt::format(
-            "{}: no picture of camera '{}' has the configured size {}x{} (cameras.{}.width, .height)",
-            options_.log.string(), camera.name, camera.intrinsics.width * camera.intrinsics.reduction,
-            camera.intrinsics.height * camera.intrinsics.reduction, camera.name));
+        throw DataError(
+            fmt::format("{}: no picture of camera '{}' has the configured size {}x{} (cameras.{}.width, .height)",
+                        options_.log.string(), camera.name, camera.intrinsics.width * camera.intrinsics.reduction,
+                        camera.intrinsics.height * camera.intrinsics.reduction, camera.name));
       }
       spdlog::warn("{}: no usable picture of camera '{}'; estimated from the other one", options_.log.string(),
                    camera.name);

@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "bodyschema/camera/picture_reduction.hpp"
+
 namespace bodyschema {
 namespace {
 
@@ -18,6 +20,15 @@ TEST(SearchRenders, LargerPicturesAreLookedAtLessOften) {
   EXPECT_GE(search_renders(options, two(1280, 720)), 2 * 16);
   EXPECT_LT(search_renders(options, two(1280, 720)), 3 * 16);
   EXPECT_GT(search_renders(options, two(640, 480)), search_renders(options, two(1280, 720)));
+}
+
+// An outline has as many points whatever the picture's size.
+TEST(SearchRenders, ReducedPicturesAreLookedAtNoMoreOften) {
+  const EstimatorOptions options;
+  auto cameras = two(1280, 720);
+  const int as_sent = search_renders(options, cameras);
+  for (auto& camera : cameras) camera = reduced(camera, 2);
+  EXPECT_EQ(search_renders(options, cameras), as_sent);
 }
 
 TEST(SearchRenders, AreAsConfigured) {

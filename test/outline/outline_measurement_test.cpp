@@ -109,7 +109,8 @@ void OutlineOfOwnRobot::derivatives_are_those_of_the_projection() {
       const Eigen::Vector3d p_B =
           links[point.part].linear().transpose() * (point.p_C - origins[point.part]) / scales[point.part];
       // The point is where it is said to be.
-      const Eigen::Vector2d own = appears(p_B, point.part, c, camera) + c.shapes[segment].dilation_px / reduction * point.normal;
+      const Eigen::Vector2d own =
+          appears(p_B, point.part, c, camera) + c.shapes[segment].dilation_px / reduction * point.normal;
       ASSERT_LT((own - point.pixel).norm(), 0.02);
       ASSERT_NEAR(point.normal.norm(), 1.0, 1e-6);
       for (std::size_t i = 0; i < all_.size(); ++i) {

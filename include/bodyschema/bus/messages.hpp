@@ -99,7 +99,8 @@ struct ImagesView {
 
 /// A received picture as 8-bit gray or RGB. A JPEG's own size is read and compared with the
 /// message's before it is decompressed.
-/// @param reduction  1, 2, 4 or 8, dividing the message's width and height: `out` is so much smaller (picture_reduction)
+/// @param reduction  1, 2, 4 or 8, dividing the message's width and height: `out` is so much smaller
+/// (picture_reduction)
 [[nodiscard]] DecodeResult unpack(const ImageView& view, Image& out, const DecodeLimits& limits = {},
                                   int reduction = 1);
 

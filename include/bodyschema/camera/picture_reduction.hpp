@@ -9,9 +9,9 @@
 namespace bodyschema {
 
 /// By how much pictures of this size are reduced before they are looked at, along each axis: 1, 2, 4 or 8. They are
-/// halved as long as both sides can be and twice the pixels of a 320x240 picture are left: outlines are measured to some
-/// hundredths of these, and what a picture costs grows with its pixels. 640x480 and 960x540 stay as they are, 1280x720
-/// becomes 640x360.
+/// halved as long as both sides can be and twice the pixels of a 320x240 picture are left: outlines are measured to
+/// some hundredths of these, and what a picture costs grows with its pixels. 640x480 and 960x540 stay as they are,
+/// 1280x720 becomes 640x360.
 [[nodiscard]] int picture_reduction(int width, int height);
 
 /// The camera that sees the reduced pictures: each pixel stands for n x n of `camera`'s, whose sides n divides. Its
