@@ -216,17 +216,11 @@ void FrameModel::ask(const Frame& frame, std::span<const OutlineSearch> search) 
                                 frame.exposures[c].at.encoder, question.corrections, c, question.active, beside,
                                 question.answer);
   };
-  std::future<void> second;
-  if (worker_ != nullptr && questions_[1].asked) second = worker_->begin([&] { ask_camera(1); });
-  std::exception_ptr failed;
-  try {
+  if (worker_ != nullptr && questions_[1].asked) {
+    worker_->share([&] { ask_camera(0); }, [&] { ask_camera(1); });
+  } else {
     ask_camera(0);
-  } catch (...) {
-    failed = std::current_exception();  // the other thread is still at work on what is ours
   }
-  if (second.valid()) second.wait();
-  if (failed) std::rethrow_exception(failed);
-  if (second.valid()) second.get();
 }
 
 void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::span<const OutlineSearch> search,

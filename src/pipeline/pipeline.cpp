@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <exception>
 #include <stdexcept>
 
 #include "bodyschema/camera/lens_knowledge.hpp"
@@ -224,21 +223,11 @@ void Pipeline::Look::leave_out_all_but(const BinaryMask& seen) {
 /// Each camera by itself: the other thread takes the second's share where it has nothing else to do.
 template <class OfCamera>
 void Pipeline::for_each_eye(const OfCamera& of_camera, bool alone) {
-  if (!alone) {
-    for (std::size_t c = 0; c < eyes_.size(); ++c) of_camera(c);
+  if (alone && eyes_.size() > 1) {
+    worker_->share([&] { of_camera(std::size_t{0}); }, [&] { of_camera(std::size_t{1}); });
     return;
   }
-  std::future<void> second;
-  if (eyes_.size() > 1) second = worker_->begin([&] { of_camera(std::size_t{1}); });
-  std::exception_ptr failed;
-  try {
-    of_camera(std::size_t{0});
-  } catch (...) {
-    failed = std::current_exception();  // the other thread is still at work on what is ours
-  }
-  if (second.valid()) second.wait();
-  if (failed) std::rethrow_exception(failed);
-  if (second.valid()) second.get();
+  for (std::size_t c = 0; c < eyes_.size(); ++c) of_camera(c);
 }
 
 /// All that can be done before the estimate of the observation before is known; asks nothing of the

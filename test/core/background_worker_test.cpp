@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 namespace bodyschema {
@@ -21,6 +23,29 @@ TEST(BackgroundWorker, GivesBackWhatWasReturnedOrThrown) {
   auto good = worker.begin([] { return 7; });
   EXPECT_THROW(failing.get(), std::runtime_error);
   EXPECT_EQ(good.get(), 7);
+}
+
+TEST(BackgroundWorker, SharesTwoPiecesOfWork) {
+  BackgroundWorker worker;
+  std::thread::id first, second;
+  worker.share([&] { first = std::this_thread::get_id(); }, [&] { second = std::this_thread::get_id(); });
+  EXPECT_EQ(first, std::this_thread::get_id());
+  EXPECT_NE(second, first);
+}
+
+TEST(BackgroundWorker, WaitsForTheOtherPieceWhateverOneThrows) {
+  BackgroundWorker worker;
+  bool done = false;
+  const auto slow = [&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    done = true;
+  };
+  const auto fail = [] { throw std::runtime_error("broken"); };
+  EXPECT_THROW(worker.share(fail, slow), std::runtime_error);
+  EXPECT_TRUE(done);
+  done = false;
+  EXPECT_THROW(worker.share(slow, fail), std::runtime_error);
+  EXPECT_TRUE(done);
 }
 
 TEST(BackgroundWorker, DoesAllInOrderBeforeItEnds) {

@@ -39,6 +39,21 @@ class BackgroundWorker {
     return result;
   }
 
+  /// Two pieces of work at once: `mine` by the caller, `yours` by this thread; returns when both are done. Throws what
+  /// `mine` threw, otherwise what `yours` did.
+  template <class Mine, class Yours>
+  void share(const Mine& mine, const Yours& yours) {
+    std::future<void> second = begin([&yours] { yours(); });
+    struct Wait {
+      const std::future<void>& second;
+      ~Wait() {
+        if (second.valid()) second.wait();  // it is still at work on what the caller holds
+      }
+    } const wait{second};
+    mine();
+    second.get();
+  }
+
  private:
   void live() {
     std::unique_lock lock(mutex_);
