@@ -12,6 +12,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   view.pixelformat = bot_core::image_t::PIXEL_FORMAT_MJPEG;
   view.data = Bytes(data, size);
   Image image;
-  (void)unpack(view, image);
+  for (const int reduction : {1, 2, 4, 8}) (void)unpack(view, image, {}, reduction);
   return 0;
 }
