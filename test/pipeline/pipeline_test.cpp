@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "bodyschema/bus/messages.hpp"
+#include "bodyschema/camera/picture_reduction.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/simulator/simulator.hpp"
@@ -24,8 +25,7 @@ Configuration configuration(const std::string& method, std::vector<std::string> 
 }
 
 /// A learned background, then a short reach.
-std::vector<Observation> observations() {
-  const Configuration c = configuration("learned_background");
+std::vector<Observation> observations(const Configuration& c = configuration("learned_background")) {
   const RobotSetup setup = RobotSetup::from(c.section("robot"));
   simulator::SimulationPlan plan;
   plan.seed = 5;
@@ -243,6 +243,27 @@ TEST(Pipeline, ReadsNoMorePixelsThanAreNeeded) {
     stream.receive(stream.channels().cameras, encode(message));
     EXPECT_EQ(stream.statistics().images_malformed, 1u);
   }
+}
+
+// An estimate as good, of a quarter of the pixels.
+TEST(Pipeline, PicturesThatAreReadReducedTellTheSame) {
+  const auto c = configuration("learned_background", high_definition());
+  const auto seen = observations(c);
+  std::vector<Pose> hands;
+  for (const auto reading : {PictureReading::kAsSent, PictureReading::kAsNeeded}) {
+    Pipeline pipeline(c, std::nullopt, reading);
+    const int n = pipeline.rig().cameras[0].intrinsics.reduction;
+    Estimate last;
+    for (Observation observation : seen) {
+      for (auto& camera : observation.cameras) camera->image = reduced(camera->image, n);
+      last = pipeline.process(observation);
+    }
+    ASSERT_EQ(last.X_CP.size(), 2u);
+    EXPECT_GT((last.X_CP[0].translation() - last.X_CP_nominal[0].translation()).norm(), 5e-3) << "5 and 2 deg off";
+    hands.push_back(last.X_CP[0]);
+  }
+  EXPECT_LT((hands[0].translation() - hands[1].translation()).norm(), 1e-3);
+  EXPECT_LT(rotation_distance(hands[0].linear(), hands[1].linear()), radians(0.5));
 }
 
 TEST(Pipeline, ReadsAllPixelsWhereThatIsAskedForOrComparedWithWhatOthersMade) {
