@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <thread>
 #include <utility>
@@ -95,9 +96,10 @@ class Calibrator {
                                             : given() ? kReadAgain
                                                       : kShown,
                                     .quiet = options_.quiet},
-                                   false);
+                                   estimator_can_begin());
     refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);
     log_ = &watched.pictures;
+    estimator_at_ = watched.offsets_at_start;
     if (!options_.quiet) bar_.emplace("calibration", 100);
     std::optional<RawPictures> masks;
     if (raw()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
@@ -178,6 +180,11 @@ class Calibrator {
       starts_ = std::move(rigs);
       progress(0.3);
     }
+  }
+
+  /// Whether the running estimator, whose particles find the way from afar, can look for the robot.
+  [[nodiscard]] bool estimator_can_begin() const {
+    return !raw() && std::none_of(rig_.cameras.begin(), rig_.cameras.end(), to_be_searched);
   }
 
   // --- pictures without masks -------------------------------------------------------------------
@@ -331,10 +338,20 @@ class Calibrator {
   }
 
   [[nodiscard]] BatchFit from(LogFit& fit, const std::vector<std::size_t>& pictures, double from_px) {
-    const auto roles = log_->roles();
-    const auto beliefs = Beliefs::from(configuration_, roles, rig_, pipeline_.options());
-    BatchFit batch(fit, State(roles, beliefs.state), beliefs.tolerances, settings());
+    BatchFit batch = started(fit, {});
     batch.run(from_px, pictures);
+    return batch;
+  }
+
+  /// From where the running estimator had come to.
+  [[nodiscard]] BatchFit from_the_estimator(LogFit& fit, const std::vector<std::size_t>& pictures) {
+    BatchFit batch = started(fit, {});
+    Eigen::VectorXd x = batch.state().x();
+    for (const auto& [joint, offset] : estimator_at_) {
+      if (const auto at = batch.state().find("joint_offset", {joint, ""}, 0); at >= 0) x[at] = offset;
+    }
+    batch.start_at(x);
+    batch.run(0.0, pictures);
     return batch;
   }
 
@@ -345,16 +362,22 @@ class Calibrator {
     std::vector<CalibratedView> views;
   };
 
-  /// What the places where cameras may be end at, each once, the best first. Which that is, some pictures tell.
+  /// Starts that are compared: places where cameras may be, and where the estimator had the robot.
+  [[nodiscard]] std::size_t start_count() const { return starts_.size() + (estimator_at_.empty() ? 0 : 1); }
+
+  /// What the starts end at, each once, the best first. Which that is, some pictures tell.
   std::vector<Answer> answers(LogFit& fit) {
-    const auto some = starts_.size() > 1 ? spread_pictures() : std::vector<std::size_t>{};
+    const auto some = start_count() > 1 ? spread_pictures() : std::vector<std::size_t>{};
     std::vector<Answer> list;
-    for (const auto& rig : starts_) {
-      use(fit, rig);
-      BatchFit batch = from(fit, some, kFrom_px);
+    const auto add = [&](const StereoRig& rig, BatchFit batch) {
       auto places = views(fit, batch);
       list.push_back({rig, std::make_unique<BatchFit>(std::move(batch)), std::move(places)});
+    };
+    for (const auto& rig : starts_) {
+      use(fit, rig);
+      add(rig, from(fit, some, kFrom_px));
     }
+    if (!estimator_at_.empty()) add(rig_, from_the_estimator(fit, some));
     return once_each(std::move(list));
   }
 
@@ -368,7 +391,7 @@ class Calibrator {
     use(fit, answers.front().rig);
     std::optional<BatchFit> best(std::move(*answers.front().fit));
     if (!last) with_masks_anew(*masks, fit, best, kReachesMoved.back());
-    if (!masks && starts_.size() > 1 && !spread_pictures().empty()) best->run(0.0, {});
+    if (!masks && start_count() > 1 && !spread_pictures().empty()) best->run(0.0, {});
     return std::move(*best);
   }
 
@@ -887,8 +910,9 @@ class Calibrator {
   StereoRig rig_;
   PictureLog* log_ = nullptr;
   std::vector<StereoRig> starts_;
-  std::string implausible_;  ///< a cause that no robot has, as a diagnosis words it
-  std::string unsettled_;    ///< a joint whose offset depends on how masks were made
+  std::map<std::string, double> estimator_at_;  ///< rad, by joint: where the running estimator had come to; or empty
+  std::string implausible_;                     ///< a cause that no robot has, as a diagnosis words it
+  std::string unsettled_;                       ///< a joint whose offset depends on how masks were made
   double believed_px_ = kAnywhere_px;
   std::vector<bool> loose_;  ///< parts that are drawn and have no say
   struct LeftOut {
