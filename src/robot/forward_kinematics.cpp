@@ -1,6 +1,7 @@
 #include "bodyschema/robot/forward_kinematics.hpp"
 
 #include <cassert>
+#include <limits>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
@@ -11,7 +12,9 @@ namespace bodyschema {
 struct ForwardKinematics::Impl {
   std::shared_ptr<const RobotModel> model;
   std::vector<TreeNode> nodes;           // the needed part of the tree, parents first, parent renumbered
-  std::vector<KDL::Frame> X_WN;          // pose of each node at the last compute
+  std::vector<double> value;             // of each node's joint at the last compute
+  std::vector<KDL::Frame> X_PN, X_WN;    // pose of each node then, in its parent and in the world
+  std::vector<bool> moved;               // whether the last compute changed X_WN
   std::vector<int> node_of_link;         // by position in the constructor's list
   std::vector<int> node_of_joint;        // by joint, -1 where not needed
   std::vector<std::vector<bool>> moves;  // [joint][link]
@@ -61,7 +64,10 @@ ForwardKinematics::ForwardKinematics(std::shared_ptr<const RobotModel> model, st
       node.parent = renumber[static_cast<std::size_t>(node.parent)];
     }
   }
+  impl_->value.resize(impl_->nodes.size(), std::numeric_limits<double>::quiet_NaN());
+  impl_->X_PN.resize(impl_->nodes.size());
   impl_->X_WN.resize(impl_->nodes.size());
+  impl_->moved.resize(impl_->nodes.size());
   for (const int target : targets) {
     impl_->node_of_link.push_back(renumber[static_cast<std::size_t>(target)]);
   }
@@ -77,10 +83,18 @@ ForwardKinematics::ForwardKinematics(ForwardKinematics&&) noexcept = default;
 void ForwardKinematics::compute(const Eigen::Ref<const Eigen::VectorXd>& q, std::span<Pose> X_WB) {
   assert(q.size() == impl_->model->joint_count());
   assert(X_WB.size() == impl_->node_of_link.size());
+  // Particles of one picture differ in the arm alone: torso, head and fixed joints are where they were.
   for (std::size_t n = 0; n < impl_->nodes.size(); ++n) {
     const TreeNode& node = impl_->nodes[n];
-    const KDL::Frame X_PN = node.segment.pose(node.joint_value(q));
-    impl_->X_WN[n] = node.parent < 0 ? X_PN : impl_->X_WN[static_cast<std::size_t>(node.parent)] * X_PN;
+    const auto parent = static_cast<std::size_t>(node.parent);
+    const double value = node.joint_value(q);
+    const bool turned = value != impl_->value[n];
+    if (turned) {
+      impl_->value[n] = value;
+      impl_->X_PN[n] = node.segment.pose(value);
+    }
+    impl_->moved[n] = turned || (node.parent >= 0 && impl_->moved[parent]);
+    if (impl_->moved[n]) impl_->X_WN[n] = node.parent < 0 ? impl_->X_PN[n] : impl_->X_WN[parent] * impl_->X_PN[n];
   }
   for (std::size_t l = 0; l < X_WB.size(); ++l) {
     const KDL::Frame& X = impl_->X_WN[static_cast<std::size_t>(impl_->node_of_link[l])];
