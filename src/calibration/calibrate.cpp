@@ -82,13 +82,16 @@ constexpr std::size_t kShown = 12;                 ///< ... of any other, for th
 
 class Calibrator {
  public:
-  Calibrator(const Configuration& configuration, const CalibrationOptions& options)
-      : configuration_(configuration), options_(options), pipeline_(configuration), rig_(pipeline_.rig()) {
+  /// @param method  instead of the configured one
+  Calibrator(const Configuration& configuration, const CalibrationOptions& options,
+             std::optional<SegmentationMethod> method = std::nullopt)
+      : configuration_(configuration), options_(options), pipeline_(configuration, method), rig_(pipeline_.rig()) {
     configuration.reject_unknown_keys();
     make_folder(options.out);
   }
 
-  Calibration run() {
+  /// @return none where cameras turned before a room and the method takes its background for what it was before
+  std::optional<Calibration> run() {
     WatchedLog watched = watch_log(pipeline_,
                                    {.log = options_.log,
                                     .picture_rate_hz = options_.picture_rate_hz,
@@ -97,12 +100,13 @@ class Calibrator {
                                                       : kShown,
                                     .quiet = options_.quiet},
                                    estimator_can_begin());
+    if (watched.background_turned) return std::nullopt;
     refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);
     log_ = &watched.pictures;
     estimator_at_ = watched.offsets_at_start;
     if (!options_.quiet) bar_.emplace("calibration", 100);
     std::optional<RawPictures> masks;
-    if (raw()) masks.emplace(*log_, VisionSetup::from(configuration_.section("vision")), watched.kept);
+    if (raw()) masks.emplace(*log_, pipeline_.vision(), watched.kept);
     loose_ = loose_fingers(*log_, Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options()));
     if (masks) believed_px_ = believed_px();
     const bool rough = believed_px_ > kRough_px || hardly_known();
@@ -307,7 +311,7 @@ class Calibrator {
     });
     const bool credible = implausible_.empty() && beyond_belief(best).empty();  // what is not, is not to be applied
     if (!pictures || !credible || !is_near(best)) return;
-    RawPictures masks(*log_, VisionSetup::from(configuration_.section("vision")), kept);
+    RawPictures masks(*log_, pipeline_.vision(), kept);
     std::optional<PictureLog> given;
     std::optional<BatchFit> own(best);
     for (const double reach_px : kReachesAgain) {
@@ -939,7 +943,14 @@ const char* to_string(CalibrationState state) {
 }
 
 Calibration calibrate(const Configuration& configuration, const CalibrationOptions& options) {
-  return Calibrator(configuration, options).run();
+  if (auto result = Calibrator(configuration, options).run()) return std::move(*result);
+  spdlog::warn("{}: a camera turned before the background that was learned: once more, as by vision.method: statistics",
+               options.log.string());
+  auto result = Calibrator(configuration, options, SegmentationMethod::kStatistics).run();
+  result->remarks.push_back(
+      "a camera turned before a room, and a learned background is of no use then: masks were looked for around the "
+      "predicted robot, as by vision.method: statistics");
+  return std::move(*result);
 }
 
 }  // namespace bodyschema

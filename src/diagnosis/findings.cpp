@@ -533,14 +533,15 @@ void Findings::find_class(const Reduced& reduced, const std::vector<Eigen::Index
     const auto other = base.heldout(rival);
     if (alone - other.total() < limits::kRivalShare * gain) continue;
     if (worse_by(other, with) > student_quantile(limits::kRivalTail, dof)) continue;
-    // One that can say the same and more besides is no other explanation: what is left of the cause beside it?
+    // One that can say the same and more besides is no other explanation: what is left of the cause beside it? (A curve
+    // that is nearly straight where the joint moved is one: elsewhere it is not.)
     if (rival.size() > own_columns) {
       Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(own_columns, rival.size());
       for (std::size_t b = 0; b < base.blocks(); ++b) shared += candidate.columns.B[b](columns, Eigen::all);
       const auto own_scores = base.score(own);
       const Eigen::MatrixXd cross = shared - own_scores.Y.transpose() * sum_of(rival.B);
       const Eigen::MatrixXd left = own_scores.S - cross * scores.S.ldlt().solve(cross.transpose());
-      if (left.diagonal().cwiseQuotient(own_scores.S.diagonal()).maxCoeff() < limits::kSameChange) continue;
+      if (left.diagonal().cwiseQuotient(own_scores.S.diagonal()).maxCoeff() < limits::kOneChange) continue;
     }
     cause.same.push_back(candidate.cause);
   }

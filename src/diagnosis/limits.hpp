@@ -22,11 +22,12 @@ constexpr double kRough_px = 1.5;  ///< px of a 320x240 picture: the roughest ou
 constexpr double kLostContrast = 0.5;  ///< between the shares of two parts of the log that are seen
 
 // Statistical.
-constexpr double kRivalTail = 0.02;       ///< two-sided, Student's t of paired blocks: clearly worse than the best
-constexpr double kRivalShare = 0.5;       ///< of the best one's gain: less explains something else
-constexpr double kAlikeShare = 0.1;       ///< of a gain: of causes that explain so much alike the simplest is taken
-constexpr double kConfidence = 0.05;      ///< two-sided, of intervals
-constexpr double kSameChange = 1e-3;      ///< share of a column that another cause cannot make up for: it is the same
+constexpr double kRivalTail = 0.02;   ///< two-sided, Student's t of paired blocks: clearly worse than the best
+constexpr double kRivalShare = 0.5;   ///< of the best one's gain: less explains something else
+constexpr double kAlikeShare = 0.1;   ///< of a gain: of causes that explain so much alike the simplest is taken
+constexpr double kConfidence = 0.05;  ///< two-sided, of intervals
+constexpr double kSameChange = 1e-3;  ///< share of a column that another cause cannot make up for: it is the same
+constexpr double kOneChange = 1e-5;   ///< ... so little, and both say one change in two ways, wherever the joint goes
 constexpr double kNeighboursAlike = 0.3;  ///< correlation of neighbouring blocks: they are made longer
 constexpr double kLeastGain = 1e-3;       ///< share of the misfit: points of an outline come and go
 constexpr double kGenericGain = 2.0;      ///< a free curve must explain so much more than any known cause

@@ -314,26 +314,37 @@ double Record::size() const {
   return held ? 1e3 : std::max(size_mm / kMatters_mm, size_px / kMatters_px);
 }
 
+std::vector<DiagnosedCause> stated(const Outcome& o) {
+  const auto& verdict = o.report.verdict;
+  if (verdict != "named" && verdict != "class" && verdict != "none") return {};
+  std::vector<DiagnosedCause> list;
+  if (verdict != "none") list = o.report.causes;
+  list.insert(list.end(), o.report.estimated.begin(), o.report.estimated.end());
+  return list;
+}
+
 bool is_named(const Outcome& o) {
-  return o.report.verdict == "named" || o.report.verdict == "class";
+  return !stated(o).empty();
 }
 
 bool is_found(const Outcome& o, std::size_t fault) {
   if (is_held(o.faults[fault])) return !o.report.not_in_model.empty();
-  return is_named(o) && std::any_of(o.report.causes.begin(), o.report.causes.end(), [&](const DiagnosedCause& cause) {
-           return std::any_of(cause.same.begin(), cause.same.end(),
-                              [&](const auto& name) { return among(o.answers[fault], name); });
-         });
+  const auto list = stated(o);
+  return std::any_of(list.begin(), list.end(), [&](const DiagnosedCause& cause) {
+    return std::any_of(cause.same.begin(), cause.same.end(),
+                       [&](const auto& name) { return among(o.answers[fault], name); });
+  });
 }
 
 bool is_first(const Outcome& o) {
   if (is_held(o.faults[0])) return is_found(o, 0);
-  return is_named(o) && !o.report.causes.empty() && among(o.answers[0], o.report.causes.front().cause);
+  const auto list = stated(o);
+  return !list.empty() && among(o.answers[0], list.front().cause);
 }
 
 bool is_wrong(const Outcome& o) {
-  if (!is_named(o)) return false;
-  return std::any_of(o.report.causes.begin(), o.report.causes.end(), [&](const DiagnosedCause& cause) {
+  const auto list = stated(o);
+  return std::any_of(list.begin(), list.end(), [&](const DiagnosedCause& cause) {
     return std::none_of(o.answers.begin(), o.answers.end(), [&](const RightAnswers& answers) {
       return std::any_of(cause.same.begin(), cause.same.end(), [&](const auto& name) { return among(answers, name); });
     });
@@ -357,16 +368,16 @@ namespace {
 
 bool names_a_large_gain(const Outcome& o) {
   constexpr double kLarge = 0.05;
-  return is_named(o) && std::any_of(o.report.causes.begin(), o.report.causes.end(),
-                                    [](const DiagnosedCause& c) { return c.heldout_gain > kLarge; });
+  const auto list = stated(o);
+  return std::any_of(list.begin(), list.end(), [](const DiagnosedCause& c) { return c.heldout_gain > kLarge; });
 }
 
 Json sizes_of(const Outcome& o) {
   Json sizes = Json::array();
-  if (!is_named(o)) return sizes;
+  const auto list = stated(o);
   for (std::size_t f = 0; f < o.faults.size(); ++f) {
     const auto& fault = o.faults[f];
-    for (const auto& cause : o.report.causes) {
+    for (const auto& cause : list) {
       // Millimetres of a cover are not the pixels of its outline.
       if (!among(o.answers[f], cause.cause) || cause.cause.name != fault.name) continue;
       if (cause.parameters.size() != 1 || fault.value() == 0.0) continue;
@@ -471,7 +482,9 @@ Json line_of(const Outcome& o) {
     faults.push_back(o.faults[f].text());
     found.push_back(is_found(o, f));
   }
-  for (const auto& c : o.report.causes) {
+  auto listed = o.report.causes;
+  listed.insert(listed.end(), o.report.estimated.begin(), o.report.estimated.end());
+  for (const auto& c : listed) {
     Json names = Json::array();
     for (const auto& name : c.same) names.push_back(name.text());
     answer.push_back({{"sentence", c.sentence}, {"class", names}, {"z", c.z}, {"gain", c.heldout_gain}});

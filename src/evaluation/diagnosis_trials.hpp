@@ -51,7 +51,10 @@ struct Drawn {
 /// Single causes of covers, cameras and held things; a mask is the robot's alone, and no held thing shows in it.
 std::vector<Drawn> covers_and_cameras(bool masks);
 
-/// Whether the answer stands behind what it lists.
+/// What the answer stands behind: the causes that it names, and of what is estimated in any case what it says that the
+/// pictures ask for.
+std::vector<DiagnosedCause> stated(const Outcome& o);
+/// Whether there is any.
 bool is_named(const Outcome& o);
 /// The fault is in the class of some cause that is named; a thing that is held is said to be there.
 bool is_found(const Outcome& o, std::size_t fault);

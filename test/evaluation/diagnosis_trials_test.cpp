@@ -44,6 +44,23 @@ TEST(DiagnosisTrials, WhatIsNamedIsRightOrWrong) {
   EXPECT_FALSE(is_wrong(second));
 }
 
+/// A neck that stands off is in the state of every log: the answer says so beside "none", rightly or wrongly.
+TEST(DiagnosisTrials, WhatIsSaidOfTheStateCounts) {
+  const CauseName neck{"head_offset", "neck_pitch", ""};
+  auto right = outcome("head_offset:joint=neck_pitch,value=2", {neck}, {});
+  right.report.estimated = {named(neck)};
+  EXPECT_TRUE(is_named(right) && is_found(right, 0) && is_first(right));
+  EXPECT_FALSE(is_wrong(right));
+  auto wrong = outcome("latency:value=40", {kLatency}, {named(kLatency)});
+  wrong.report.estimated = {named(neck)};
+  EXPECT_TRUE(is_first(wrong) && is_wrong(wrong));
+  Outcome healthy;
+  healthy.report.verdict = "none";
+  EXPECT_FALSE(is_named(healthy));
+  healthy.report.estimated = {named(neck)};
+  EXPECT_TRUE(is_named(healthy));
+}
+
 TEST(DiagnosisTrials, OfACoverThePartIsTheAnswer) {
   EXPECT_TRUE(is_first(outcome("cover_dilation:part=hand,value=2", {kCover, kBias}, {named(kCover)})));
 }
