@@ -88,6 +88,10 @@ class Calibrator {
       : configuration_(configuration), options_(options), pipeline_(configuration, method), rig_(pipeline_.rig()) {
     configuration.reject_unknown_keys();
     make_folder(options.out);
+    if (!method) return;
+    result_.remarks.push_back(
+        "a camera turned before a room, and a learned background is of no use then: masks were looked for around the "
+        "predicted robot, as by vision.method: statistics");
   }
 
   /// @return none where cameras turned before a room and the method takes its background for what it was before
@@ -946,11 +950,7 @@ Calibration calibrate(const Configuration& configuration, const CalibrationOptio
   if (auto result = Calibrator(configuration, options).run()) return std::move(*result);
   spdlog::warn("{}: a camera turned before the background that was learned: once more, as by vision.method: statistics",
                options.log.string());
-  auto result = Calibrator(configuration, options, SegmentationMethod::kStatistics).run();
-  result->remarks.push_back(
-      "a camera turned before a room, and a learned background is of no use then: masks were looked for around the "
-      "predicted robot, as by vision.method: statistics");
-  return std::move(*result);
+  return std::move(*Calibrator(configuration, options, SegmentationMethod::kStatistics).run());
 }
 
 }  // namespace bodyschema

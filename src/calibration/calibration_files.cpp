@@ -200,6 +200,13 @@ std::vector<RosCamera> ros_cameras_of(const Calibration& c, const StereoRig& rig
   return cameras;
 }
 
+/// Remarks but for those that a table of joints has beside each.
+std::vector<std::string> notes_of(const Calibration& c) {
+  std::vector<std::string> notes = c.remarks;
+  for (const auto& joint : c.joints) std::erase(notes, joint.name + ": " + joint.untold_why);
+  return notes;
+}
+
 void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, const std::vector<Observation>& kept,
                 const CalibrationOptions& options) {
   Report page("Calibration of " + options.log.filename().string());
@@ -237,6 +244,10 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
     std::vector<std::string> items;
     for (const auto& effect : c.effects) items.push_back(effect.sentence);
     page.list(items);
+  }
+  if (const auto notes = notes_of(c); !notes.empty()) {
+    page.heading("What limits it");
+    page.list(notes);
   }
   page.heading("How well it fits");
   rows = {{"before", fmt::format("{:.2f}", c.outline_px.before)}, {"after", fmt::format("{:.2f}", c.outline_px.after)}};
@@ -328,6 +339,7 @@ std::string to_table(const Calibration& c) {
         fmt::format("\n{:<36} {:>9.3f} {:<3} sd {:.3f} (believed {:.3f})", p.name, p.value, p.unit, p.sd, p.prior_sd);
   }
   for (const auto& effect : c.effects) text += "\nalso: " + effect.sentence;
+  for (const auto& note : notes_of(c)) text += "\nnote: " + note;
   text += fmt::format("\n\noutlines, median distance: {:.2f} px before, {:.2f} px after{}\n", c.outline_px.before,
                       c.outline_px.after,
                       c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out (worst fifth {:.2f})",

@@ -256,6 +256,12 @@ TEST_F(Calibrated, AHeadThatTurnsBeforeARoomIsCalibratedWithoutALearnedBackgroun
   const auto result =
       expect_good_and_right({{"r_shoulder_roll", 2.0}, {"r_elbow", -3.0}, {"r_wrist_yaw", 2.0}}, "head", 5.0, 2.0);
   EXPECT_THAT(result.remarks, ::testing::Contains(HasSubstr("a camera turned before a room")));
+  EXPECT_THAT(to_table(result), HasSubstr("note: a camera turned before a room"));
+  for (const char* file : {"calibration.json", "report.html"}) {
+    std::ifstream in(folder_ / "out" / file);
+    EXPECT_THAT(std::string(std::istreambuf_iterator<char>(in), {}), HasSubstr("a camera turned before a room"))
+        << file;
+  }
 }
 
 /// A mount trades with all that a result which is not good has wrong, whatever its standard deviation.
