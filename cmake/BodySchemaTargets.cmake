@@ -65,8 +65,8 @@ function(bodyschema_warnings target)
 endfunction()
 
 # bodyschema_precompile(<test program>)
-#   Half of a test's compile time is Eigen's and GoogleTest's headers: they are read once for all. Where ccache compiles,
-#   they are not, as it keeps nothing of such sources unless told to be sloppy.
+#   A fifth of a test's compile time is Eigen's and GoogleTest's headers: they are read once for all. Where ccache
+#   compiles they are not, as it keeps nothing of such sources unless told to be sloppy.
 function(bodyschema_precompile target)
   if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU" OR CMAKE_CXX_COMPILER_LAUNCHER)
     return()

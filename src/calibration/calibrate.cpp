@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <thread>
 #include <utility>
@@ -88,13 +87,10 @@ class Calibrator {
       : configuration_(configuration), options_(options), pipeline_(configuration, method), rig_(pipeline_.rig()) {
     configuration.reject_unknown_keys();
     make_folder(options.out);
-    if (!method) return;
-    result_.remarks.push_back(
-        "a camera turned before a room, and a learned background is of no use then: masks were looked for around the "
-        "predicted robot, as by vision.method: statistics");
+    if (method) result_.remarks.push_back(kReadWithoutBackground);
   }
 
-  /// @return none where cameras turned before a room and the method takes its background for what it was before
+  /// @return none where a camera turned, and the learned background with it
   std::optional<Calibration> run() {
     WatchedLog watched = watch_log(pipeline_,
                                    {.log = options_.log,
@@ -107,7 +103,7 @@ class Calibrator {
     if (watched.background_turned) return std::nullopt;
     refuse_unusable(watched, options_.log, pipeline_.bus().channels(), kAdvice);
     log_ = &watched.pictures;
-    estimator_at_ = watched.offsets_at_start;
+    watched_ = &watched;
     if (!options_.quiet) bar_.emplace("calibration", 100);
     std::optional<RawPictures> masks;
     if (raw()) masks.emplace(*log_, pipeline_.vision(), watched.kept);
@@ -354,11 +350,7 @@ class Calibrator {
   /// From where the running estimator had come to.
   [[nodiscard]] BatchFit from_the_estimator(LogFit& fit, const std::vector<std::size_t>& pictures) {
     BatchFit batch = started(fit, {});
-    Eigen::VectorXd x = batch.state().x();
-    for (const auto& [joint, offset] : estimator_at_) {
-      if (const auto at = batch.state().find("joint_offset", {joint, ""}, 0); at >= 0) x[at] = offset;
-    }
-    batch.start_at(x);
+    batch.start_at(at_start(*watched_, batch.state()));
     batch.run(0.0, pictures);
     return batch;
   }
@@ -371,7 +363,9 @@ class Calibrator {
   };
 
   /// Starts that are compared: places where cameras may be, and where the estimator had the robot.
-  [[nodiscard]] std::size_t start_count() const { return starts_.size() + (estimator_at_.empty() ? 0 : 1); }
+  [[nodiscard]] std::size_t start_count() const {
+    return starts_.size() + (watched_->offsets_at_start.empty() ? 0 : 1);
+  }
 
   /// What the starts end at, each once, the best first. Which that is, some pictures tell.
   std::vector<Answer> answers(LogFit& fit) {
@@ -385,7 +379,7 @@ class Calibrator {
       use(fit, rig);
       add(rig, from(fit, some, kFrom_px));
     }
-    if (!estimator_at_.empty()) add(rig_, from_the_estimator(fit, some));
+    if (!watched_->offsets_at_start.empty()) add(rig_, from_the_estimator(fit, some));
     return once_each(std::move(list));
   }
 
@@ -916,11 +910,11 @@ class Calibrator {
   CalibrationOptions options_;
   Pipeline pipeline_;
   StereoRig rig_;
-  PictureLog* log_ = nullptr;
+  const WatchedLog* watched_ = nullptr;
+  PictureLog* log_ = nullptr;  ///< its pictures
   std::vector<StereoRig> starts_;
-  std::map<std::string, double> estimator_at_;  ///< rad, by joint: where the running estimator had come to; or empty
-  std::string implausible_;                     ///< a cause that no robot has, as a diagnosis words it
-  std::string unsettled_;                       ///< a joint whose offset depends on how masks were made
+  std::string implausible_;  ///< a cause that no robot has, as a diagnosis words it
+  std::string unsettled_;    ///< a joint whose offset depends on how masks were made
   double believed_px_ = kAnywhere_px;
   std::vector<bool> loose_;  ///< parts that are drawn and have no say
   struct LeftOut {
@@ -948,8 +942,7 @@ const char* to_string(CalibrationState state) {
 
 Calibration calibrate(const Configuration& configuration, const CalibrationOptions& options) {
   if (auto result = Calibrator(configuration, options).run()) return std::move(*result);
-  spdlog::warn("{}: a camera turned before the background that was learned: once more, as by vision.method: statistics",
-               options.log.string());
+  spdlog::warn("{}: once more: {}", options.log.string(), kReadWithoutBackground);
   return std::move(*Calibrator(configuration, options, SegmentationMethod::kStatistics).run());
 }
 

@@ -60,12 +60,7 @@ class LogDiagnosis {
           "direction of its axes wrong, or are the masks? Look at overlay_final.png of 'bodyschema replay'");
     }
     add_remarks(report);
-    if (other_masks) {
-      report.warnings.insert(
-          report.warnings.begin(),
-          "the head turned before a room, and a learned background is of no use then: masks were looked "
-          "for around the predicted robot, as by vision.method: statistics");
-    }
+    if (other_masks) report.warnings.insert(report.warnings.begin(), kReadWithoutBackground);
     if (!options_.out.empty()) {
       const auto motion = diagnosis::telling_motion(fit, report);
       report.next_steps = next_steps(report, motion.has_value());
@@ -118,12 +113,7 @@ class LogDiagnosis {
   /// Where the estimator was when it had converged.
   [[nodiscard]] std::vector<Eigen::VectorXd> starts() const {
     if (watched_.offsets_at_start.empty()) return {};
-    const State state(watched_.pictures.roles(), pipeline_.beliefs().state);
-    Eigen::VectorXd x = state.x();
-    for (const auto& [joint, offset] : watched_.offsets_at_start) {
-      if (const auto at = state.find("joint_offset", {joint, ""}, 0); at >= 0) x[at] = offset;
-    }
-    return {x};
+    return {at_start(watched_, State(watched_.pictures.roles(), pipeline_.beliefs().state))};
   }
 
   /// The diagnosis; what it refuses is refused in the log's name.
@@ -221,7 +211,7 @@ DiagnosisReport diagnose_log(const Configuration& configuration, const LogDiagno
   {
     LogDiagnosis diagnosis(configuration, options);
     if (!diagnosis.background_turned()) return diagnosis.conclude(false);
-    spdlog::warn("{}: once more, as by vision.method: statistics", options.log.string());
+    spdlog::warn("{}: once more: {}", options.log.string(), kReadWithoutBackground);
   }
   LogDiagnosis diagnosis(configuration, options, SegmentationMethod::kStatistics);
   return diagnosis.conclude(true);

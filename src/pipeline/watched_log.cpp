@@ -158,6 +158,14 @@ class Watcher {
 
 }  // namespace
 
+Eigen::VectorXd at_start(const WatchedLog& log, const State& state) {
+  Eigen::VectorXd x = state.x();
+  for (const auto& [joint, offset] : log.offsets_at_start) {
+    if (const auto at = state.find("joint_offset", {joint, ""}, 0); at >= 0) x[at] = offset;
+  }
+  return x;
+}
+
 WatchedLog watch_log(Pipeline& pipeline, const WatchOptions& options, bool estimate_first) {
   return Watcher(pipeline, options).run(estimate_first);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include "bodyschema/bus/observation_stream.hpp"
 #include "bodyschema/evidence/picture_log.hpp"
+#include "bodyschema/evidence/state.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 
 namespace bodyschema {
@@ -30,6 +32,14 @@ struct WatchedLog {
   /// The cameras turned before a room, and the background that was learned is of no use: reading ended there.
   bool background_turned = false;
 };
+
+/// What is said of a log that was read once more, as its learned background had turned away.
+inline constexpr const char* kReadWithoutBackground =
+    "a camera turned before a room, and a learned background is of no use then: masks were looked for around the "
+    "predicted robot, as by vision.method: statistics";
+
+/// The parameters of a state, joints' offsets where the estimator was (WatchedLog::offsets_at_start).
+Eigen::VectorXd at_start(const WatchedLog& log, const State& state);
 
 /// Reads a log's pictures and encoders and finds the masks as configured. A background that is to be learned is learned
 /// from the whole log first.
