@@ -64,28 +64,6 @@ function(bodyschema_warnings target)
   endif()
 endfunction()
 
-# bodyschema_precompile(<test program>)
-#   A fifth of a test's compile time is Eigen's and GoogleTest's headers: they are read once for all. Where ccache
-#   compiles they are not, as it keeps nothing of such sources unless told to be sloppy.
-function(bodyschema_precompile target)
-  if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU" OR CMAKE_CXX_COMPILER_LAUNCHER)
-    return()
-  endif()
-  if(NOT TARGET test_precompiled)
-    find_package(Eigen3 REQUIRED NO_MODULE)
-    file(WRITE ${CMAKE_BINARY_DIR}/test_precompiled.cpp "// A precompiled header needs a source to be made for.\n")
-    add_library(test_precompiled OBJECT ${CMAKE_BINARY_DIR}/test_precompiled.cpp)
-    bodyschema_warnings(test_precompiled)
-    target_compile_features(test_precompiled PRIVATE cxx_std_20)
-    target_compile_options(test_precompiled PRIVATE ${CMAKE_CXX_COMPILE_OPTIONS_PIE})  # as programs are
-    target_link_libraries(test_precompiled PRIVATE GTest::gtest GTest::gmock Eigen3::Eigen)
-    target_precompile_headers(test_precompiled PRIVATE
-      <gmock/gmock.h> <gtest/gtest.h> <Eigen/Dense>
-      <algorithm> <chrono> <filesystem> <fstream> <functional> <map> <random> <thread>)
-  endif()
-  target_precompile_headers(${target} REUSE_FROM test_precompiled)
-endfunction()
-
 # bodyschema_patient(<variable> <seconds>)
 #   The time a test may take: of a release build, times BODYSCHEMA_TEST_PATIENCE (sanitizers are slow).
 function(bodyschema_patient variable seconds)
@@ -109,7 +87,6 @@ function(bodyschema_test folder)
   set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)  # tests' own helpers are named alike
   bodyschema_warnings(${target})
   target_link_libraries(${target} PRIVATE ${ARG_LINKS} GTest::gtest GTest::gmock GTest::gtest_main)
-  bodyschema_precompile(${target})
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/test)
   target_compile_definitions(${target} PRIVATE
     BODYSCHEMA_SOURCE_DIR="${PROJECT_SOURCE_DIR}" BODYSCHEMA_BINARY_DIR="${PROJECT_BINARY_DIR}")
