@@ -108,6 +108,14 @@ OutlineSearch ModelSearch::search() const {
 void ModelSearch::measure_noise() {
   constexpr double kRobust_px = 3.0;
   noise_ = fit_.noise(state_.model(), {limits::kSearch_px, options_.spacing_px, kRobust_px}, options_.noise, raster_);
+  slope_ = fit_.slope(state_, search(), mean_variance_px2(), raster_, options_.seed);
+  spdlog::debug("diagnosis: slope {:.3f}", slope_);
+}
+
+double ModelSearch::mean_variance_px2() const {
+  double variance = 0.0;
+  for (const auto& noise : noise_) variance += noise.variance_px2() / static_cast<double>(noise_.size());
+  return variance;
 }
 
 double ModelSearch::fit(State& state, double from_px) {
@@ -115,15 +123,13 @@ double ModelSearch::fit(State& state, double from_px) {
 }
 
 double ModelSearch::fit(State& state, double from_px, std::span<const std::size_t> pictures) {
-  double variance = 0.0;
-  for (const auto& noise : noise_) variance += noise.variance_px2() / static_cast<double>(noise_.size());
   return fit_.fit(state,
                   {.iterations = 12,
                    .from_px = from_px,
                    .finest_px = limits::kSearch_px,
                    .robust_px = search().robust_px,
                    .spacing_px = options_.spacing_px,
-                   .variance_px2 = variance},
+                   .variance_px2 = mean_variance_px2() * slope_},
                   pictures);
 }
 
@@ -260,10 +266,11 @@ std::vector<Eigen::Index> ModelSearch::columns_of(std::size_t cause) const {
 std::shared_ptr<const LinearLog> ModelSearch::linearised(std::span<const std::uint32_t> coordinates) {
   const auto how = search();
   const auto& model = state_.model();
-  if (!last_ || !are_same(last_->model, model) || last_->robust_px != how.robust_px) {
+  if (!last_ || !are_same(last_->model, model) || last_->robust_px != how.robust_px || last_->slope != slope_) {
     last_.reset();  // before the next one needs room
-    last_.emplace(
-        Linearised{model, how.robust_px, std::make_shared<const LinearLog>(fit_.linearise(model, coordinates, how))});
+    auto at = std::make_shared<LinearLog>(fit_.linearise(model, coordinates, how));
+    for (auto& evidence : at->evidence) evidence.A *= slope_;
+    last_.emplace(Linearised{model, how.robust_px, slope_, std::move(at)});
   }
   return last_->at;
 }
@@ -279,7 +286,7 @@ LogAbout ModelSearch::about(double block_s) {
     const auto camera = fit_.log().pictures()[p].camera;
     const double unit = picture_unit(fit_.log().rig().cameras[camera].intrinsics);
     const bool seen = log.at.evidence[p].weight > 0.0;
-    log.precision.push_back(seen ? 1.0 / (unit * unit * noise_[camera].variance_px2()) : 0.0);
+    log.precision.push_back(seen ? 1.0 / (unit * unit * noise_[camera].variance_px2() * slope_) : 0.0);
   }
   log.block_s = block_s;
   group_blocks(log);
@@ -418,7 +425,7 @@ Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Dir
                                                     log.at.coordinates, measurement.projection().hand_link());
     const auto& evidence = log.at.evidence[p];
     size.hand_m += (jacobian.topRows<3>() * moved).squaredNorm();
-    size.outline_px += moved.dot(evidence.A * moved);
+    size.outline_px += moved.dot(evidence.A * moved) / slope_;
     weight += evidence.weight;
     depth += measurement.projection().hand().translation().z();
     focal += fit_.log().rig().cameras[picture.camera].intrinsics.fx;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <random>
 #include <set>
 #include <thread>
 #include <utility>
@@ -14,7 +15,10 @@ namespace {
 /// A picture in which fewer points of the outline are found shows something else.
 constexpr double kFewestPoints = 20.0;
 constexpr double kLeastShare = 0.3;
-constexpr double kNarrow = 0.75;  ///< of the search, a step
+/// Of ways that are tried for the slope, both ends each: they average how single points come and go.
+constexpr int kWays = 2;
+constexpr double kLeastSlope = 0.25;  ///< less is no slope that a step could rely on
+constexpr double kNarrow = 0.75;      ///< of the search, a step
 
 /// Plays the encoder log: `observe` sees every sample up to each picture, then `visit` the picture.
 template <class Observe, class Visit>
@@ -250,6 +254,38 @@ std::vector<StateEvidence> LogFit::project(const LinearLog& at, const ErrorModel
     result[p] = {J.transpose() * evidence.A * J, J.transpose() * evidence.b, evidence.square, evidence.weight};
   }
   return result;
+}
+
+double LogFit::slope(const State& state, const OutlineSearch& search, double variance_px2,
+                     std::span<const std::size_t> pictures, std::uint64_t seed) {
+  const auto parameters = state.refs();
+  const auto coordinates = moved_by(state.model(), parameters);
+  const auto sum_at = [&](const Eigen::VectorXd& x) {
+    State there = state;
+    there.set(x);
+    StateEvidence sum{Eigen::MatrixXd::Zero(x.size(), x.size()), Eigen::VectorXd::Zero(x.size())};
+    for (const auto& picture :
+         project(linearise(there.model(), coordinates, search, pictures), there.model(), parameters)) {
+      sum.add(picture, 1.0 / variance_px2);
+    }
+    return sum;
+  };
+  const Eigen::VectorXd x = state.x();
+  const Eigen::MatrixXd A = sum_at(x).A;
+  Eigen::MatrixXd H = A;
+  H.diagonal() += state.prior_sd().array().square().inverse().matrix();
+  const Eigen::LLT<Eigen::MatrixXd> root(H);
+  std::mt19937_64 random(seed);
+  double fell = 0.0, said = 0.0;
+  for (int way = 0; way < kWays; ++way) {
+    // As likely in all directions, told or not.
+    const Eigen::VectorXd signs =
+        Eigen::VectorXd::NullaryExpr(x.size(), [&] { return random() % 2 == 0 ? 1.0 : -1.0; });
+    const Eigen::VectorXd step = root.matrixU().solve(signs);
+    fell += step.dot(sum_at(x - step).b - sum_at(x + step).b);
+    said += 2.0 * step.dot(A * step);
+  }
+  return said > 0.0 ? std::clamp(fell / said, kLeastSlope, 1.0) : 1.0;
 }
 
 std::vector<OutlineNoise> LogFit::noise(const ErrorModel& model, const OutlineSearch& search,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
@@ -87,6 +88,14 @@ class LogFit {
   /// Fits the state; @return the mean cost of an outline point at the end, px^2 of a 320x240 picture.
   /// @param free  positions of parameters that may move; empty: all
   double fit(State& state, const FitSettings& settings, std::span<const std::size_t> pictures = {});
+
+  /// By how much all pictures' b changes along ways of about a standard deviation, as a share of what A says; at
+  /// most 1. Outlines that lie far off pull less the further they are, points near a corner find another flank, and
+  /// others go out of sight: a step A^-1 b falls short by this, and fits to some of the pictures each seem to differ
+  /// less than they do.
+  /// @param seed  of the ways that are tried
+  double slope(const State& state, const OutlineSearch& search, double variance_px2,
+               std::span<const std::size_t> pictures, std::uint64_t seed);
 
   /// How outlines err in each camera's pictures, measured on what a model leaves.
   std::vector<OutlineNoise> noise(const ErrorModel& model, const OutlineSearch& search,
