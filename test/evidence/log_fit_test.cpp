@@ -91,51 +91,29 @@ TEST_F(LogFitOfOwnRobot, EvidenceAboutParametersPointsToTheTruth) {
   EXPECT_NEAR(step[7], 0.001, 3e-4);
 }
 
-/// A step that A asks for falls short, by the same share in one direction as in another: with the slope it ends nearer.
-TEST_F(LogFitOfOwnRobot, AStepFallsShortByTheSlope) {
-  const auto log = log_of(seen_);
-  LogFit fit(*log, 2);
-  State found = truth(state());
-  fit.fit(found, {.variance_px2 = 0.1});
-  const OutlineSearch search{.search_px = 6.0};
-  const double slope = fit.slope(found, search, 0.1, {}, test::seed());
-  EXPECT_GT(slope, 0.8);
-  EXPECT_LT(slope, 0.99);
-  const auto sum_at = [&](const Eigen::VectorXd& x) {
-    State there = found;
-    there.set(x);
-    const auto at = fit.linearise(there.model(), fit.moved_by(there.model(), there.refs()), search);
-    StateEvidence sum;
-    for (const auto& picture : fit.project(at, there.model(), there.refs())) sum.add(picture);
-    return sum;
-  };
-  const auto here = sum_at(found.x());
-  const Eigen::LLT<Eigen::MatrixXd> root(here.A);
-  std::mt19937_64 random(test::seed() + 1);
-  std::normal_distribution<double> normal;
-  double left = 0.0, left_by_A = 0.0;
-  for (int way = 0; way < 8; ++way) {
-    Eigen::VectorXd away = Eigen::VectorXd::NullaryExpr(found.size(), [&] { return normal(random); });
-    away = root.matrixU().solve(away).eval();
-    const Eigen::VectorXd back = here.A.ldlt().solve(sum_at(found.x() + away).b - here.b);
-    left += away.dot(here.A * (away + back / slope));
-    left_by_A += away.dot(here.A * (away + back));
-  }
-  EXPECT_LT(std::abs(left), 0.4 * left_by_A);
-}
-
-/// Of outlines that lie as far off as the robust scale reaches the pull hardly falls any more.
+/// Outlines that pictures place exactly pull back as A says. Where each posture has the arm a little elsewhere, many
+/// lie as far off as the robust scale reaches, and pull less the further they are.
 TEST_F(LogFitOfOwnRobot, TheSlopeIsLessWhereOutlinesLieFarOff) {
-  const auto log = log_of(seen_);
-  LogFit fit(*log, 2);
-  State wrong = truth(state());
-  Eigen::VectorXd x = wrong.x();
-  x[3] += radians(2.0);
-  wrong.set(x);
-  const auto slope = [&](double robust_px) {
-    return fit.slope(wrong, {.search_px = 8.0, .robust_px = robust_px}, 0.1, {}, test::seed());
+  auto wrong = seen_;
+  std::mt19937_64 random(test::seed());
+  std::normal_distribution<double> normal(0.0, radians(1.0));
+  for (auto& observation : wrong) {
+    for (const char* joint : {"r_shoulder_yaw", "r_elbow", "r_wrist_prosup"}) {
+      const double noise = normal(random);
+      for (auto& camera : observation.cameras) camera->joints.q[robot_->joint_index(joint)] += noise;
+    }
+  }
+  const auto slope = [&](const std::vector<Observation>& seen) {
+    const auto log = log_of(seen);
+    LogFit fit(*log, 2);
+    State found = truth(state());
+    fit.fit(found, {.variance_px2 = 0.1});
+    return fit.slope(found, {.search_px = 8.0, .robust_px = 3.0}, 0.1, {}, test::seed());
   };
-  EXPECT_LT(slope(1.0), slope(8.0) - 0.1);
+  const double exact = slope(seen_), rough = slope(wrong);
+  EXPECT_GT(exact, 0.9);
+  EXPECT_LT(rough, exact - 0.05);
+  EXPECT_GT(rough, 0.25);
 }
 
 TEST_F(LogFitOfOwnRobot, OnlyWhatIsAskedForIsLookedAt) {
