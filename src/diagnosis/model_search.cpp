@@ -108,7 +108,8 @@ OutlineSearch ModelSearch::search() const {
 void ModelSearch::measure_noise() {
   constexpr double kRobust_px = 3.0;
   noise_ = fit_.noise(state_.model(), {limits::kSearch_px, options_.spacing_px, kRobust_px}, options_.noise, raster_);
-  slope_ = fit_.slope(state_, search(), mean_variance_px2(), raster_, options_.seed);
+  const auto some = raster_of(fit_.log(), std::min(options_.most_pictures, limits::kPicturesForSlope));
+  slope_ = fit_.slope(state_, search(), mean_variance_px2(), some, options_.seed);
   spdlog::debug("diagnosis: slope {:.3f}", slope_);
 }
 
