@@ -108,15 +108,6 @@ OutlineSearch ModelSearch::search() const {
 void ModelSearch::measure_noise() {
   constexpr double kRobust_px = 3.0;
   noise_ = fit_.noise(state_.model(), {limits::kSearch_px, options_.spacing_px, kRobust_px}, options_.noise, raster_);
-  const auto some = raster_of(fit_.log(), std::min(options_.most_pictures, limits::kPicturesForSlope));
-  slope_ = fit_.slope(state_, search(), mean_variance_px2(), some, options_.seed);
-  spdlog::debug("diagnosis: slope {:.3f}", slope_);
-}
-
-double ModelSearch::mean_variance_px2() const {
-  double variance = 0.0;
-  for (const auto& noise : noise_) variance += noise.variance_px2() / static_cast<double>(noise_.size());
-  return variance;
 }
 
 double ModelSearch::fit(State& state, double from_px) {
@@ -130,7 +121,7 @@ double ModelSearch::fit(State& state, double from_px, std::span<const std::size_
                    .finest_px = limits::kSearch_px,
                    .robust_px = search().robust_px,
                    .spacing_px = options_.spacing_px,
-                   .variance_px2 = mean_variance_px2() * slope_},
+                   .variance_px2 = mean_variance_px2(noise_) * slope_},
                   pictures);
 }
 
@@ -283,6 +274,7 @@ LogAbout ModelSearch::about(double block_s) {
   log.base = fit_.directions(log.at, state_.model(), state_.refs());
   add_causes(log);
   add_considered(log);
+  // A has the slope in it: divided by it once more here, what pictures tell stays, and their pull counts for more.
   for (std::size_t p = 0; p < log.base.size(); ++p) {
     const auto camera = fit_.log().pictures()[p].camera;
     const double unit = picture_unit(fit_.log().rig().cameras[camera].intrinsics);
@@ -442,6 +434,8 @@ Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Dir
 void ModelSearch::polish(double block_s) {
   constexpr int kRounds = 4;
   constexpr double kNegligible_sd = 0.05;
+  slope_ = fit_.slope(state_, search(), mean_variance_px2(noise_), raster_, options_.seed);
+  spdlog::debug("diagnosis: slope {:.3f}", slope_);
   double last = 0.0;
   Eigen::VectorXd before = state_.x();
   for (int round = 0; round < kRounds; ++round) {

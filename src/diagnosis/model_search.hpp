@@ -71,6 +71,7 @@ class ModelSearch {
   void look_for_lost_part();
 
   /// Moves the state to where all pictures together have it: what a fit along a direction that is hardly told leaves.
+  /// From now on steps and intervals go by the slope that is measured there.
   void polish(double block_s);
 
   [[nodiscard]] const State& state() const { return state_; }
@@ -99,12 +100,11 @@ class ModelSearch {
   /// Pictures of an arm that stands err alike, however many there are: together they count as those of one shortest
   /// block do, and as one picture at least.
   void count_postures_once(LogAbout& log) const;
-  /// About the present model, all pictures, A as b falls; not anew while that stays what it is.
+  /// About the present model, all pictures, A times the slope; not anew while that stays what it is.
   std::shared_ptr<const LinearLog> linearised(std::span<const std::uint32_t> coordinates);
   double fit(State& state, double from_px);
   double fit(State& state, double from_px, std::span<const std::size_t> pictures);
   void measure_noise();
-  [[nodiscard]] double mean_variance_px2() const;
 
   LogFit& fit_;
   std::vector<Belief> beliefs_, tolerances_;
@@ -115,7 +115,7 @@ class ModelSearch {
   std::vector<FoundCause> causes_;
   std::vector<OutlineNoise> noise_;
   double cost_ = 0.0;
-  double slope_ = 1.0;  ///< of b, of what A says (LogFit::slope); what A is multiplied by
+  double slope_ = 1.0;  ///< LogFit::slope, about the model that was polished last
   struct Linearised {
     ErrorModel model;
     double robust_px = 0.0, slope = 1.0;

@@ -95,17 +95,12 @@ void BatchFit::meet(const MemoryEstimate& other) {
 }
 
 void BatchFit::run(double from_px, const std::vector<std::size_t>& pictures) {
-  const auto variance = [&] {
-    double sum = 0.0;
-    for (const auto& noise : noise_) sum += noise.variance_px2() / static_cast<double>(noise_.size());
-    return sum;
-  };
   FitSettings settings{.iterations = settings_.iterations,
                        .from_px = from_px,
                        .finest_px = kFinest_px,
                        .robust_px = 3.0,
                        .spacing_px = settings_.spacing_px,
-                       .variance_px2 = variance()};
+                       .variance_px2 = mean_variance_px2(noise_)};
   fit_.fit(state_, settings, pictures);
   if (settings_.progress) settings_.progress(0.5);
   measure(pictures);
@@ -114,7 +109,7 @@ void BatchFit::run(double from_px, const std::vector<std::size_t>& pictures) {
   for (const auto& noise : noise_) robust_px = std::max(robust_px, noise.robust_px());
   settings.from_px = 0.0;
   settings.robust_px = robust_px;
-  settings.variance_px2 = variance();
+  settings.variance_px2 = mean_variance_px2(noise_);
   fit_.fit(state_, settings, pictures);
   measure(pictures);
   if (settings_.progress) settings_.progress(0.8);

@@ -15,7 +15,7 @@ namespace {
 /// A picture in which fewer points of the outline are found shows something else.
 constexpr double kFewestPoints = 20.0;
 constexpr double kLeastShare = 0.3;
-/// Of ways that are tried for the slope, both ends each: they average how single points come and go.
+/// Of ways that are tried for the slope, both ends each: with some hundred pictures it is known to a few hundredths.
 constexpr int kWays = 2;
 constexpr double kLeastSlope = 0.25;  ///< less is no slope that a step could rely on
 constexpr double kNarrow = 0.75;      ///< of the search, a step

@@ -99,4 +99,10 @@ double OutlineNoise::robust_px() const {
   return std::clamp(kScale_sd * sd_px(), kLeastScale_px, kMostScale_px);
 }
 
+double mean_variance_px2(std::span<const OutlineNoise> cameras) {
+  double sum = 0.0;
+  for (const auto& noise : cameras) sum += noise.variance_px2() / static_cast<double>(cameras.size());
+  return sum;
+}
+
 }  // namespace bodyschema

@@ -89,11 +89,10 @@ class LogFit {
   /// @param free  positions of parameters that may move; empty: all
   double fit(State& state, const FitSettings& settings, std::span<const std::size_t> pictures = {});
 
-  /// By how much all pictures' b changes along ways of about a standard deviation, as a share of what A says; at
-  /// most 1. Outlines that lie far off pull less the further they are, points near a corner find another flank, and
-  /// others go out of sight: a step A^-1 b falls short by this, and fits to some of the pictures each seem to differ
-  /// less than they do.
-  /// @param seed  of the ways that are tried
+  /// By how much the b of all pictures together changes along ways of about a standard deviation, as a share of what A
+  /// says; at most 1. Where pictures err it is less: outlines that lie far off pull less the further they are, and
+  /// others find another counterpart. A step A^-1 b falls short by this, and fits to some of the pictures each seem to
+  /// differ less than they do. @param variance_px2  as of FitSettings  @param seed  of the ways that are tried
   double slope(const State& state, const OutlineSearch& search, double variance_px2,
                std::span<const std::size_t> pictures, std::uint64_t seed);
 

@@ -57,4 +57,7 @@ class OutlineNoise {
   std::array<double, kBins> product_{}, pairs_{};
 };
 
+/// Mean over the cameras of what their evidence is to be divided by.
+double mean_variance_px2(std::span<const OutlineNoise> cameras);
+
 }  // namespace bodyschema
