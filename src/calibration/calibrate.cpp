@@ -19,6 +19,7 @@
 #include "bodyschema/evidence/batch_fit.hpp"
 #include "bodyschema/evidence/outline_distance.hpp"
 #include "bodyschema/pipeline/watched_log.hpp"
+#include "arm_geometry.hpp"
 #include "believed_outline.hpp"
 #include "beyond_model.hpp"
 #include "calibration_files.hpp"
@@ -107,7 +108,8 @@ class Calibrator {
     if (!options_.quiet) bar_.emplace("calibration", 100);
     std::optional<RawPictures> masks;
     if (raw()) masks.emplace(*log_, pipeline_.vision(), watched.kept);
-    loose_ = loose_fingers(*log_, Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options()));
+    believe_what_is_configured();
+    loose_ = loose_fingers(*log_, beliefs_);
     if (masks) believed_px_ = believed_px();
     const bool rough = believed_px_ > kRough_px || hardly_known();
     bool still = masks && rough && masks->cameras_stood_still();
@@ -128,6 +130,7 @@ class Calibrator {
     if (masks || !pipeline_.learns_background()) without_strangers(fit, best);
     progress(0.6);
     if (auto more = with_effects(fit, *best)) best.emplace(std::move(*more));
+    if (auto more = with_arm_geometry(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
     leave_out_sections(fit, *best);
     if (given()) read_once_more(watched.kept, fit, *best);
@@ -206,8 +209,7 @@ class Calibrator {
   [[nodiscard]] double believed_px() {
     if (std::any_of(rig_.cameras.begin(), rig_.cameras.end(), to_be_searched)) return kAnywhere_px;
     LogFit fit(*log_, 1);
-    const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
-    return believed_outline_sd_px(fit, State(log_->roles(), beliefs.state), loose_);
+    return believed_outline_sd_px(fit, State(log_->roles(), beliefs_.state), loose_);
   }
 
   /// Masks and fit by turns, masks ever nearer to what the fit of all postures says.
@@ -283,17 +285,14 @@ class Calibrator {
   [[nodiscard]] static bool is_near(const BatchFit& batch) { return batch.noise().front().sd_px() < kNear_px; }
 
   [[nodiscard]] BatchFit started(LogFit& fit, const Eigen::VectorXd& x) const {
-    const auto roles = log_->roles();
-    const auto beliefs = Beliefs::from(configuration_, roles, rig_, pipeline_.options());
-    BatchFit batch(fit, State(roles, beliefs.state), beliefs.tolerances, settings());
+    BatchFit batch(fit, State(log_->roles(), beliefs_.state), beliefs_.tolerances, settings());
     if (x.size() > 0) batch.start_at(x);
     return batch;
   }
 
   /// A fit that has still to run, of the state that another one has come to: what was found besides is in it.
   [[nodiscard]] BatchFit about_the_same(LogFit& fit, const BatchFit& batch) const {
-    const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
-    return {fit, batch.state(), beliefs.tolerances, settings()};
+    return {fit, batch.state(), beliefs_.tolerances, settings()};
   }
 
   /// Encoders and cameras as they are configured.
@@ -461,19 +460,18 @@ class Calibrator {
   /// What the log asks for besides: causes that a diagnosis of it names become part of the state.
   std::optional<BatchFit> with_effects(LogFit& fit, const BatchFit& best) {
     if (best.postures() < DiagnosisOptions{}.fewest_postures) return std::nullopt;
-    const auto beliefs = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
     DiagnosisOptions options;
     options.noise = pipeline_.options().noise;
     options.spacing_px = pipeline_.options().outline_spacing_px;
     options.starts = {best.state().x()};
     DiagnosisReport report;
     try {
-      report = diagnose(fit, beliefs.state, beliefs.tolerances, options);
+      report = diagnose(fit, beliefs_.state, beliefs_.tolerances, options);
     } catch (const DataError& error) {
       result_.remarks.push_back(std::string("no further causes were looked for: ") + error.what());
       return std::nullopt;
     }
-    auto more = beliefs;
+    auto more = beliefs_;
     for (const auto& cause : report.causes) {
       if (cause.implausible && implausible_.empty()) implausible_ = cause.sentence;
       CalibratedEffect effect{cause.cause.name, cause.cause.joint, cause.cause.source, cause.sentence, {}};
@@ -487,13 +485,47 @@ class Calibrator {
       result_.effects.push_back(std::move(effect));
     }
     if (report.verdict == "unexplained") result_.remarks.push_back(report.sentence);
-    if (more.state.size() == beliefs.state.size()) return std::nullopt;
-    State state(log_->roles(), without_doubles(more.state));
-    BatchFit extended(fit, state, more.tolerances, settings());
+    if (more.state.size() == beliefs_.state.size()) return std::nullopt;
+    more.state = without_doubles(more.state);
+    auto extended = extended_by(fit, best, more);
+    if (extended.misfit() >= best.misfit()) return std::nullopt;
+    beliefs_ = more;
+    return extended;
+  }
+
+  /// A fit of a state that holds more, from where another one has come to.
+  [[nodiscard]] BatchFit extended_by(LogFit& fit, const BatchFit& best, const Beliefs& beliefs) const {
+    State state(log_->roles(), beliefs.state);
+    BatchFit extended(fit, state, beliefs.tolerances, settings());
     extended.start_at(joined(state, best.state()));
     extended.run(0.0, {});
-    if (extended.misfit() >= best.misfit()) return std::nullopt;
     return extended;
+  }
+
+  /// An arm that is built otherwise than its URDF says in so many ways that none can be named: how far, is measured.
+  /// Where the pictures ask for it, joints' places and axes are estimated, otherwise what may be wrong is considered.
+  std::optional<BatchFit> with_arm_geometry(LogFit& fit, const BatchFit& best) {
+    if (best.postures() <= kFewestPostures || !is_near(best)) return std::nullopt;
+    const ArmGeometry geometry(log_->roles(), best.state(), beliefs_.tolerances);
+    const auto with = [](std::vector<Belief> list, const std::vector<Belief>& more) {
+      list.insert(list.end(), more.begin(), more.end());
+      return list;
+    };
+    BatchFit probe(fit, best.state(), with(beliefs_.tolerances, geometry.probe()), settings());
+    probe.run(0.0, {});
+    const auto found = geometry.measure(probe);
+    if (!found.asked_for) {
+      beliefs_.tolerances = with(beliefs_.tolerances, found.beliefs);
+      BatchFit considered = about_the_same(fit, best);
+      considered.run(0.0, {});
+      return considered;
+    }
+    beliefs_.state = with(beliefs_.state, found.beliefs);
+    result_.remarks.push_back(
+        fmt::format("the arm is not built quite as its URDF says: joints lie about {:.1f} mm beside where it has them, "
+                    "axes are tilted by about {:.2f} deg; offsets are uncertain by what that leaves open",
+                    1e3 * found.beside_sd_m, degrees(found.tilted_sd_rad)));
+    return extended_by(fit, best, beliefs_);
   }
 
   static const EffectKind* effect_kind_of(const DiagnosedCause& cause) {
@@ -525,6 +557,11 @@ class Calibrator {
     rig_ = rig;
     log_->replace_rig(load_robot(pipeline_.setup(), rig), rig);
     fit.refresh();
+    believe_what_is_configured();
+  }
+
+  void believe_what_is_configured() {
+    beliefs_ = Beliefs::from(configuration_, log_->roles(), rig_, pipeline_.options());
   }
 
   // --- what it says -------------------------------------------------------------------------------
@@ -913,6 +950,7 @@ class Calibrator {
   const WatchedLog* watched_ = nullptr;
   PictureLog* log_ = nullptr;  ///< its pictures
   std::vector<StereoRig> starts_;
+  Beliefs beliefs_;          ///< those of the configuration, with what was found besides
   std::string implausible_;  ///< a cause that no robot has, as a diagnosis words it
   std::string unsettled_;    ///< a joint whose offset depends on how masks were made
   double believed_px_ = kAnywhere_px;

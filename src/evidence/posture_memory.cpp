@@ -107,6 +107,17 @@ double PostureMemory::distance(const Eigen::VectorXd& x) const {
   return away.dot(posture_precision() * away);
 }
 
+Quadratic PostureMemory::of_considered() const {
+  const auto n = layout_.estimated(), m = layout_.considered_root.rows();
+  const Quadratic total = sum();
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(total.A.topLeftCorner(n, n));
+  const Eigen::MatrixXd across = total.A.topRightCorner(n, m);
+  const Eigen::VectorXd sd = layout_.considered_root.rowwise().norm();
+  return {
+      sd.asDiagonal() * (total.A.bottomRightCorner(m, m) - across.transpose() * ldlt.solve(across)) * sd.asDiagonal(),
+      sd.cwiseProduct(total.b.tail(m) - across.transpose() * ldlt.solve(total.b.head(n)))};
+}
+
 PostureMemory PostureMemory::beliefs() const {
   PostureMemory result = *this;
   result.forget_all();

@@ -278,6 +278,14 @@ class Scene:
         self.urdf = Urdf((folder / own["urdf"]).resolve(), [(folder / r).resolve() for r in own["mesh_search_roots"]])
         self.own, self.cameras, self.condition = own, self.configuration["cameras"], condition
         self.rendered = set(own["rendered_links"])
+        self.begin()
+        self.build(self.urdf.root, self.spec.worldbody, np.zeros(3), np.eye(3), None)
+        self.add_cameras()
+        self.add_lights()
+        self.add_room(table_z)
+        self.finish()
+
+    def begin(self):
         self.spec = mujoco.MjSpec()
         self.spec.stat.extent, self.spec.stat.center = 1.0, [0, 0, 0]
         visual = self.spec.visual
@@ -288,10 +296,8 @@ class Scene:
         self.bodies = {}
         self.points = []  # of the arm: (link, points in its frame)
         self.visuals = []  # (name, (link, its mesh, its looks))
-        self.build(self.urdf.root, self.spec.worldbody, np.zeros(3), np.eye(3), None)
-        self.add_cameras()
-        self.add_lights()
-        self.add_room(table_z)
+
+    def finish(self):
         self.model = self.spec.compile()
         self.data = mujoco.MjData(self.model)
         self.option = mujoco.MjvOption()
@@ -342,6 +348,9 @@ class Scene:
         if self.condition.get("glove_mm", 0) and (link.startswith("r_hand") or re.match(DIGITS, link)):
             normals = trimesh.Trimesh(vertices, faces, process=False).vertex_normals
             vertices = vertices + normals * self.condition["glove_mm"] * 1e-3
+        if self.condition.get("thicker_mm", 0):
+            normals = trimesh.Trimesh(vertices, faces, process=False).vertex_normals
+            vertices = vertices + normals * self.condition["thicker_mm"] * 1e-3
         name = f"{link}_{k}"
         mesh = self.spec.add_mesh(name=name)
         mesh.uservert, mesh.userface = vertices.ravel().tolist(), faces.ravel().tolist()

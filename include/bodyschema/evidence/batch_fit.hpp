@@ -45,6 +45,7 @@ class BatchFit {
   /// postures get wrong; half their difference is what each reading errs by.)
   void meet(const MemoryEstimate& other);
   [[nodiscard]] const PostureMemory& memory() const { return memory_; }
+  [[nodiscard]] const Considered& beside() const { return beside_; }
   [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
   /// The pictures about the result; evidence over LinearLog::coordinates.
   [[nodiscard]] const LinearLog& at() const { return at_; }

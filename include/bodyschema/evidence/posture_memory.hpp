@@ -111,6 +111,9 @@ class PostureMemory {
   [[nodiscard]] MemoryEstimate in_posture(const Quadratic& frame) const;
   /// The same of a frame without evidence.
   [[nodiscard]] MemoryEstimate in_posture() const;
+  /// What pictures say of what is considered, in units of its standard deviations, all that is estimated integrated
+  /// out.
+  [[nodiscard]] Quadratic of_considered() const;
   /// How a frame agrees with everything that is known.
   [[nodiscard]] Innovation innovation(const Quadratic& frame) const;
   /// The step of some parameters that would make a frame agree best, and how it agrees then.
