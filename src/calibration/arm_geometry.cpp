@@ -22,8 +22,7 @@ struct Kind {
   std::size_t component;
   double unit;
 };
-constexpr std::array kKinds = {Kind{"link_length", kBeside, kBeside_m}, Kind{"axis_shift", kBeside, kBeside_m},
-                               Kind{"axis_tilt", kTilted, kTilted_rad}};
+constexpr std::array kKinds = {Kind{"joint_place", kBeside, kBeside_m}, Kind{"axis_tilt", kTilted, kTilted_rad}};
 
 const Kind& kind_of(const std::string& effect) {
   return *std::find_if(kKinds.begin(), kKinds.end(), [&](const Kind& k) { return effect == k.effect; });
@@ -65,8 +64,8 @@ ArmGeometry::Found ArmGeometry::measure(const BatchFit& batch) const {
     for (double& sd : belief.sd) sd *= measured.sd[static_cast<Eigen::Index>(kind_of(belief.effect).component)];
     found.beliefs.push_back(std::move(belief));
   }
-  spdlog::debug("arm geometry: joints {:.2f} mm beside, axes tilted by {:.2f} deg, odds {:.1f}", 1e3 * found.beside_sd_m,
-                degrees(found.tilted_sd_rad), measured.odds);
+  spdlog::debug("arm geometry: joints {:.2f} mm beside, axes tilted by {:.2f} deg, odds {:.1f}",
+                1e3 * found.beside_sd_m, degrees(found.tilted_sd_rad), measured.odds);
   return found;
 }
 

@@ -7,7 +7,7 @@
 namespace bodyschema {
 
 /// How an arm may be built otherwise than its URDF says, in many small ways of which pictures name none: joints sit
-/// beside where they should (`link_length`, `axis_shift`), axes are tilted (`axis_tilt`). Printed parts, a URDF that was
+/// beside where they should (`joint_place`), axes are tilted (`axis_tilt`). Printed parts, a URDF that was
 /// drawn by eye. How far, nobody has measured, but all postures together tell it, as one number for all joints.
 class ArmGeometry {
  public:

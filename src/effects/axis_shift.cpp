@@ -12,9 +12,10 @@ EffectKind axis_shift() {
   return {.name = "axis_shift",
           .targets =
               [](const JointRoles& roles) {
-                // The first one of an arm is a shifted base.
+                // The first two of an arm look like a shifted base.
                 auto targets = arm_targets(roles);
-                if (!targets.empty()) targets.erase(targets.begin());
+                targets.erase(targets.begin(),
+                              targets.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(2, targets.size())));
                 return targets;
               },
           .make = on_joint("axis_shift", {in_mm("shift_1", 3.0), in_mm("shift_2", 3.0)},
@@ -26,10 +27,6 @@ EffectKind axis_shift() {
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
                 return "the axis of " + e.target().joint + " lies beside where the URDF has it, by " + both(amounts);
               },
-          .not_testable = [](const EffectTarget& target, const JointRoles& roles, const LogMotion&) -> std::string {
-            const auto arm = arm_targets(roles);
-            return arm.size() > 1 && target == arm[1] ? "it looks like a shifted base" : "";
-          },
           .lookalikes = {"link_length", "base_shift"},
           .splitting_motion = "Move the joint and its neighbours one at a time through their full ranges.",
           .home = EffectHome::kUrdf};
