@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 
 #include "bodyschema/evidence/variance_components.hpp"
@@ -59,13 +60,13 @@ ArmGeometry::Found ArmGeometry::measure(const BatchFit& batch) const {
   Found found;
   found.beside_sd_m = measured.sd[kBeside] * kBeside_m;
   found.tilted_sd_rad = measured.sd[kTilted] * kTilted_rad;
-  found.asked_for = measured.odds > kOdds;
+  found.asked_for = measured.log_odds > std::log(kOdds);
   for (Belief belief : probe_) {
     for (double& sd : belief.sd) sd *= measured.sd[static_cast<Eigen::Index>(kind_of(belief.effect).component)];
     found.beliefs.push_back(std::move(belief));
   }
-  spdlog::debug("arm geometry: joints {:.2f} mm beside, axes tilted by {:.2f} deg, odds {:.1f}",
-                1e3 * found.beside_sd_m, degrees(found.tilted_sd_rad), measured.odds);
+  spdlog::debug("arm geometry: joints {:.2f} mm beside, axes tilted by {:.2f} deg, log odds {:.1f}",
+                1e3 * found.beside_sd_m, degrees(found.tilted_sd_rad), measured.log_odds);
   return found;
 }
 

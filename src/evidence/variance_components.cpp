@@ -30,28 +30,35 @@ MeasuredComponents measure_components(const Quadratic& evidence, std::span<const
   for (std::size_t c = 0; c < components.size(); ++c) assign(c, 0.0);
   const double nothing = likelihood(evidence, each);
   MeasuredComponents result{Eigen::VectorXd::Zero(count), 0.0};
-  double weight = 0.0, believed = 0.0;
+  if (count == 0) return result;
+  double weight = 0.0, believed = 0.0, most = 0.0;  // the first in units of exp(most), which may be anything
   std::vector<int> tried(components.size(), 0);
-  for (bool more = count > 0; more;) {
+  for (bool more = true; more;) {
     Eigen::VectorXd sd(count);
-    double log_weight = 0.0;
+    double log_prior = 0.0;
     for (std::size_t c = 0; c < components.size(); ++c) {
       const double own = kLeast * std::pow(kMost / kLeast, tried[c] / (kTried - 1.0));
       sd[static_cast<Eigen::Index>(c)] = own;
       assign(c, own);
-      log_weight += std::log(own / (1.0 + own * own));  // half Cauchy, on a grid of equal ratios
+      log_prior += std::log(own / (1.0 + own * own));  // half Cauchy, on a grid of equal ratios
     }
-    const double own = std::exp(0.5 * (likelihood(evidence, each) - nothing) + log_weight);
+    const double gain = 0.5 * (likelihood(evidence, each) - nothing);
+    if (gain > most) {
+      const double less = std::exp(most - gain);
+      weight *= less;
+      result.sd *= less;
+      most = gain;
+    }
+    const double own = std::exp(gain - most + log_prior);
     weight += own;
-    believed += std::exp(log_weight);
     result.sd += own * sd.cwiseAbs2();
+    believed += std::exp(log_prior);
     std::size_t c = 0;
     while (c < tried.size() && ++tried[c] == kTried) tried[c++] = 0;
     more = c < tried.size();
   }
-  if (count == 0) return result;
   result.sd = (result.sd / weight).cwiseSqrt();
-  result.odds = weight / believed;
+  result.log_odds = most + std::log(weight / believed);
   return result;
 }
 

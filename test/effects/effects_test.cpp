@@ -53,7 +53,7 @@ double size_of(const Corrections& c) {
 
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
-  EXPECT_EQ(shipped_effects().size(), 31u);
+  EXPECT_EQ(shipped_effects().size(), 32u);
   auto at = instant(r);
   at.q.setConstant(0.7);
   at.encoder.setConstant(0.8);
@@ -325,6 +325,11 @@ TEST(Geometry, LengthTiltAndHeadGoWhereTheyBelong) {
   EXPECT_NEAR(forearm.shift_1_m, 0.0016, 1e-15);
   EXPECT_NEAR(corrections(*make_effect("axis_tilt", {"elbow", ""}, r), 2.0, at).adjustments[kElbow].tilt_1_rad,
               radians(2.0), 1e-15);
+  const auto place = corrections(*make_effect("joint_place", {"elbow", ""}, r), 2.0, at).adjustments[kElbow];
+  EXPECT_NEAR(place.along_m, 0.002, 1e-15);
+  EXPECT_EQ(place.shift_1_m, 0.0);
+  EXPECT_THROW((void)make_effect("joint_place", effect_targets("joint_offset", r).front(), r), ConfigurationError)
+      << "the first joint's place is the base's";
   EXPECT_NEAR(dq_deg(corrections(*make_effect("head_offset", {"neck_yaw", ""}, r), 1.0, at), 2), 1.0, 1e-12);
   const auto vergence = corrections(*make_effect("vergence", {}, r), 1.0, at);
   EXPECT_NEAR(dq_deg(vergence, 4) - dq_deg(vergence, 5), 1.0, 1e-12);

@@ -400,6 +400,28 @@ TEST_F(MemoryWithTolerance, ErrorsAreContainedWhateverTheToleranceWas) {
   EXPECT_NEAR(innovation / dof, 1.0, 0.15);
 }
 
+/// What is considered may be asked about as if it had been estimated.
+TEST_F(MemoryWithTolerance, PicturesTellOfIt) {
+  std::mt19937 random(22);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  const Eigen::Vector3d truth(0.4, -0.3, 0.11);
+  options_.memory_s = 1e12;  // nothing fades
+  auto memory = this->memory();
+  Quadratic all = Quadratic::zero(3);
+  all.A(0, 0) = 1.0 / std::pow(layout_.prior_sd[0], 2);
+  all.A(1, 1) = 1.0 / std::pow(layout_.prior_sd[1], 2);
+  for (int i = 0; i < 12; ++i) {
+    const Eigen::VectorXd direction = with(uniform(random), uniform(random), uniform(random));
+    const Quadratic frame = measures(direction, direction.dot(truth), 0.01);
+    all.add(frame);
+    next(memory, frame);
+  }
+  const Quadratic told = memory.of_considered();
+  const Eigen::Matrix3d covariance = all.A.inverse();
+  EXPECT_NEAR(1.0 / told.A(0, 0), covariance(2, 2) / (0.05 * 0.05), 1e-9);
+  EXPECT_NEAR(told.b[0] / told.A(0, 0), (covariance * all.b)[2] / 0.05, 1e-6);
+}
+
 TEST_F(MemoryWithTolerance, AFramesOwnStateCarriesItThrough) {
   auto memory = this->memory();
   for (int i = 0; i < 50; ++i) next(memory, measures(with(1.0, 0.0, 1.0), 0.3, 0.01));

@@ -15,8 +15,8 @@ using VarianceComponent = std::vector<Eigen::Index>;
 struct MeasuredComponents {
   /// Root mean square of each component's standard deviation, over all that the pictures leave possible.
   Eigen::VectorXd sd;
-  /// How much likelier the pictures are than if all were zero: the Bayes factor.
-  double odds = 0.0;
+  /// Natural logarithm of how much likelier the pictures are than if all were zero: of the Bayes factor.
+  double log_odds = 0.0;
 };
 
 /// What pictures say of the standard deviations of variance components, the parameters' own values integrated out
