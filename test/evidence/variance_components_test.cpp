@@ -80,7 +80,8 @@ TEST_F(Components, AreNotBlamedForWhatIsBelievedBesides) {
   Eigen::VectorXd direction = Eigen::VectorXd::Zero(2 * kEach + 1);
   direction[0] = 0.1;
   direction[2 * kEach] = 1.0;
-  const auto measured = measure_components({1e4 * direction * direction.transpose(), 1e4 * 1.5 * direction}, components_);
+  const auto measured =
+      measure_components({1e4 * direction * direction.transpose(), 1e4 * 1.5 * direction}, components_);
   EXPECT_LT(measured.log_odds, std::log(2.0));
 }
 
