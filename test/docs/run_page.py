@@ -66,7 +66,7 @@ def main():
             print(content, flush=True)
             done = subprocess.run(["bash", "-euo", "pipefail", "-c", content], cwd=scratch, text=True,
                                   env=environment, stdin=subprocess.DEVNULL, check=False,
-                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=240 * PATIENCE)
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=850 * PATIENCE)
             output = done.stdout
             print(output, flush=True)
             if done.returncode != 0 and not lcm_works():
