@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -23,6 +24,7 @@
 #include "believed_outline.hpp"
 #include "beyond_model.hpp"
 #include "calibration_files.hpp"
+#include "left_as_it_is.hpp"
 #include "loose_fingers.hpp"
 #include "next_posture.hpp"
 #include "raw_pictures.hpp"
@@ -133,9 +135,12 @@ class Calibrator {
     if (auto more = with_arm_geometry(fit, *best)) best.emplace(std::move(*more));
     progress(0.7);
     leave_out_sections(fit, *best);
+    const Eigen::VectorXd fitted = best->state().x();
     if (given()) read_once_more(watched.kept, fit, *best);
-    describe(fit, *best);
     judge_left_out();
+    describe_joints(*best);
+    if (helps_ && !options_.all_parameters) leave_untold(fit, fitted, *best);
+    describe(fit, *best);
     progress(0.9);
     conclude(fit, *best);
     suggest(fit, *best);
@@ -566,21 +571,81 @@ class Calibrator {
 
   // --- what it says -------------------------------------------------------------------------------
 
-  void describe(LogFit& fit, const BatchFit& batch) {
-    const auto& estimate = batch.estimate();
+  static Eigen::VectorXd sds_of(const BatchFit& batch) {
+    return batch.estimate().covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  }
+
+  /// What the pictures make of each joint.
+  void describe_joints(const BatchFit& batch) {
     const auto& state = batch.state();
-    const Eigen::VectorXd x = state.x(), sd = estimate.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
-    for (Eigen::Index k = 0; k < state.size(); ++k) {
-      const auto& p = state.parameters()[static_cast<std::size_t>(k)];
-      if (k < state.joints()) {
-        CalibratedJoint joint{p.name, x[k], sd[k], false, {}};
-        joint.told = sd[k] < kTold_rad && sd[k] < kToldShare * p.prior_sd;
-        if (!joint.told) joint.untold_why = why_untold(batch, k);
-        result_.joints.push_back(std::move(joint));
-      } else {
-        result_.parameters.push_back(
-            {p.name, p.unit, x[k] / p.si_per_unit, sd[k] / p.si_per_unit, p.prior_sd / p.si_per_unit});
+    const Eigen::VectorXd x = state.x(), sd = sds_of(batch);
+    for (Eigen::Index k = 0; k < state.joints(); ++k) {
+      CalibratedJoint joint;
+      joint.name = state.parameters()[static_cast<std::size_t>(k)].name;
+      joint.offset_rad = joint.seen_rad = x[k];
+      joint.sd_rad = joint.seen_sd_rad = sd[k];
+      joint.told = helps_ && is_told(state, sd, k);
+      joint.applied = joint.told || options_.all_parameters;
+      if (!joint.told) {
+        joint.untold_why =
+            helps_ ? why_untold(batch, k) : "postures left out of the fit look further off with it than without";
       }
+      result_.joints.push_back(std::move(joint));
+    }
+  }
+
+  static bool is_told(const State& state, const Eigen::VectorXd& sd, Eigen::Index k) {
+    return sd[k] < kTold_rad && sd[k] < kToldShare * state.prior_sd()[k];
+  }
+
+  /// Effects of the state that move the robot's joints or hands and that the pictures tell too little of.
+  [[nodiscard]] static std::vector<std::size_t> untold_effects(const BatchFit& batch) {
+    const auto& state = batch.state();
+    const Eigen::VectorXd sd = sds_of(batch);
+    std::set<std::size_t> untold;
+    for (Eigen::Index k = 0; k < state.size(); ++k) {
+      const auto e = state.parameters()[static_cast<std::size_t>(k)].ref.effect;
+      const auto& effect = state.model()[e].name();
+      const bool joint = effect == "joint_offset" || effect == "head_offset";
+      const bool mount_is_told = sd[k] < kToldShare * state.prior_sd()[k];
+      if (joint ? !is_told(state, sd, k) : effect == "hand_mount" && !mount_is_told) untold.insert(e);
+    }
+    return {untold.begin(), untold.end()};
+  }
+
+  /// What is told too little stays on the robot as it is: the result becomes what is right together with that.
+  /// @param fitted  the state as it was fitted to the pictures that are there now
+  void leave_untold(LogFit& fit, const Eigen::VectorXd& fitted, BatchFit& batch) {
+    const auto left = left_as_they_are(batch.state(), batch.estimate(), untold_effects(batch));
+    for (std::size_t k = 0; k < result_.joints.size(); ++k) {
+      const auto effect = batch.state().parameters()[k].ref.effect;
+      result_.joints[k].applied = std::find(left.begin(), left.end(), effect) == left.end();
+    }
+    if (left.empty()) return;
+    const State held(log_->roles(), held_as_believed(beliefs_.state, batch.state(), left));
+    BatchFit again(fit, held, beliefs_.tolerances, settings());
+    again.start_at(fitted + given_as_believed(batch.state(), batch.estimate(), left) - batch.state().x());
+    again.run(0.0, {});
+    batch.move_to(batch.state().x() + again.state().x() - fitted);
+    const Eigen::VectorXd sd = sds_of(batch);
+    for (std::size_t k = 0; k < result_.joints.size(); ++k) {
+      auto& joint = result_.joints[k];
+      const auto at = static_cast<Eigen::Index>(k);
+      joint.offset_rad = joint.applied ? batch.state().x()[at] : batch.state().prior_mean()[at];
+      joint.sd_rad = sd[at];
+      if (!joint.told || is_told(batch.state(), sd, at)) continue;
+      joint.told = false;
+      joint.untold_why = "what is left as it is leaves it open";
+    }
+  }
+
+  void describe(LogFit& fit, const BatchFit& batch) {
+    const auto& state = batch.state();
+    const Eigen::VectorXd x = state.x(), sd = sds_of(batch);
+    for (Eigen::Index k = state.joints(); k < state.size(); ++k) {
+      const auto& p = state.parameters()[static_cast<std::size_t>(k)];
+      result_.parameters.push_back(
+          {p.name, p.unit, x[k] / p.si_per_unit, sd[k] / p.si_per_unit, p.prior_sd / p.si_per_unit});
     }
     result_.pictures = static_cast<std::size_t>(std::count_if(batch.at().evidence.begin(), batch.at().evidence.end(),
                                                               [](const auto& e) { return e.weight > 0.0; }));
@@ -641,6 +706,8 @@ class Calibrator {
       const Eigen::MatrixXd C = J * batch.estimate().covariance * J.transpose();
       found.sd_m = std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace()));
       found.sd_rad = std::sqrt(std::max(0.0, C.bottomRightCorner<3, 3>().trace()));
+      found.axis_sd_m = largest_sd(C.topLeftCorner<3, 3>());
+      found.axis_sd_rad = largest_sd(C.bottomRightCorner<3, 3>());
       if (camera.mount.relative) found.beside = beside_first(batch, c);
       const Eigen::VectorXd with_first = J * batch.estimate().covariance.col(0);
       const Eigen::MatrixXd beside =
@@ -661,9 +728,7 @@ class Calibrator {
     Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, state.size());
     for (Eigen::Index k = 0; k < state.size(); ++k) {
       const auto& effect = state.model()[state.parameters()[static_cast<std::size_t>(k)].ref.effect].name();
-      if (effect != "camera_pose" && effect != "camera_pair" && effect != "first_camera" && effect != "baseline") {
-        continue;
-      }
+      if (!places_cameras(effect)) continue;
       any = true;
       Eigen::VectorXd changed = x;
       changed[k] += kStep;
@@ -683,9 +748,17 @@ class Calibrator {
     };
     bool any = false;
     const Eigen::MatrixXd J = place_jacobian(state, place, any);
-    const Eigen::VectorXd variance = (J * batch.estimate().covariance * J.transpose()).diagonal().cwiseMax(0.0);
-    return {rig_.cameras.front().name, place(state.x()), std::sqrt(variance.head<3>().sum()),
-            std::sqrt(variance.tail<3>().sum())};
+    const Eigen::MatrixXd C = J * batch.estimate().covariance * J.transpose();
+    const Eigen::VectorXd variance = C.diagonal().cwiseMax(0.0);
+    return {rig_.cameras.front().name,           place(state.x()),
+            std::sqrt(variance.head<3>().sum()), std::sqrt(variance.tail<3>().sum()),
+            largest_sd(C.topLeftCorner<3, 3>()), largest_sd(C.bottomRightCorner<3, 3>())};
+  }
+
+  /// Along the direction of which least is known.
+  static double largest_sd(const Eigen::Matrix3d& covariance) {
+    return std::sqrt(
+        std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff()));
   }
 
   [[nodiscard]] std::string carrier_of(std::size_t camera) const {
@@ -782,11 +855,6 @@ class Calibrator {
     result_.outline_px.heldout_worst = own.back();
     heldout_mean_px_ = after / pictures;
     helps_ = after / pictures < before / pictures + kSame_px * picture_unit(rig_.cameras.front().intrinsics);
-    if (helps_) return;
-    for (auto& joint : result_.joints) {
-      joint.told = false;
-      joint.untold_why = "postures left out of the fit look further off with it than without";
-    }
   }
 
   /// What of the robot's predicted outline lies near an edge in the pictures.
@@ -905,14 +973,22 @@ class Calibrator {
       return say(CalibrationState::kNotConverged,
                  "Not converged: the pictures tell no joint's offset; record postures that differ more.");
     }
-    std::string untold;
-    for (const auto& joint : result_.joints) {
-      if (!joint.told) untold += (untold.empty() ? "" : ", ") + joint.name;
-    }
     say(CalibrationState::kGood,
-        fmt::format("Good: {} of {} joints told; the hand is known to {:.1f} mm in the camera's frame (one sigma){}.",
+        fmt::format("Good: {} of {} joints told; the hand is known to {:.1f} mm in the camera's frame (one sigma){}{}.",
                     told, result_.joints.size(), 1e3 * result_.hand_sd_m,
-                    untold.empty() ? "" : "; not told, and not to be applied: " + untold));
+                    listed("; not told, and not to be applied: ", [](const auto& j) { return !j.applied; }),
+                    listed("; hardly told, and to be applied with the rest all the same: ",
+                           [](const auto& j) { return j.applied && !j.told; })));
+  }
+
+  /// Names of those joints, behind a few words; empty where there is none.
+  template <class Which>
+  [[nodiscard]] std::string listed(const char* words, const Which& which) const {
+    std::string names;
+    for (const auto& joint : result_.joints) {
+      if (which(joint)) names += (names.empty() ? words : ", ") + joint.name;
+    }
+    return names;
   }
 
   [[nodiscard]] std::string beyond_belief(const BatchFit& batch) const {

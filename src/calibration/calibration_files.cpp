@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/core/write_file.hpp"
+#include "bodyschema/effects/effect_kind.hpp"
 #include "bodyschema/pipeline/export_correction.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/pipeline/silhouette_preview.hpp"
@@ -38,12 +39,16 @@ Json to_json(const Calibration& c, const std::string& root) {
   Json json;
   json["state"] = to_string(c.state);
   json["sentence"] = c.sentence;
-  json["told"] = Json::array();
+  json["told"] = json["applied"] = Json::array();
   for (const auto& joint : c.joints) {
     json["offset_deg"][joint.name] = degrees(joint.offset_rad);
     json["stddev_deg"][joint.name] = degrees(joint.sd_rad);
     if (joint.told) json["told"].push_back(joint.name);
-    if (!joint.told) json["untold"][joint.name] = joint.untold_why;
+    if (joint.applied) json["applied"].push_back(joint.name);
+    if (joint.told) continue;
+    json["untold"][joint.name] = joint.untold_why;
+    json["pictures_alone"][joint.name] = {{"offset_deg", degrees(joint.seen_rad)},
+                                          {"stddev_deg", degrees(joint.seen_sd_rad)}};
   }
   for (const auto& camera : c.cameras) {
     auto& entry = json["cameras"][camera.name];
@@ -94,11 +99,19 @@ Json to_json(const Calibration& c, const std::string& root) {
   return json;
 }
 
-/// What is told, as the exporter takes it; what is not told stays out unless asked for.
-Correction correction_of(const Calibration& c, bool all) {
+/// What of a joint that is not told the files and tables say.
+std::string why_so(const CalibratedJoint& joint) {
+  if (joint.told) return {};
+  if (joint.applied) return "hardly told: " + joint.untold_why;
+  return fmt::format("not told: {}; the pictures alone make it {:.2f}, sd {:.2f}", joint.untold_why,
+                     degrees(joint.seen_rad), degrees(joint.seen_sd_rad));
+}
+
+/// What is to be applied, as the exporter takes it.
+Correction correction_of(const Calibration& c) {
   Correction correction;
   for (const auto& joint : c.joints) {
-    if (!joint.told && !all) {
+    if (!joint.applied) {
       correction.warnings.push_back(joint.name + " is left as it is: " + joint.untold_why);
       continue;
     }
@@ -108,39 +121,43 @@ Correction correction_of(const Calibration& c, bool all) {
   return correction;
 }
 
-/// How hands are mounted, as far as a good result tells: the offsets hold together with it. Where a result is not good
-/// a mount takes up what is wrong elsewhere, and its standard deviation does not say so.
-void add_mounts(const Calibration& calibration, const BatchFit& batch, const PictureLog& log, const Pipeline& pipeline,
-                bool all, Correction& correction) {
+/// What a URDF can hold besides: the head's offsets, lengths, how hands are mounted; the offsets hold together with it.
+/// Of a result that is not good nothing: a mount takes up what is wrong elsewhere, and its standard deviation does not
+/// say so. Cameras have a file of their own.
+void add_geometry(const Calibration& calibration, const BatchFit& batch, const PictureLog& log,
+                  const Pipeline& pipeline, bool all, Correction& correction) {
   if (calibration.state != CalibrationState::kGood && !all) return;
-  constexpr double kTold = 1.0 / 3.0;  // of what was believed
-  const auto& state = batch.state();
-  ErrorModel mounts(log.roles());
-  for (std::size_t e = 0; e < state.model().size(); ++e) {
-    const Effect& effect = state.model()[e];
-    if (effect.name() != "hand_mount") continue;
-    bool told = true;
-    for (std::size_t p = 0; p < effect.parameters().size(); ++p) {
-      const auto k = state.find(effect.name(), effect.target(), p);
-      told &= k < 0 || std::sqrt(batch.estimate().covariance(k, k)) < kTold * state.prior_sd()[k];
+  ErrorModel geometry(log.roles());
+  const auto& model = batch.state().model();
+  for (std::size_t e = 0; e < model.size(); ++e) {
+    const auto parameters = model[e].parameters();
+    const bool differs =
+        std::any_of(parameters.begin(), parameters.end(), [](const auto& p) { return p.value != 0.0; });
+    if (differs && effect_kind(model[e].name()).home == EffectHome::kUrdf && !places_cameras(model[e].name())) {
+      geometry.add(model[e].clone());
     }
-    if (told || all) mounts.add(effect.clone());
   }
-  add_effects(mounts, log.robot(), pipeline.setup(), log.rig(), correction);
+  add_effects(geometry, log.robot(), pipeline.setup(), log.rig(), correction);
 }
 
-std::string offsets_yaml(const Calibration& c, bool all) {
+std::string offsets_yaml(const Calibration& c, const Correction& correction) {
   std::string text = "# encoder = true + offset: subtract from every encoder reading. Degrees.\nversion: 1\n";
   std::string offsets = "offset_deg:\n", sds = "stddev_deg:\n";
   for (const auto& joint : c.joints) {
-    if (!joint.told && !all) {
+    if (!joint.applied) {
       text += fmt::format("# {} is left out: {}\n", joint.name, joint.untold_why);
       continue;
     }
     offsets += fmt::format("  {}: {:.4f}\n", joint.name, degrees(joint.offset_rad));
     sds += fmt::format("  {}: {:.4f}\n", joint.name, degrees(joint.sd_rad));
   }
-  return text + offsets + sds;
+  std::string head;
+  for (const auto& [joint, offset] : correction.known_offsets_rad) {
+    head += fmt::format("  {}: {:.4f}\n", joint, degrees(offset));
+  }
+  if (!head.empty())
+    head = "# Of the head's joints; arm and head hold together: apply both or neither.\nhead_offset_deg:\n" + head;
+  return text + offsets + sds + head;
 }
 
 std::string cameras_yaml(const Calibration& c) {
@@ -151,7 +168,9 @@ std::string cameras_yaml(const Calibration& c) {
     const auto& d = camera.distortion;
     const auto& beside = camera.beside;
     const Eigen::Matrix4d X = (beside ? beside->X_first_optical : camera.X_link_optical).matrix();
-    const double sd_m = beside ? beside->sd_m : camera.sd_m, sd_rad = beside ? beside->sd_rad : camera.sd_rad;
+    // One figure serves all axes: that of the axis of which least is known.
+    const double sd_m = beside ? beside->axis_sd_m : camera.axis_sd_m;
+    const double sd_rad = beside ? beside->axis_sd_rad : camera.axis_sd_rad;
     // The other way to place a camera is taken out of what this is included behind.
     text += beside ? fmt::format("  {}:\n    link: ~\n    X_link_optical: ~\n    beside: {}\n    X_beside_optical:\n",
                                  camera.name, beside->camera)
@@ -161,9 +180,8 @@ std::string cameras_yaml(const Calibration& c) {
       text += fmt::format("      - [{:.9f}, {:.9f}, {:.9f}, {:.9f}]\n", X(r, 0), X(r, 1), X(r, 2), X(r, 3));
     }
     if (camera.estimated) {
-      text +=
-          fmt::format("    pose: roughly\n    pose_sd_deg: {:.4f}\n    pose_sd_mm: {:.3f}\n",
-                      std::max(1e-3, degrees(sd_rad) / std::sqrt(3.0)), std::max(1e-2, 1e3 * sd_m / std::sqrt(3.0)));
+      text += fmt::format("    pose: roughly\n    pose_sd_deg: {:.4f}\n    pose_sd_mm: {:.3f}\n",
+                          std::max(1e-3, degrees(sd_rad)), std::max(1e-2, 1e3 * sd_m));
     } else {
       text += "    pose: known\n";
     }
@@ -213,12 +231,13 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
   page.verdict(c.sentence);
   page.heading("Offsets of the joints");
   page.paragraph(
-      "encoder = true + offset; one standard deviation. What is not told keeps what was believed and is not to be "
-      "applied.");
+      "encoder = true + offset; one standard deviation. What is not told stays as it is: zero, and how far off that "
+      "may "
+      "be. All else is right together with that.");
   std::vector<std::vector<std::string>> rows;
   for (const auto& joint : c.joints) {
     rows.push_back({joint.name, fmt::format("{:.2f}", degrees(joint.offset_rad)),
-                    fmt::format("{:.2f}", degrees(joint.sd_rad)), joint.told ? "told" : joint.untold_why});
+                    fmt::format("{:.2f}", degrees(joint.sd_rad)), joint.told ? "told" : why_so(joint)});
   }
   page.table({"joint", "offset, deg", "sd, deg", ""}, rows);
   page.heading("Cameras");
@@ -299,6 +318,10 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
 
 }  // namespace
 
+bool places_cameras(const std::string& effect) {
+  return effect == "camera_pose" || effect == "camera_pair" || effect == "first_camera" || effect == "baseline";
+}
+
 void write_calibration(const Calibration& calibration, const BatchFit& batch, PictureLog& log,
                        const std::vector<Observation>& kept, const Pipeline& pipeline,
                        const Configuration& configuration, const CalibrationOptions& options) {
@@ -308,11 +331,11 @@ void write_calibration(const Calibration& calibration, const BatchFit& batch, Pi
   json["model_hash"] = pipeline.model_hash();
   replace_file(options.out / "calibration.json", json.dump(2) + '\n');
   write_page(calibration, batch, log, kept, options);
-  replace_file(options.out / "offsets.yaml", offsets_yaml(calibration, options.all_parameters));
+  Correction correction = correction_of(calibration);
+  add_geometry(calibration, batch, log, pipeline, options.all_parameters, correction);
+  replace_file(options.out / "offsets.yaml", offsets_yaml(calibration, correction));
   replace_file(options.out / "cameras.yaml", cameras_yaml(calibration));
   if (!options.configuration.empty()) replace_file(options.out / "estimator.yaml", estimator_yaml(options));
-  Correction correction = correction_of(calibration, options.all_parameters);
-  add_mounts(calibration, batch, log, pipeline, options.all_parameters, correction);
   write_corrected_urdf(pipeline.setup().model.urdf, correction, options.out / "corrected.urdf");
   write_ros_files(options.out / "ros", pipeline.setup().model.urdf, options.out / "corrected.urdf", correction,
                   ros_cameras_of(calibration, log.rig()));
@@ -323,7 +346,7 @@ std::string to_table(const Calibration& c) {
   text += fmt::format("{:<24} {:>10} {:>8}\n", "joint", "offset deg", "sd deg");
   for (const auto& joint : c.joints) {
     text += fmt::format("{:<24} {:>10.2f} {:>8.2f}  {}\n", joint.name, degrees(joint.offset_rad), degrees(joint.sd_rad),
-                        joint.told ? "" : "not told: " + joint.untold_why);
+                        why_so(joint));
   }
   for (const auto& camera : c.cameras) {
     const Eigen::Vector3d p = camera.X_link_optical.translation();

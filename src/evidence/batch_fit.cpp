@@ -83,8 +83,12 @@ void BatchFit::widen(const Eigen::VectorXd& factor) {
 void BatchFit::meet(const MemoryEstimate& other) {
   const Eigen::MatrixXd own = memory_.estimate().own;
   // P_b of (P_a + P_b)^-1 P_b, without an inverse of what is hardly known.
-  const Eigen::VectorXd moved = own * (own + other.own).ldlt().solve(other.x - estimate_.x);
-  estimate_.x += moved;
+  move_to(estimate_.x + own * (own + other.own).ldlt().solve(other.x - estimate_.x));
+}
+
+void BatchFit::move_to(const Eigen::VectorXd& x) {
+  const Eigen::VectorXd moved = x - estimate_.x;
+  estimate_.x = x;
   for (auto* covariance : {&estimate_.own, &estimate_.covariance}) *covariance += moved * moved.transpose();
   state_.set(estimate_.x);
   std::vector<std::size_t> pictures;

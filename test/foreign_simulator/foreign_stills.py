@@ -10,8 +10,9 @@ usage: foreign_stills.py play URDF CONDITION SEED FOLDER      a folder of stills
 
 `table` plays what is not in FOLDER yet, runs new-robot, import stills and calibrate as a user would, and prints for
 each set the state, how many joints are told, the rms of their errors, the worst one in published standard deviations
-(0.1 deg added), and how far the camera is off, a turn about the first joint's axis taken out. Exit status 1 where a
-result is `good` and wrong: a told joint off by more than 5 standard deviations, or by more than 3 and 0.5 deg.
+(0.1 deg added), how far the camera is off, a turn about the first joint's axis taken out, and how far off the files as
+they are written put the hand in the camera's frame. Exit status 1 where a result is `good` and wrong: a told joint off by
+more than 5 standard deviations, or by more than 3 and 0.5 deg, or the hand by more than 3 and 2 mm.
 
 Needs what foreign_simulator.py needs.
 """
@@ -25,7 +26,7 @@ import subprocess
 import sys
 
 from foreign_simulator import (DEG, FINER, SOURCE, Lens, Scene, Urdf, add_texture, bricks, cloth, cv2, mujoco, np,
-                               numbers, origin_of, plaster, posters, quaternion, rotation, wood)
+                               numbers, origin_of, plaster, posters, quaternion, rotation, wood, yaml)
 
 PLAIN = {"postures": 8, "cameras": "stereo", "size": (960, 540), "focal": 534.6, "looks": "covers", "offset_sd_deg": 4,
          "spread_deg": 50, "light": 1.0, "noise": 1.0, "masks": "exact", "tool": False, "twin": False, "covered": False}
@@ -64,6 +65,23 @@ def looking_at(eye, target, roll):
     X = np.eye(4)
     X[:3, :3] = np.column_stack([x, np.cross(z, x), z]) @ rotation([0, 0, roll])
     X[:3, 3] = eye
+    return X
+
+
+def pose_of(urdf, link, angles):
+    """Pose of a link in the base at these joint angles, rad; zero where none is given."""
+    X = np.eye(4)
+    while link != urdf.root:
+        joint = next(j for j in urdf.joints.values() if j.find("child").get("link") == link)
+        step = np.eye(4)
+        xyz, R = origin_of(joint)
+        if joint.get("type") in ("revolute", "continuous"):
+            axis = joint.find("axis")
+            a = np.array(numbers(axis.get("xyz"))) if axis is not None else np.array([1.0, 0, 0])
+            R = R @ cv2.Rodrigues(angles.get(joint.get("name"), 0.0) * a)[0]
+        step[:3, :3], step[:3, 3] = R, xyz
+        X = step @ X
+        link = joint.find("parent").get("link")
     return X
 
 
@@ -166,7 +184,7 @@ class StillScene(Scene):
 
     def set_twin(self, body):
         for name, (link, vertices, faces, rgba, material) in list(self.visuals):
-            X = self.at_zero(link)
+            X = pose_of(self.urdf, link, {name: 0.5 for name in self.urdf.joints})
             mesh = self.spec.add_mesh(name="twin " + name)
             mesh.uservert = (vertices @ X[:3, :3].T + X[:3, 3]).ravel().tolist()
             mesh.userface = faces.ravel().tolist()
@@ -174,22 +192,6 @@ class StillScene(Scene):
             geom = body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, contype=0, conaffinity=0,
                                  rgba=rgba)
             geom.material = material
-
-    def at_zero(self, link):
-        """Pose of a link in the base, all joints at 0.5 rad."""
-        X = np.eye(4)
-        while link != self.urdf.root:
-            joint = next(j for j in self.urdf.joints.values() if j.find("child").get("link") == link)
-            step = np.eye(4)
-            xyz, R = origin_of(joint)
-            if joint.get("type") in ("revolute", "continuous"):
-                axis = joint.find("axis")
-                a = np.array(numbers(axis.get("xyz"))) if axis is not None else np.array([1.0, 0, 0])
-                R = R @ cv2.Rodrigues(0.5 * a)[0]
-            step[:3, :3], step[:3, 3] = R, xyz
-            X = step @ X
-            link = joint.find("parent").get("link")
-        return X
 
     def add_tool(self):
         """What no URDF has: a bracket and a rod on the last link that has a shape."""
@@ -397,13 +399,15 @@ class Stills:
             (out / "stills/images" / camera).mkdir(parents=True, exist_ok=True)
             (out / "stills/masks" / camera).mkdir(parents=True, exist_ok=True)
         (out / "stills/camera_info").mkdir(exist_ok=True)
-        rows, sheet = [], []
+        rows, sheet, hands = [], [], []
         for k, angles in enumerate(self.postures):
             if self.condition.get("moved"):
                 self.scene.move_things()
             self.scene.set_joints(angles)
             noise = self.random.normal(0, 0.02 * DEG, len(self.joints))
             rows.append([k, *(angles[j] + self.offsets[j] * DEG + n for j, n in zip(self.joints, noise))])
+            hand = self.scene.pose(self.scene.points[-1][0])
+            hands.append((np.linalg.inv(self.cameras["left"]["X_base_optical"]) @ hand).tolist())
             for camera in self.cameras:
                 picture = self.scene.picture(camera)
                 arm, tool = self.scene.silhouettes(camera)
@@ -427,7 +431,7 @@ class Stills:
         cv2.imwrite(str(out / "sheet.png"),
                     np.vstack([np.hstack(sheet[i:i + columns]) for i in range(0, len(sheet), columns)])[..., ::-1])
         (out / "truth.json").write_text(json.dumps({
-            "offsets_deg": self.offsets,
+            "offsets_deg": self.offsets, "hand_link": self.scene.points[-1][0], "hand_in_left_camera": hands,
             "cameras": {name: camera["X_base_optical"].tolist() for name, camera in self.cameras.items()}}))
 
 
@@ -489,6 +493,22 @@ def calibrate(program, urdf, folder, masks):
     return json.loads((out / "calibration/calibration.json").read_text())
 
 
+def hand_by_the_files(folder, truth):
+    """How far off the hand is in the camera's frame, mm, for whoever feeds corrected.urdf and cameras.yaml with the
+    encoders as they are: rms over the postures."""
+    calibration = folder / "calibration"
+    urdf = Urdf(calibration / "corrected.urdf", [folder])
+    found = yaml.safe_load((calibration / "cameras.yaml").read_text())["cameras"]["left"]
+    X = pose_of(urdf, found["link"], {}) @ np.array(found["X_link_optical"])
+    squares = []
+    with (folder.parent / "stills/joints.csv").open() as file:
+        for row, hand in zip(csv.DictReader(file), truth["hand_in_left_camera"]):
+            angles = {j: float(a) for j, a in row.items() if j != "posture"}
+            by_files = np.linalg.inv(X) @ pose_of(urdf, truth["hand_link"], angles)
+            squares.append(1e6 * np.sum((by_files[:3, 3] - np.array(hand)[:3, 3]) ** 2))
+    return math.sqrt(np.mean(squares))
+
+
 def score(result, truth, urdf):
     told = [j for j in result["told"] if j in truth["offsets_deg"]]
     first = next(iter(truth["offsets_deg"]))
@@ -505,7 +525,8 @@ def score(result, truth, urdf):
 
 
 def table(arguments):
-    print(f"{'set':<26} {'state':<14} {'told':>7} {'rms, deg':>9} {'error/sd':>8} {'camera':>18} {'outline':>8}  wrong")
+    print(f"{'set':<26} {'state':<14} {'told':>7} {'rms, deg':>9} {'error/sd':>8} {'camera':>18} {'outline':>8} "
+          f"{'hand (sd)':>18}  wrong")
     bad = 0
     for robot in arguments.robots:
         name, _, urdf = robot.partition("=")
@@ -519,10 +540,15 @@ def table(arguments):
                 if isinstance(result, list):
                     print(f"{folder.name:<26} {' '.join(result)}", flush=True)
                     continue
-                s = score(result, json.loads((folder / "truth.json").read_text()), urdf)
+                truth = json.loads((folder / "truth.json").read_text())
+                s = score(result, truth, urdf)
+                hand = hand_by_the_files(folder / ("raw" if arguments.no_masks else "masks"), truth)
+                if hand > max(2, 3 * result["hand_sd_mm"]):
+                    s["wrong"].append("hand")
                 bad += s["state"] == "good" and bool(s["wrong"])
                 print(f"{folder.name:<26} {s['state']:<14} {s['told']:>2} of {s['of']:<2} {s['rms']:>8.2f} "
-                      f"{s['z']:>9.1f} {s['mm']:>8.1f} mm {s['deg']:>4.2f} deg {s['px']:>5.2f} px  "
+                      f"{s['z']:>9.1f} {s['mm']:>8.1f} mm {s['deg']:>4.2f} deg {s['px']:>5.2f} px "
+                      f"{hand:>6.1f} ({result['hand_sd_mm']:>6.1f}) mm  "
                       f"{' '.join(s['wrong'])}", flush=True)
     return 1 if bad else 0
 

@@ -44,6 +44,9 @@ class BatchFit {
   /// it claims to know, and is uncertain by as much as it moved. (Two readings of one thing share what pictures and
   /// postures get wrong; half their difference is what each reading errs by.)
   void meet(const MemoryEstimate& other);
+  /// The state is put where something else decides that it is, along what pictures hardly tell: covariances become mean
+  /// squared errors about that place.
+  void move_to(const Eigen::VectorXd& x);
   [[nodiscard]] const PostureMemory& memory() const { return memory_; }
   [[nodiscard]] const Considered& beside() const { return beside_; }
   [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }

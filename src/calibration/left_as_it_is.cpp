@@ -1,0 +1,67 @@
+#include "left_as_it_is.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "bodyschema/evidence/distributions.hpp"
+
+namespace bodyschema {
+namespace {
+
+/// Statistical: probability of such a distance where nothing is wrong. To apply what need not be costs little: of all
+/// values the estimate is the one that is least off on average.
+constexpr double kContradicted = 0.05;
+constexpr double kHeld = 1e-3;          ///< of a belief's standard deviation: next to nothing
+
+std::vector<Eigen::Index> parameters_of(const State& state, const std::vector<std::size_t>& effects) {
+  std::vector<Eigen::Index> list;
+  for (Eigen::Index k = 0; k < state.size(); ++k) {
+    const auto effect = state.parameters()[static_cast<std::size_t>(k)].ref.effect;
+    if (std::find(effects.begin(), effects.end(), effect) != effects.end()) list.push_back(k);
+  }
+  return list;
+}
+
+}  // namespace
+
+std::vector<std::size_t> left_as_they_are(const State& state, const MemoryEstimate& estimate,
+                                          std::vector<std::size_t> untold) {
+  while (!untold.empty()) {
+    const auto own = parameters_of(state, untold);
+    const Eigen::VectorXd away = (state.prior_mean() - estimate.x)(own);
+    const Eigen::MatrixXd C = estimate.covariance(own, own);
+    const double distance = away.dot(C.ldlt().solve(away));
+    if (distance <= chi_square_quantile(kContradicted, static_cast<double>(own.size()))) break;
+    Eigen::Index furthest = 0;
+    away.cwiseAbs().cwiseQuotient(C.diagonal().cwiseSqrt()).maxCoeff(&furthest);
+    const auto worst = own[static_cast<std::size_t>(furthest)];
+    std::erase(untold, state.parameters()[static_cast<std::size_t>(worst)].ref.effect);
+  }
+  return untold;
+}
+
+Eigen::VectorXd given_as_believed(const State& state, const MemoryEstimate& estimate,
+                                  const std::vector<std::size_t>& effects) {
+  const auto own = parameters_of(state, effects);
+  const Eigen::VectorXd away = (state.prior_mean() - estimate.x)(own);
+  const Eigen::MatrixXd C = estimate.covariance(own, own);
+  Eigen::VectorXd x = estimate.x + estimate.covariance(Eigen::all, own) * C.ldlt().solve(away);
+  x(own) = state.prior_mean()(own);
+  return x;
+}
+
+std::vector<Belief> held_as_believed(std::vector<Belief> beliefs, const State& state,
+                                     const std::vector<std::size_t>& effects) {
+  for (auto& belief : beliefs) {
+    const bool held = std::any_of(effects.begin(), effects.end(), [&](std::size_t e) {
+      const Effect& effect = state.model()[e];
+      return effect.name() == belief.effect && effect.target() == belief.target;
+    });
+    if (!held) continue;
+    for (double& sd : belief.sd) sd *= kHeld;
+  }
+  return beliefs;
+}
+
+}  // namespace bodyschema
