@@ -2,17 +2,11 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <cmath>
-
-#include "bodyschema/evidence/distributions.hpp"
 
 namespace bodyschema {
 namespace {
 
-/// Statistical: probability of such a distance where nothing is wrong. To apply what need not be costs little: of all
-/// values the estimate is the one that is least off on average.
-constexpr double kContradicted = 0.05;
-constexpr double kHeld = 1e-3;          ///< of a belief's standard deviation: next to nothing
+constexpr double kHeld = 1e-3;  ///< of a belief's standard deviation: next to nothing
 
 std::vector<Eigen::Index> parameters_of(const State& state, const std::vector<std::size_t>& effects) {
   std::vector<Eigen::Index> list;
@@ -32,7 +26,7 @@ std::vector<std::size_t> left_as_they_are(const State& state, const MemoryEstima
     const Eigen::VectorXd away = (state.prior_mean() - estimate.x)(own);
     const Eigen::MatrixXd C = estimate.covariance(own, own);
     const double distance = away.dot(C.ldlt().solve(away));
-    if (distance <= chi_square_quantile(kContradicted, static_cast<double>(own.size()))) break;
+    if (distance <= static_cast<double>(own.size())) break;
     Eigen::Index furthest = 0;
     away.cwiseAbs().cwiseQuotient(C.diagonal().cwiseSqrt()).maxCoeff(&furthest);
     const auto worst = own[static_cast<std::size_t>(furthest)];

@@ -13,8 +13,9 @@ namespace bodyschema {
 // together with six degrees in a joint is wrong by these on a robot that keeps its zero, and so is all that holds
 // together with them; what is written has to be right for the robot as it will be.
 
-/// Which of some effects of a state can stay as they are believed: those that all together lie within what the pictures
-/// leave open (chi-square, one in twenty); of others the one furthest off is given up first.
+/// Which of some effects of a state can stay as they are believed: those that all together lie no further from there
+/// than the pictures leave open, one standard deviation (the mean of their chi-square distribution). To leave more
+/// would cost more than what is not known of it anyway. The one furthest off is given up first.
 /// @param untold  positions in the state's model
 std::vector<std::size_t> left_as_they_are(const State& state, const MemoryEstimate& estimate,
                                           std::vector<std::size_t> untold);

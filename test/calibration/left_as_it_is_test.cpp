@@ -40,12 +40,12 @@ class LeftAsItIs : public ::testing::Test {
 };
 
 TEST_F(LeftAsItIs, WhatPicturesLeaveOpenStays) {
-  estimate_.x[0] = radians(4.0);  // 1.3 standard deviations
+  estimate_.x[0] = radians(2.0);  // 0.7 standard deviations
   EXPECT_EQ(left_as_they_are(state_, estimate_, {0}), std::vector<std::size_t>{0});
 }
 
 TEST_F(LeftAsItIs, WhatPicturesContradictDoesNotAndTheOthersDo) {
-  estimate_.x[0] = radians(4.0);
+  estimate_.x[0] = radians(2.0);
   estimate_.x[2] = radians(0.5);  // 5
   EXPECT_EQ(left_as_they_are(state_, estimate_, {0, 2}), std::vector<std::size_t>{0});
   EXPECT_TRUE(left_as_they_are(state_, estimate_, {2}).empty());
@@ -54,8 +54,8 @@ TEST_F(LeftAsItIs, WhatPicturesContradictDoesNotAndTheOthersDo) {
 /// Each of two joints may stay, both together not.
 TEST_F(LeftAsItIs, TogetherTheyAreJudgedAsTheyHoldTogether) {
   estimate_.covariance(1, 2) = estimate_.covariance(2, 1) = -0.9 * radians(0.1) * radians(0.1);
-  estimate_.x[1] = radians(0.15);
-  estimate_.x[2] = radians(0.14);
+  estimate_.x[1] = radians(0.09);
+  estimate_.x[2] = radians(0.08);
   EXPECT_EQ(left_as_they_are(state_, estimate_, {1}).size(), 1u);
   EXPECT_EQ(left_as_they_are(state_, estimate_, {2}).size(), 1u);
   EXPECT_EQ(left_as_they_are(state_, estimate_, {1, 2}), std::vector<std::size_t>{2});
