@@ -47,7 +47,7 @@ std::string misfit(const PostureMemory& memory, const State& state) {
 
 EstimatorState conclude(const FrameOutcome& outcome, const FusedState& known, const State& state, bool knows_shape,
                         Estimate& estimate) {
-  if (outcome.state != EstimatorState::kConverging || known.young()) return outcome.state;
+  if (outcome.state != EstimatorState::kConverging || known.unsure()) return outcome.state;
   estimate.misfit = misfit(known.memory, state);
   // Known by the memory alone, whatever it claims: nobody sees whether it still holds.
   if (outcome.hidden.hand > limits::kMostHidden || (outcome.hidden_only && !outcome.near)) {

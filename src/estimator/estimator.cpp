@@ -83,7 +83,7 @@ struct Estimator::Impl {
       } else {
         const OutlineFit fit = tracker.measure(frame);
         tracker.gate(frame, fit, outcome);
-        if (outcome.verdict == FrameVerdict::kAgrees && !known.young()) {
+        if (outcome.verdict == FrameVerdict::kAgrees && !known.unsure()) {
           tracker.remember(frame, fit, outcome);
         } else {
           tracker.explain(frame, fit, outcome);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "limits.hpp"
+
 namespace bodyschema {
 
 FusedState::FusedState(const State& state, MemoryLayout layout, const MemoryOptions& options, std::size_t least)
@@ -18,6 +20,11 @@ Eigen::VectorXd FusedState::where_it_was() const {
 
 double FusedState::disagreement() const {
   return std::max(1.0, memory.dispersion());
+}
+
+void FusedState::hand_was_missed(double share) {
+  ++postures_;
+  postures_missed_ += share > limits::kBreakdown;
 }
 
 void FusedState::read(const Eigen::VectorXd& reading_rad, double time_s) {
@@ -44,6 +51,7 @@ void FusedState::see_loose_joints() {
 
 void FusedState::forget() {
   memory.forget_all();
+  forget_missed();
   memory.loosen({});
   alternative.reset();
   x = prior_mean_;

@@ -96,7 +96,7 @@ void Occlusion::learn(const Frame& frame, const Eigen::VectorXd& x, double hand_
 
 HiddenShare Occlusion::hidden(const FrameEvidence& seen) const {
   HiddenShare hidden;
-  double hand = 0.0, hand_gone = 0.0, robot = 0.0, robot_gone = 0.0;
+  double hand = 0.0, hand_gone = 0.0, hand_covered = 0.0, robot = 0.0, robot_gone = 0.0;
   for (const auto& samples : seen.samples) {
     for (const auto& sample : samples) {
       const bool gone = sample.odd || sample.covered;
@@ -105,9 +105,11 @@ HiddenShare Occlusion::hidden(const FrameEvidence& seen) const {
       if (!of_hand_[sample.part]) continue;
       hand += 1.0;
       hand_gone += gone;
+      hand_covered += sample.covered;
     }
   }
   if (hand > 0.0) hidden.hand = hand_gone / hand;
+  if (hand > hand_covered) hidden.hand_missed = (hand_gone - hand_covered) / (hand - hand_covered);
   if (robot > 0.0) hidden.robot = robot_gone / robot;
   hidden.holds = held_.known();
   return hidden;

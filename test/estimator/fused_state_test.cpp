@@ -45,6 +45,39 @@ TEST_F(FusedStateOfOwnRobot, IsYoungUntilEnoughPosturesWereSeenAndAfterForgettin
   EXPECT_EQ(known.x, Eigen::VectorXd::Zero(7));
 }
 
+/// A log of a cluttered room: a wrist 19 deg off in all of its 26 postures, most of the hand "hidden" in each, and once
+/// called converged.
+TEST_F(FusedStateOfOwnRobot, AHandThatMostPosturesDoNotShowIsLostAndNotHidden) {
+  FusedState known = state();
+  for (std::size_t posture = 0; posture < kLeast; ++posture) {
+    see(known, paper_offsets_rad());
+    EXPECT_FALSE(known.hand_is_lost()) << posture;
+    known.hand_was_missed(0.9);
+  }
+  EXPECT_FALSE(known.young());
+  EXPECT_TRUE(known.hand_is_lost());
+  EXPECT_TRUE(known.unsure());
+  for (std::size_t posture = 0; posture < kLeast; ++posture) known.hand_was_missed(0.2);
+  EXPECT_FALSE(known.hand_is_lost());
+  for (std::size_t posture = 0; posture < 2 * kLeast; ++posture) known.hand_was_missed(0.9);
+  EXPECT_TRUE(known.hand_is_lost());
+  known.forget();
+  EXPECT_FALSE(known.hand_is_lost());
+}
+
+/// What hides the hand of an arm that is well known costs no knowledge.
+TEST_F(FusedStateOfOwnRobot, AHandThatWasSeenLongEnoughMayBeHiddenForAsLong) {
+  FusedState known = state();
+  for (int posture = 0; posture < 20; ++posture) {
+    see(known, paper_offsets_rad());
+    known.hand_was_missed(0.1);
+  }
+  for (int posture = 0; posture < 20; ++posture) {
+    known.hand_was_missed(0.9);
+    EXPECT_FALSE(known.unsure()) << posture;
+  }
+}
+
 TEST_F(FusedStateOfOwnRobot, AJointThatStepsUnderItsReadingIsWhereItWasLast) {
   FusedState known = state();
   Eigen::VectorXd reading = Eigen::VectorXd::Zero(7);

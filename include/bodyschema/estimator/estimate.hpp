@@ -90,9 +90,10 @@ const char* to_string(FrameVerdict verdict);
 /// What other things hide of the robot in one frame: shares of the predicted outline, 0 to 1, that show the edge of
 /// something else or lie where a held thing is known to be. They are left out of the evidence.
 struct HiddenShare {
-  double hand = 0.0;   ///< of hand and fingers, all cameras; 0 where none of them is in view
-  double robot = 0.0;  ///< of all that is drawn of the robot
-  bool holds = false;  ///< something is known to be held: it has moved with the hand over several postures
+  double hand = 0.0;         ///< of hand and fingers, all cameras; 0 where none of them is in view
+  double hand_missed = 0.0;  ///< ... of what no held thing is known to cover
+  double robot = 0.0;        ///< of all that is drawn of the robot
+  bool holds = false;        ///< something is known to be held: it has moved with the hand over several postures
   /// "35 % of the hand is hidden, it holds something"; empty: nothing worth a word.
   [[nodiscard]] std::string text() const;
 };
