@@ -706,8 +706,6 @@ class Calibrator {
       const Eigen::MatrixXd C = J * batch.estimate().covariance * J.transpose();
       found.sd_m = std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace()));
       found.sd_rad = std::sqrt(std::max(0.0, C.bottomRightCorner<3, 3>().trace()));
-      found.axis_sd_m = largest_sd(C.topLeftCorner<3, 3>());
-      found.axis_sd_rad = largest_sd(C.bottomRightCorner<3, 3>());
       if (camera.mount.relative) found.beside = beside_first(batch, c);
       const Eigen::VectorXd with_first = J * batch.estimate().covariance.col(0);
       const Eigen::MatrixXd beside =
@@ -748,17 +746,9 @@ class Calibrator {
     };
     bool any = false;
     const Eigen::MatrixXd J = place_jacobian(state, place, any);
-    const Eigen::MatrixXd C = J * batch.estimate().covariance * J.transpose();
-    const Eigen::VectorXd variance = C.diagonal().cwiseMax(0.0);
-    return {rig_.cameras.front().name,           place(state.x()),
-            std::sqrt(variance.head<3>().sum()), std::sqrt(variance.tail<3>().sum()),
-            largest_sd(C.topLeftCorner<3, 3>()), largest_sd(C.bottomRightCorner<3, 3>())};
-  }
-
-  /// Along the direction of which least is known.
-  static double largest_sd(const Eigen::Matrix3d& covariance) {
-    return std::sqrt(
-        std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff()));
+    const Eigen::VectorXd variance = (J * batch.estimate().covariance * J.transpose()).diagonal().cwiseMax(0.0);
+    return {rig_.cameras.front().name, place(state.x()), std::sqrt(variance.head<3>().sum()),
+            std::sqrt(variance.tail<3>().sum())};
   }
 
   [[nodiscard]] std::string carrier_of(std::size_t camera) const {

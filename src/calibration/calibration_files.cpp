@@ -168,9 +168,7 @@ std::string cameras_yaml(const Calibration& c) {
     const auto& d = camera.distortion;
     const auto& beside = camera.beside;
     const Eigen::Matrix4d X = (beside ? beside->X_first_optical : camera.X_link_optical).matrix();
-    // One figure serves all axes: that of the axis of which least is known.
-    const double sd_m = beside ? beside->axis_sd_m : camera.axis_sd_m;
-    const double sd_rad = beside ? beside->axis_sd_rad : camera.axis_sd_rad;
+    const double sd_m = beside ? beside->sd_m : camera.sd_m, sd_rad = beside ? beside->sd_rad : camera.sd_rad;
     // The other way to place a camera is taken out of what this is included behind.
     text += beside ? fmt::format("  {}:\n    link: ~\n    X_link_optical: ~\n    beside: {}\n    X_beside_optical:\n",
                                  camera.name, beside->camera)
@@ -180,8 +178,10 @@ std::string cameras_yaml(const Calibration& c) {
       text += fmt::format("      - [{:.9f}, {:.9f}, {:.9f}, {:.9f}]\n", X(r, 0), X(r, 1), X(r, 2), X(r, 3));
     }
     if (camera.estimated) {
-      text += fmt::format("    pose: roughly\n    pose_sd_deg: {:.4f}\n    pose_sd_mm: {:.3f}\n",
-                          std::max(1e-3, degrees(sd_rad)), std::max(1e-2, 1e3 * sd_m));
+      // One figure serves all axes: their mean. That of the axis of which least is known would leave the others open.
+      text +=
+          fmt::format("    pose: roughly\n    pose_sd_deg: {:.4f}\n    pose_sd_mm: {:.3f}\n",
+                      std::max(1e-3, degrees(sd_rad) / std::sqrt(3.0)), std::max(1e-2, 1e3 * sd_m / std::sqrt(3.0)));
     } else {
       text += "    pose: known\n";
     }
@@ -231,9 +231,9 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
   page.verdict(c.sentence);
   page.heading("Offsets of the joints");
   page.paragraph(
-      "encoder = true + offset; one standard deviation. What is not told stays as it is: zero, and how far off that "
-      "may "
-      "be. All else is right together with that.");
+      "encoder = true + offset; one standard deviation. What is not told stays as it is, at zero, with how far off "
+      "that "
+      "may be. All else is right together with that.");
   std::vector<std::vector<std::string>> rows;
   for (const auto& joint : c.joints) {
     rows.push_back({joint.name, fmt::format("{:.2f}", degrees(joint.offset_rad)),

@@ -104,7 +104,7 @@ OutlineFit ArmTracker::measure(const Frame& frame) {
 void ArmTracker::gate(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome) {
   outcome.near = fitter_.lies_near(frame, fit.evidence);
   // Few postures say little, of a step as of all else.
-  const auto standing = known_.unsure() ? std::vector<Eigen::Index>() : known_.stalled.standing_while_others_move();
+  const auto standing = known_.young() ? std::vector<Eigen::Index>() : known_.stalled.standing_while_others_move();
   const auto judgement = gate_.judge(known_.memory, fit.quadratic, outcome.near, standing);
   outcome.verdict = judgement.verdict;
   outcome.innovation = judgement.innovation;
@@ -176,7 +176,7 @@ void ArmTracker::explain(const Frame& frame, const OutlineFit& fit, FrameOutcome
     return;
   }
   if (!round_) {
-    if (!agrees && !known_.unsure()) particles_.suspect_slips(frame, known_.x);
+    if (!agrees && !known_.young()) particles_.suspect_slips(frame, known_.x);
     round_.emplace();
     round_since_s_ = frame.time_s;
     round_->hypotheses = hypotheses(known_, model_.state(), fit, outcome, frame, particles_);
@@ -210,10 +210,10 @@ void ArmTracker::take(const Frame& frame, Explanation better, FrameOutcome& outc
     outcome.changed =
         fmt::format("{} slipped by {:.1f} deg", model_.state().parameters()[static_cast<std::size_t>(released[0])].name,
                     degrees(step));
-  } else if (!known_.unsure()) {
+  } else if (!known_.young()) {
     outcome.changed = better.hypothesis.what;
   }
-  if (better.hypothesis.instead == nullptr && !known_.unsure()) {
+  if (better.hypothesis.instead == nullptr && !known_.young()) {
     known_.alternative = std::move(known_.memory);
     known_.alternative_s = frame.time_s;
   } else if (better.hypothesis.instead != nullptr) {
@@ -235,7 +235,7 @@ void ArmTracker::take(const Frame& frame, Explanation better, FrameOutcome& outc
 /// Nothing happened to the robot, and what is seen of it agrees with what is known: something hides the rest. The
 /// memory stays, nothing is learned.
 bool ArmTracker::take_for_hidden(const OutlineFit& fit, FrameOutcome& outcome) {
-  if (known_.unsure()) return false;
+  if (known_.young()) return false;
   outcome.hidden = occlusion_.hidden(fit.seen.evidence);
   const bool rest = fitter_.rest_fits(fit.seen);
   if (rest) {
@@ -271,7 +271,7 @@ void ArmTracker::stay(const Frame& frame, const OutlineFit& fit, FrameOutcome& o
   if (frame.time_s - doubted_since_s_ <= limits::kPatience_s) return;
   outcome.verdict = FrameVerdict::kContradicts;
   outcome.state = EstimatorState::kDiverged;
-  if (known_.unsure()) begin_anew();
+  if (known_.young()) begin_anew();
 }
 
 // --- from frame to frame -----------------------------------------------------------------------
@@ -280,7 +280,7 @@ void ArmTracker::spread_particles(const FrameOutcome& outcome) {
   const auto& memory = known_.memory;
   std::optional<Eigen::VectorXd> sd_rad;
   // A young memory that pictures contradict may be the wrong arm's: the search goes on beside it.
-  if (!memory.empty() && !(known_.unsure() && outcome.verdict != FrameVerdict::kAgrees)) {
+  if (!memory.empty() && !(known_.young() && outcome.verdict != FrameVerdict::kAgrees)) {
     sd_rad = memory.estimate().covariance.diagonal().head(model_.state().joints()).cwiseMax(0.0).cwiseSqrt();
   }
   particles_.spread(known_.x, sd_rad);

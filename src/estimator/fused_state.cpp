@@ -25,6 +25,7 @@ double FusedState::disagreement() const {
 void FusedState::hand_was_missed(double share) {
   ++postures_;
   postures_missed_ += share > limits::kBreakdown;
+  postures_without_hand_ += share > limits::kMostHidden;
 }
 
 void FusedState::read(const Eigen::VectorXd& reading_rad, double time_s) {

@@ -38,14 +38,14 @@ std::vector<Hypothesis> hypotheses(const FusedState& known, const State& state, 
   constexpr std::size_t kStarts = 3;
   std::vector<Hypothesis> list;
   auto anew = particles.nearest(known.x, kStarts);
-  if (known.unsure() && outcome.verdict != FrameVerdict::kAgrees) {
+  if (known.hand_is_lost() || (known.young() && outcome.verdict != FrameVerdict::kAgrees)) {
     // What the first pictures were taken for has drawn the particles to itself, and may have been wrong.
     const auto guesses = particles.nearest_guesses(particles.score_first_guesses(frame), kStarts);
     anew.insert(anew.end(), guesses.begin(), guesses.end());
   }
   std::vector<Eigen::Index> everything(static_cast<std::size_t>(state.size()));
   std::iota(everything.begin(), everything.end(), Eigen::Index{0});
-  if (!known.unsure()) {
+  if (!known.young()) {
     for (Eigen::Index joint = 0; joint < state.joints(); ++joint) {
       list.push_back(slip(joint, known, fit, outcome.near, particles));
     }
@@ -57,9 +57,10 @@ std::vector<Hypothesis> hypotheses(const FusedState& known, const State& state, 
   if (known.alternative && frame.time_s - known.alternative_s < limits::kAlternative_s && !known.stalled.suspected()) {
     list.push_back({"what was known before holds", {}, {}, &*known.alternative});
     // One picture that is wrong may look like an arm elsewhere; the next ones are as the better memory foresees.
-    if (known.unsure()) list.back().known_instead = everything.size();
+    if (known.young()) list.back().known_instead = everything.size();
   }
-  list.push_back({"the arm was found elsewhere", everything, anew, nullptr, known.unsure()});
+  list.push_back(
+      {"the arm was found elsewhere", everything, anew, nullptr, known.young() || known.hand_was_never_seen()});
   return list;
 }
 

@@ -56,11 +56,13 @@ TEST_F(FusedStateOfOwnRobot, AHandThatMostPosturesDoNotShowIsLostAndNotHidden) {
   }
   EXPECT_FALSE(known.young());
   EXPECT_TRUE(known.hand_is_lost());
+  EXPECT_TRUE(known.hand_was_never_seen());
   EXPECT_TRUE(known.unsure());
   for (std::size_t posture = 0; posture < kLeast; ++posture) known.hand_was_missed(0.2);
   EXPECT_FALSE(known.hand_is_lost());
-  for (std::size_t posture = 0; posture < 2 * kLeast; ++posture) known.hand_was_missed(0.9);
+  for (std::size_t posture = 0; posture < 2 * kLeast; ++posture) known.hand_was_missed(0.6);
   EXPECT_TRUE(known.hand_is_lost());
+  EXPECT_FALSE(known.hand_was_never_seen());
   known.forget();
   EXPECT_FALSE(known.hand_is_lost());
 }

@@ -319,12 +319,12 @@ TEST(Health, FramesThatCouldNotBeWorkedOn) {
 
 TEST(Health, WhatHidesTheHandIsSaidBesideWhatTheRestGives) {
   HealthFacts facts = well();
-  facts.estimate.hidden = {0.35, 0.2, true};
+  facts.estimate.hidden = {.hand = 0.35, .robot = 0.2, .holds = true};
   expect(facts, HealthLevel::kOk, "hand known to 0.4 mm; weakest 0.71 r_wrist_prosup");
   expect(facts, HealthLevel::kOk, "; 35 % of the hand is hidden, it holds something");
-  facts.estimate.hidden = {0.0, 0.0, true};
+  facts.estimate.hidden = {.holds = true};
   expect(facts, HealthLevel::kOk, "; the hand holds something");
-  facts.estimate.hidden = {0.95, 0.6, false};
+  facts.estimate.hidden = {.hand = 0.95, .robot = 0.6};
   facts.estimate.state = EstimatorState::kOccluded;
   expect(facts, HealthLevel::kWarn, "occluded: too little of the hand is seen to say where it is");
   expect(facts, HealthLevel::kWarn, "95 % of the hand is hidden");

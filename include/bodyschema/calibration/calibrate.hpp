@@ -53,8 +53,6 @@ struct CalibratedCamera {
   std::array<double, 5> distortion{};      ///< k1 k2 p1 p2 k3 as OpenCV, as estimated
   double sd_m = 0.0;                       ///< root of the summed variances of its place in the link's frame
   double sd_rad = 0.0;                     ///< ... of its rotation
-  double axis_sd_m = 0.0;                  ///< standard deviation of its place along the axis of which least is known
-  double axis_sd_rad = 0.0;                ///< ... of its rotation
   /// The same if the arm's first joint were known: where the camera does not move with the robot's base, no picture
   /// tells that joint from a turn of the camera about its axis, and both figures above contain the turn.
   double sd_m_beside_first_joint = 0.0, sd_rad_beside_first_joint = 0.0;
@@ -63,7 +61,6 @@ struct CalibratedCamera {
     std::string camera;
     Pose X_first_optical = Pose::Identity();
     double sd_m = 0.0, sd_rad = 0.0;
-    double axis_sd_m = 0.0, axis_sd_rad = 0.0;
   };
   std::optional<Beside> beside;
   bool estimated = false;  ///< false: as configured
@@ -85,7 +82,7 @@ struct CalibratedJoint {
   double offset_rad = 0.0, sd_rad = 0.0;
   bool told = false;       ///< see Estimate::told
   std::string untold_why;  ///< "cannot be told from camera_pose turn_y"; empty where it is told
-  /// Told, or told too little and yet so much that pictures contradict leaving it as it is.
+  /// Told; or told too little, and further from where it is than the pictures leave open.
   bool applied = false;
   double seen_rad = 0.0, seen_sd_rad = 0.0;  ///< what the pictures make of it, whether it is applied or not
 };
