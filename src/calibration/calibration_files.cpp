@@ -231,9 +231,8 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
   page.verdict(c.sentence);
   page.heading("Offsets of the joints");
   page.paragraph(
-      "encoder = true + offset; one standard deviation. What is not told stays as it is, at zero, with how far off "
-      "that "
-      "may be. All else is right together with that.");
+      "encoder = true + offset; one standard deviation. What is not told stays as it is: zero, and how far off it is. "
+      "All else is right together with that.");
   std::vector<std::vector<std::string>> rows;
   for (const auto& joint : c.joints) {
     rows.push_back({joint.name, fmt::format("{:.2f}", degrees(joint.offset_rad)),

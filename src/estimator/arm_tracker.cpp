@@ -125,13 +125,14 @@ void ArmTracker::learn(const Frame& frame, const OutlineFit& fit, FrameOutcome& 
   }
   fitter_.learn_noise(fit);
   const Eigen::VectorXd posture = posture_of(frame.exposures[0].at.encoder, model_.roles());
-  if (const auto block = known_.memory.add(frame.time_s, posture, fit.seen.quadratic, fit.x)) {
-    known_.hand_was_missed(occlusion_.hidden(fit.seen.evidence).hand_missed);
+  const auto block = known_.memory.add(frame.time_s, posture, fit.seen.quadratic, fit.x);
+  if (block) {
     fitter_.learn_shape(fit, known_.memory.told());
     keyframes_.keep(frame, *block, known_.memory, fitter_.pictures_show(frame, fit.evidence));
   }
   keyframes_.look_again(known_.memory, fitter_);
   settle_on(frame, fit, outcome);
+  if (block) known_.hand_was_missed(outcome.hidden.hand_missed);
   if (!known_.young()) occlusion_.learn(frame, known_.in_frame.x, hand_sd_m_);
 }
 
