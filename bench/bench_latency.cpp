@@ -152,11 +152,13 @@ std::filesystem::path log_of(const Played& robot, Size size, const std::filesyst
   return file;
 }
 
-void latency(benchmark::State& state, const Played& robot, int seconds, Size size, bool jpeg) {
+void latency(benchmark::State& state, const std::string& engine, const Played& robot, int seconds, Size size,
+             bool jpeg) {
   const Scratch scratch;
   const std::string url = own_lcm_url();
   const auto log = jpeg ? log_of(robot, size, scratch.folder()) : reach_log();
-  std::vector<std::string> command{"bodyschemad", "--config", robot.file("estimator.yaml"), "--lcm-url", url};
+  std::vector<std::string> command{"bodyschemad", "--config", robot.file("estimator.yaml"), "--engine", engine,
+                                   "--lcm-url",   url};
   for (const auto& argument : size.arguments(robot)) command.push_back(argument);
   Process daemon(command, scratch.folder());
   if (!daemon.said("waiting for", Seconds(60))) {
@@ -221,13 +223,16 @@ int main(int argc, char** argv) {
     const char* wish = std::getenv("BODYSCHEMA_BENCH_SECONDS");
     const int seconds = wish != nullptr ? std::max(2, std::atoi(wish)) : 60;
     const auto add = [&](const Played& robot, Size size, bool jpeg) {
-      benchmark::RegisterBenchmark(
-          ("daemon" + std::string(jpeg ? "+jpeg/" : "/") + "contour/" + robot.triangles + "/" + size.text() + "/200")
-              .c_str(),
-          [=, &robot](benchmark::State& state) { latency(state, robot, seconds, size, jpeg); })
-          ->UseManualTime()
-          ->Iterations(1000)
-          ->Unit(benchmark::kMillisecond);
+      for (const std::string engine : {"contour", "atlas"}) {
+        benchmark::RegisterBenchmark(
+            ("daemon" + std::string(jpeg ? "+jpeg/" : "/") + engine + "/" + robot.triangles + "/" + size.text() +
+             "/200")
+                .c_str(),
+            [=, &robot](benchmark::State& state) { latency(state, engine, robot, seconds, size, jpeg); })
+            ->UseManualTime()
+            ->Iterations(1000)
+            ->Unit(benchmark::kMillisecond);
+      }
     };
     const char* data = std::getenv("BODYSCHEMA_DATA");
     const bool g1 = data != nullptr && std::filesystem::exists(std::filesystem::path(data) / "real/robots/g1");

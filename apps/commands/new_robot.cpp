@@ -48,8 +48,9 @@ void add_new_robot(CLI::App& app) {
       ->take_all();
   command->add_flag("--rectified", a->options.rectified,
                     "The pictures are rectified: P of the CameraInfo counts, not K");
-  command->add_option("--camera-pose", a->options.camera_pose,
-                      "camera_pose.json, or camera_pose.json:METHOD: poses of the cameras, taken as known");
+  command->add_option(
+      "--camera-pose", a->options.camera_pose,
+      "camera_pose.json, or camera_pose.json:METHOD: poses of the cameras, taken for right to 10 mm and 1 deg");
   command->add_option("--size", a->size, "Size of the pictures in px, WIDTHxHEIGHT (default 640x480)");
   command->add_option("--focal", a->options.focal_px, "Focal length in px; a guess without it")
       ->check(number_in(1.0, 1e5));

@@ -183,7 +183,7 @@ std::string cameras_yaml(const Calibration& c) {
           fmt::format("    pose: roughly\n    pose_sd_deg: {:.4f}\n    pose_sd_mm: {:.3f}\n",
                       std::max(1e-3, degrees(sd_rad) / std::sqrt(3.0)), std::max(1e-2, 1e3 * sd_m / std::sqrt(3.0)));
     } else {
-      text += "    pose: known\n";
+      text += "    pose: exact\n";
     }
     text += fmt::format(
         "    width: {}\n    height: {}\n    fx: {:.4f}\n    fy: {:.4f}\n    cx: {:.4f}\n    cy: {:.4f}\n"

@@ -13,6 +13,9 @@ namespace bodyschema {
 namespace {
 
 constexpr std::size_t kMostCameras = 2;
+// Physical: nobody measures the place of a camera on a robot better.
+constexpr double kKnown_m = 1e-3;
+constexpr double kKnown_rad = radians(0.1);
 constexpr double kRigid = 1e-3;  // poses are written with few digits: a row of 4 digits is off by less
 
 /// Names stand in file names, in JSON keys and on pages.
@@ -67,8 +70,9 @@ CameraMount read_mount(const Configuration& section) {
   const char* pose_key = mount.relative ? "X_beside_optical" : "X_link_optical";
   mount.parent = section.text(mount.relative ? "beside" : "link");
   if (mount.relative && section.has("link")) section.fail("link", "either 'link' or 'beside'");
-  const std::string knowledge = section.choice_or("pose", "known", {"known", "roughly", "unknown"});
-  mount.knowledge = knowledge == "known"     ? PlaceKnowledge::kKnown
+  const std::string knowledge = section.choice_or("pose", "exact", {"exact", "known", "roughly", "unknown"});
+  mount.knowledge = knowledge == "exact"     ? PlaceKnowledge::kExact
+                    : knowledge == "known"   ? PlaceKnowledge::kKnown
                     : knowledge == "roughly" ? PlaceKnowledge::kRoughly
                                              : PlaceKnowledge::kUnknown;
   if (section.has(pose_key)) {
@@ -79,6 +83,10 @@ CameraMount read_mount(const Configuration& section) {
   for (const char* sd : {"pose_sd_deg", "pose_sd_mm"}) {
     if (section.has(sd) && mount.knowledge != PlaceKnowledge::kRoughly)
       section.fail(sd, "it only with 'pose: roughly'");
+  }
+  if (mount.knowledge == PlaceKnowledge::kKnown) {
+    mount.sd_rad = kKnown_rad;
+    mount.sd_m = kKnown_m;
   }
   if (mount.knowledge == PlaceKnowledge::kRoughly) {
     mount.sd_rad = radians(section.number("pose_sd_deg", 1e-3, 90.0));

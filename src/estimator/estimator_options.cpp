@@ -80,12 +80,12 @@ std::vector<Belief> camera_beliefs(const StereoRig& rig) {
   std::vector<Belief> list;
   if (rig.cameras.empty()) return list;
   const auto& first = rig.cameras.front().mount;
-  if (first.knowledge != PlaceKnowledge::kKnown) list.push_back({"camera_pose", {}, sds(first)});
+  if (first.knowledge != PlaceKnowledge::kExact) list.push_back({"camera_pose", {}, sds(first)});
   if (rig.cameras.size() < 2) return list;
   const auto& second = rig.cameras[1].mount;
   std::vector<double> pair(6, 0.0);
   for (const auto* mount : {&second, second.relative ? nullptr : &first}) {
-    if (mount == nullptr || mount->knowledge == PlaceKnowledge::kKnown) continue;
+    if (mount == nullptr || mount->knowledge == PlaceKnowledge::kExact) continue;
     const auto own = sds(*mount);
     for (std::size_t k = 0; k < pair.size(); ++k) pair[k] = std::hypot(pair[k], own[k]);
   }

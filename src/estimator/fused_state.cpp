@@ -1,15 +1,37 @@
 #include "fused_state.hpp"
 
 #include <algorithm>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "limits.hpp"
 
 namespace bodyschema {
+namespace {
+
+/// What is believed of all but joints' offsets, whose prior is as wide as they may be off, may turn out to be too
+/// narrow: of an effect wherever it is, as one description has them all.
+MemoryLayout doubted(MemoryLayout layout, const State& state) {
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < state.parameters().size(); ++k) {
+    if (layout.is_joint[k]) {
+      layout.effect.push_back(-1);
+      continue;
+    }
+    const auto& name = state.model()[state.parameters()[k].ref.effect].name();
+    const auto seen = std::find(names.begin(), names.end(), name);
+    layout.effect.push_back(seen - names.begin());
+    if (seen == names.end()) names.push_back(name);
+  }
+  return layout;
+}
+
+}  // namespace
 
 FusedState::FusedState(const State& state, MemoryLayout layout, const MemoryOptions& options, std::size_t least)
-    : memory(std::move(layout), options), stalled(state.joints()), x(state.prior_mean()), in_frame(memory.estimate()),
-      least_postures(least), prior_mean_(x), joints_(state.joints()) {}
+    : memory(doubted(std::move(layout), state), options), stalled(state.joints()), x(state.prior_mean()),
+      in_frame(memory.estimate()), least_postures(least), prior_mean_(x), joints_(state.joints()) {}
 
 Eigen::VectorXd FusedState::where_it_was() const {
   Eigen::VectorXd result = memory.estimate().x;

@@ -11,6 +11,9 @@ namespace {
 
 /// A direction of which a piece says less than this, in units of what was believed of it, is not told by it.
 constexpr double kLeastTold = 0.1;
+/// Of what is believed of effects: heavy enough for a description that is plainly wrong, near a normal distribution
+/// where it is not.
+constexpr double kStudent_dof = 4.0;
 /// Blocks after which the dispersion has forgotten one.
 constexpr double kRecentBlocks = 12.0;
 /// Physical. rad; a joint whose encoder says nothing may be this far from where it was last: it has a range of motion.
@@ -27,13 +30,8 @@ Eigen::MatrixXd inverse(const Eigen::MatrixXd& A) {
 }  // namespace
 
 PostureMemory::PostureMemory(MemoryLayout layout, const MemoryOptions& options)
-    : layout_(std::move(layout)), options_(options), prior_(Quadratic::zero(layout_.size())),
-      posture_variance_(std::pow(options.posture_sd_rad, 2)) {
-  const auto n = layout_.estimated();
-  const Eigen::VectorXd precision = layout_.prior_sd.array().square().inverse();
-  prior_.A.diagonal().head(n) = precision;
-  prior_.b.head(n) = precision.cwiseProduct(layout_.prior_mean);
-}
+    : layout_(std::move(layout)), options_(options), posture_variance_(std::pow(options.posture_sd_rad, 2)),
+      widening_(Eigen::VectorXd::Ones(layout_.estimated())) {}
 
 /// What a posture gets wrong in one joint's angle.
 double PostureMemory::own_variance(Eigen::Index joint, std::span<const Eigen::Index> loose) const {
@@ -54,14 +52,50 @@ Quadratic PostureMemory::with_posture_error(const Quadratic& block, std::span<co
   return result;
 }
 
-Quadratic PostureMemory::sum(const Block* without) const {
-  Quadratic total = prior_;
+Quadratic PostureMemory::of_pictures() const {
+  Quadratic total = Quadratic::zero(layout_.size());
   const auto kept = [&](double then_s) { return std::exp(-std::max(0.0, now_s_ - then_s) / options_.memory_s); };
   if (old_) total.add(*old_, kept(old_s_));
   for (const auto& block : blocks_) {
-    if (&block != without) total.add(with_posture_error(block.pictures, block.loose), kept(block.end_s));
+    total.add(with_posture_error(block.pictures, block.loose), kept(block.end_s));
   }
   return total;
+}
+
+/// What is believed, as wide as it was found to be.
+Quadratic PostureMemory::prior() const {
+  Quadratic result = Quadratic::zero(layout_.size());
+  const Eigen::VectorXd precision = layout_.prior_sd.cwiseProduct(widening_).array().square().inverse();
+  result.A.diagonal().head(layout_.estimated()) = precision;
+  result.b.head(layout_.estimated()) = precision.cwiseProduct(layout_.prior_mean);
+  return result;
+}
+
+Quadratic PostureMemory::sum() const {
+  (void)estimate();  // finds how wide the prior is
+  Quadratic total = of_pictures();
+  total.add(prior());
+  return total;
+}
+
+/// One step of expectation and maximisation: the expected weight of a Student t distribution, whose inverse is the
+/// square of the widening.
+Eigen::VectorXd PostureMemory::wider(const MemoryEstimate& estimate) const {
+  const Eigen::VectorXd square = ((estimate.x - layout_.prior_mean).cwiseAbs2() + estimate.own.diagonal())
+                                     .cwiseQuotient(layout_.prior_sd.cwiseAbs2());
+  Eigen::VectorXd result = Eigen::VectorXd::Ones(square.size());
+  for (Eigen::Index k = 0; k < square.size(); ++k) {
+    const Eigen::Index effect = layout_.effect[static_cast<std::size_t>(k)];
+    if (effect < 0) continue;
+    double sum = kStudent_dof, count = kStudent_dof;
+    for (Eigen::Index i = 0; i < square.size(); ++i) {
+      if (layout_.effect[static_cast<std::size_t>(i)] != effect) continue;
+      sum += square[i];
+      count += 1.0;
+    }
+    result[k] = std::sqrt(std::max(1.0, sum / count));
+  }
+  return result;
 }
 
 MemoryEstimate PostureMemory::solve(const Quadratic& total) const {
@@ -82,8 +116,26 @@ Eigen::MatrixXd PostureMemory::with_considered(const MemoryEstimate& estimate) c
 }
 
 const MemoryEstimate& PostureMemory::estimate() const {
-  if (!estimate_) estimate_ = solve(sum());
+  if (estimate_) return *estimate_;
+  constexpr int kMostSteps = 30;
+  constexpr double kSettled = 0.01;  // a hundredth of a standard deviation
+  widening_.setOnes();               // from the narrowest on: where beliefs and pictures may both be right, beliefs are
+  const Quadratic pictures = of_pictures();
+  for (int step = 0;; ++step) {
+    Quadratic total = pictures;
+    total.add(prior());
+    estimate_ = solve(total);
+    if (layout_.effect.empty() || step == kMostSteps) break;
+    const Eigen::VectorXd next = wider(*estimate_);
+    if ((next - widening_).cwiseQuotient(widening_).cwiseAbs().maxCoeff() < kSettled) break;
+    widening_ = next;
+  }
   return *estimate_;
+}
+
+const Eigen::VectorXd& PostureMemory::widening() const {
+  (void)estimate();
+  return widening_;
 }
 
 void PostureMemory::changed() {
@@ -136,7 +188,7 @@ MemoryEstimate PostureMemory::in_posture() const {
 
 double PostureMemory::told() const {
   return static_cast<double>(layout_.estimated()) -
-         estimate().own.diagonal().cwiseQuotient(layout_.prior_sd.cwiseAbs2()).sum();
+         estimate().own.diagonal().cwiseQuotient(layout_.prior_sd.cwiseAbs2()).cwiseMin(1.0).sum();
 }
 
 MemoryEstimate PostureMemory::in_posture(const Quadratic& frame) const {
@@ -370,6 +422,8 @@ void PostureMemory::tighten_since(Eigen::Index joint, double from_s) {
 }
 
 void PostureMemory::release(std::span<const Eigen::Index> parameters, double from_s) {
+  (void)estimate();  // finds how wide the prior is
+  const Quadratic believed = prior();
   std::vector<Block> later;
   while (!blocks_.empty() && blocks_.back().begin_s >= from_s) {
     later.insert(later.begin(), std::move(blocks_.back()));
@@ -379,8 +433,8 @@ void PostureMemory::release(std::span<const Eigen::Index> parameters, double fro
   if (old_) {
     for (const auto k : parameters) {
       // Integrated out, with what was believed of it; the new value is believed of as the old one was.
-      old_->A(k, k) += prior_.A(k, k);
-      old_->b(k) += prior_.b(k);
+      old_->A(k, k) += believed.A(k, k);
+      old_->b(k) += believed.b(k);
       const Eigen::VectorXd column = old_->A.col(k);
       const double pivot = column(k), b = old_->b(k);
       old_->A -= column * column.transpose() / pivot;

@@ -162,11 +162,12 @@ std::string mount_yaml(const CameraModel& camera, const CameraModel& first) {
   if (mount.relative) {
     text = fmt::format("    beside: {}\n    X_beside_optical: {}\n", first.name, pose_yaml(mount.X_PC));
   } else if (camera.link == mount.parent) {
-    return fmt::format("    link: {}\n", camera.link);
+    text = fmt::format("    link: {}\n", camera.link);
+    if (mount.knowledge == PlaceKnowledge::kExact) return text;
   } else {
     text = fmt::format("    link: {}\n    X_link_optical: {}\n", mount.parent, pose_yaml(mount.X_PC));
   }
-  constexpr std::array<const char*, 3> kKnowledge = {"known", "roughly", "unknown"};
+  constexpr std::array<const char*, 4> kKnowledge = {"exact", "known", "roughly", "unknown"};
   text += fmt::format("    pose: {}\n", kKnowledge[static_cast<std::size_t>(mount.knowledge)]);
   if (mount.knowledge == PlaceKnowledge::kRoughly) {
     text += fmt::format("    pose_sd_deg: {:.6g}\n    pose_sd_mm: {:.6g}\n", degrees(mount.sd_rad), 1e3 * mount.sd_m);

@@ -110,9 +110,8 @@ StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const Rob
     CameraMount& mount = result.cameras[c].mount;
     mount.X_PC = mount.X_PC * moved[c];
     if (mount.relative) mount.X_PC = moved.front().inverse(Eigen::Isometry) * mount.X_PC;
-    if (motion || (mount.relative && !moved.front().isApprox(Pose::Identity(), 1e-12))) {
-      mount.knowledge = PlaceKnowledge::kKnown;
-    }
+    const bool found = motion || (mount.relative && !moved.front().isApprox(Pose::Identity(), 1e-12));
+    if (found && mount.knowledge != PlaceKnowledge::kExact) mount.knowledge = PlaceKnowledge::kKnown;
   }
   return result;
 }

@@ -26,6 +26,11 @@ namespace fs = std::filesystem;
 
 constexpr double kGuessedFieldOfView_rad = 1.05;       // 60 deg across, a common camera
 constexpr double kPairSd_deg = 0.1, kPairSd_mm = 1.0;  // of a stereo pair that was calibrated as one
+/// Of a camera's place by a hand-eye calibration, a drawing or a tape measure: wide enough for each, as pictures tell
+/// it far better.
+constexpr double kPlace_sd_deg = 1.0, kPlace_sd_mm = 10.0;
+/// Of an arm that comes with a URDF, and of a camera's calibration.
+constexpr double kBeside_sd_mm = 0.5, kTilted_sd_deg = 0.1, kFocal_sd_percent = 0.5;
 /// Physical: joined by arrival, pictures come late by some frames; a lens that nobody measured bends by as much.
 constexpr double kLag_sd_ms = 60.0;
 /// Of a camera's principal point, share of the width: by which calibrations of one camera differ.
@@ -436,16 +441,23 @@ class Starter {
                         : "unknown             # k1 is estimated; zeros: pictures come straightened";
   }
 
+  /// What a file says of a camera's place is some day's measurement, or a drawing.
+  [[nodiscard]] static std::string roughly() {
+    return fmt::format(
+        "    pose: roughly                   # or exact (a simulator's), known (to 1 mm and 0.1 deg) or unknown\n"
+        "    pose_sd_deg: {}                  # what is believed possible, about each axis\n"
+        "    pose_sd_mm: {}                  # ... and along each\n",
+        kPlace_sd_deg, kPlace_sd_mm);
+  }
+
   [[nodiscard]] std::string camera_yaml(std::size_t c) const {
     const StarterCamera& camera = cameras_[c];
     std::string text = fmt::format("  {}:\n", yaml(camera.name));
     if (camera.X_base) {
-      text += fmt::format(
-          "    link: {}\n    pose: known                     # or roughly, with pose_sd_deg and "
-          "pose_sd_mm, or unknown\n    X_link_optical: {}\n",
-          yaml(camera.link), pose_yaml(*camera.X_base));
+      text += fmt::format("    link: {}\n    X_link_optical: {}\n{}", yaml(camera.link), pose_yaml(*camera.X_base),
+                          roughly());
     } else if (!camera.unknown()) {
-      text += fmt::format("    link: {}\n", yaml(camera.link));
+      text += fmt::format("    link: {}\n{}", yaml(camera.link), roughly());
     } else if (camera.X_first) {
       text += fmt::format(
           "    beside: {}                    # as their calibration says; x right, y down, z forward\n"
@@ -454,7 +466,8 @@ class Starter {
     } else {
       text += fmt::format(
           "    link: {}                    # what carries the camera; where on it, is to be found:\n"
-          "    pose: unknown                   # or known, or roughly: X_link_optical, pose_sd_deg, pose_sd_mm\n",
+          "    pose: unknown                   # or exact, known, or roughly: X_link_optical, pose_sd_deg, "
+          "pose_sd_mm\n",
           yaml(urdf_.root()));
     }
     const auto& k = camera.k;
@@ -501,6 +514,16 @@ class Starter {
   /// What may be wrong in this recording besides what may be on any robot.
   [[nodiscard]] std::string state_yaml() const {
     std::string text;
+    if (!stills_) {
+      text += fmt::format(
+          "    # What a real arm and camera are wrong by as a rule (standard deviations); what turns out to be wronger "
+          "is\n"
+          "    # found all the same, and said. 0 leaves one out, for a simulator's.\n"
+          "    joint_place: {{sd_mm: {}}}       # each joint beside where the URDF has it\n"
+          "    axis_tilt: {{sd_deg: {}}}        # each axis\n",
+          kBeside_sd_mm, kTilted_sd_deg);
+      if (!focal_guessed()) text += fmt::format("    focal_length: {{sd_percent: {}}}\n", kFocal_sd_percent);
+    }
     if (moving_) {
       text += fmt::format("    latency: {{sd_ms: {}}}             # pictures against encoders\n", kLag_sd_ms);
     }

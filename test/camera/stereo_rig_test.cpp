@@ -119,17 +119,22 @@ TEST(StereoRig, TakesCamerasOfAnyNameInTheOrderOfTheirNumbers) {
 }
 
 TEST(StereoRig, ReadsWhereACameraIsFixedAndHowWellThatIsKnown) {
-  const CameraModel known = parse(
+  const CameraModel exact = parse(
                                 "cameras:\n  a: {link: base, X_link_optical: {xyz_m: [1, 2, 3], rpy_rad: "
                                 "[-1.5707963267948966, 0, -1.5707963267948966]}, " +
                                 kLens + "}\n")
                                 .cameras[0];
-  EXPECT_EQ(known.mount.parent, "base");
-  EXPECT_EQ(known.link, "camera:a");
-  EXPECT_EQ(known.mount.knowledge, PlaceKnowledge::kKnown);
+  EXPECT_EQ(exact.mount.parent, "base");
+  EXPECT_EQ(exact.link, "camera:a");
+  EXPECT_EQ(exact.mount.knowledge, PlaceKnowledge::kExact);
   // As a URDF has it: the optical frame of a camera that looks along x.
-  EXPECT_TRUE((known.mount.X_PC * Eigen::Vector3d(0, 0, 1)).isApprox(Eigen::Vector3d(2, 2, 3), 1e-12));
-  EXPECT_TRUE((known.mount.X_PC * Eigen::Vector3d(1, 0, 0)).isApprox(Eigen::Vector3d(1, 1, 3), 1e-12));
+  EXPECT_TRUE((exact.mount.X_PC * Eigen::Vector3d(0, 0, 1)).isApprox(Eigen::Vector3d(2, 2, 3), 1e-12));
+  EXPECT_TRUE((exact.mount.X_PC * Eigen::Vector3d(1, 0, 0)).isApprox(Eigen::Vector3d(1, 1, 3), 1e-12));
+
+  const CameraModel known = parse("cameras:\n  a: {link: base, pose: known, " + kLens + "}\n").cameras[0];
+  EXPECT_EQ(known.mount.knowledge, PlaceKnowledge::kKnown);
+  EXPECT_DOUBLE_EQ(known.mount.sd_rad, radians(0.1));
+  EXPECT_DOUBLE_EQ(known.mount.sd_m, 0.001);
 
   const CameraModel roughly = parse(
                                   "cameras:\n  a: {link: base, X_link_optical: [[0, 0, 1, 1], [-1, 0, 0, 2], [0, "
@@ -137,7 +142,7 @@ TEST(StereoRig, ReadsWhereACameraIsFixedAndHowWellThatIsKnown) {
                                   kLens + "}\n")
                                   .cameras[0];
   EXPECT_EQ(roughly.mount.knowledge, PlaceKnowledge::kRoughly);
-  EXPECT_TRUE(roughly.mount.X_PC.isApprox(known.mount.X_PC, 1e-12));
+  EXPECT_TRUE(roughly.mount.X_PC.isApprox(exact.mount.X_PC, 1e-12));
   EXPECT_DOUBLE_EQ(roughly.mount.sd_rad, radians(5.0));
   EXPECT_DOUBLE_EQ(roughly.mount.sd_m, 0.05);
 

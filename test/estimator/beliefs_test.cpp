@@ -111,7 +111,12 @@ TEST_F(BeliefsOfOwnRobot, OffsetsAreBelievedInOnePlaceOnly) {
 }
 
 TEST_F(BeliefsOfOwnRobot, WhereACameraSitsIsBelievedAsItsPoseSays) {
-  EXPECT_TRUE(camera_beliefs(rig_).empty()) << "known";
+  EXPECT_TRUE(camera_beliefs(rig_).empty()) << "exact: a simulator's";
+  // Nobody knows a place better than a good calibration does.
+  const auto known = read(load({"cameras.left.pose=known", "cameras.right.pose=known"}));
+  ASSERT_NE(find(known.state, "camera_pose"), nullptr);
+  EXPECT_NEAR(find(known.state, "camera_pose")->sd.at(2), 0.001, 1e-12);
+  EXPECT_NEAR(find(known.state, "camera_pair")->sd.at(5), std::sqrt(2.0) * radians(0.1), 1e-12);
   // Roughly: as its deviations say; fixed in a head, so each camera by itself.
   const auto rough = read(load({"cameras.left={pose: roughly, pose_sd_deg: 2, pose_sd_mm: 20}",
                                 "cameras.right={pose: roughly, pose_sd_deg: 1, pose_sd_mm: 10}"}));

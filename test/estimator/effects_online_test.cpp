@@ -135,7 +135,10 @@ TEST_F(EffectsOnline, FingersThatStandElsewhereOneByOneDoNotTurnTheWrist) {
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const auto* found = find(estimate, "finger_offset of " + joints[i].joint);
     ASSERT_NE(found, nullptr) << joints[i].joint;
-    EXPECT_LT(found->sd, found->prior_sd) << joints[i].joint;
+    // Fingers are off by four times what is believed of them: it is found too narrow, for those that are hardly seen
+    // too.
+    EXPECT_LT(std::abs(found->value - radians(off_deg[i])), 4.0 * found->sd) << joints[i].joint;
+    EXPECT_LT(found->sd, 0.5 * radians(4.2)) << joints[i].joint << ": half of how far they are off, root mean square";
   }
 }
 

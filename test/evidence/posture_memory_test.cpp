@@ -66,6 +66,46 @@ TEST_F(MemoryOfTwo, BeforeAnyFrameAndAfterForgettingItIsWhatWasBelieved) {
   is_prior();
 }
 
+// A camera said to be known to 1 mm that sits 10 mm off: half of it went into offsets, sure of themselves.
+TEST_F(MemoryOfTwo, ABeliefThatPicturesContradictOutrightGivesWay) {
+  layout_.effect = {0, 0};
+  const auto off = [&](double truth) {
+    auto memory = this->memory();
+    next(memory, measures(first_, truth, 0.7));
+    next(memory, measures(first_, truth, 0.7));
+    return memory;
+  };
+  for (const double truth : {-10.0, 6.0, 20.0}) {
+    SCOPED_TRACE(truth);
+    const auto memory = off(truth);
+    const auto& known = memory.estimate();
+    EXPECT_NEAR(known.x[0], truth, 2.0 * std::sqrt(known.own(0, 0)));
+    EXPECT_GT(memory.widening()[0], 2.0);
+    EXPECT_DOUBLE_EQ(memory.widening()[0], memory.widening()[1]) << "one description: wrong in one, not trusted in all";
+    EXPECT_NEAR(known.own(1, 1), std::pow(2.0 * memory.widening()[1], 2), 1e-6) << "of which pictures say nothing";
+  }
+  // What may be as believed is believed.
+  for (const double truth : {0.0, 1.0, -1.4}) {
+    SCOPED_TRACE(truth);
+    const auto memory = off(truth);
+    EXPECT_LT(memory.widening()[0], 1.05);
+    EXPECT_NEAR(memory.estimate().x[0], truth * 2.0 / (2.0 + 0.49), 0.02);
+  }
+}
+
+TEST_F(MemoryOfTwo, OtherEffectsAndOffsetsStayAsBelieved) {
+  for (const std::vector<Eigen::Index>& effect : {std::vector<Eigen::Index>{0, 1}, {0, -1}, {-1, 0}, {}}) {
+    layout_.effect = effect;
+    auto memory = this->memory();
+    next(memory, both(first_, 8.0, second_, 1.0, 0.7));
+    EXPECT_DOUBLE_EQ(memory.widening()[1], 1.0);
+    EXPECT_EQ(memory.widening()[0] > 1.5, !effect.empty() && effect[0] == 0);
+    memory.forget_all();
+    EXPECT_DOUBLE_EQ(memory.widening()[0], 1.0);
+    EXPECT_NEAR(memory.estimate().covariance(0, 0), 1.0, 1e-12);
+  }
+}
+
 TEST_F(MemoryOfTwo, DirectionsThatOnePostureCannotTellAreToldByAnother) {
   auto memory = this->memory();
   const Eigen::Vector2d truth(0.5, -0.4);

@@ -484,7 +484,7 @@ TEST_F(StarterConfiguration, ACameraPoseIsReadWhereItIsNamedAndOnlyThere) {
   o.out = folder_ / "known";
   EXPECT_TRUE(write_starter_configuration(o).usable);
   const Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
-  EXPECT_EQ(pipeline.rig().cameras[1].mount.knowledge, PlaceKnowledge::kKnown);
+  EXPECT_EQ(pipeline.rig().cameras[1].mount.knowledge, PlaceKnowledge::kRoughly) << "a file may be wrong";
   EXPECT_EQ(pipeline.rig().cameras[1].mount.X_PC.translation().x(), 2.0);
   o.out = folder_ / "none";
   for (const char* method : {"", ":b", ":c"}) {

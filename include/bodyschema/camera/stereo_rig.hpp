@@ -16,7 +16,8 @@ namespace bodyschema {
 
 /// What is known of a camera's place before anything has been estimated.
 enum class PlaceKnowledge {
-  kKnown,    ///< to be taken as it is
+  kExact,    ///< to be taken as it is: a simulator's
+  kKnown,    ///< as well as a good calibration knows it: to 1 mm and 0.1 deg, more or less
   kRoughly,  ///< up to errors of the standard deviations that are given
   kUnknown,  ///< nothing: to be found
 };
@@ -27,9 +28,9 @@ struct CameraMount {
   std::string parent;
   bool relative = false;         ///< to the rig's first camera
   Pose X_PC = Pose::Identity();  ///< the camera in its parent; identity where nothing is given
-  PlaceKnowledge knowledge = PlaceKnowledge::kKnown;
-  double sd_rad = 0.0;  ///< kRoughly: of the camera's rotation about each of its axes
-  double sd_m = 0.0;    ///< kRoughly: of its position along each of its axes
+  PlaceKnowledge knowledge = PlaceKnowledge::kExact;
+  double sd_rad = 0.0;  ///< kKnown, kRoughly: of the camera's rotation about each of its axes
+  double sd_m = 0.0;    ///< kKnown, kRoughly: of its position along each of its axes
 };
 
 /// One camera: where it sits on the robot and how it maps directions to pixels.

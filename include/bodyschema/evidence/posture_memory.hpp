@@ -30,6 +30,10 @@ struct MemoryLayout {
   /// What is not estimated but may be wrong all the same: Schmidt's considered parameters (Jazwinski 1970, section
   /// 8.4). A root of their covariance, SI. Quadratics are over the estimated parameters, then these.
   Eigen::MatrixXd considered_root;
+  /// Numbers of the kinds of effects that parameters belong to, below 0 for none; empty: none. What is believed of a
+  /// kind is a description by somebody who may be wrong: its `prior_sd` hold up to a factor, 1 or more, that all of its
+  /// parameters have in common and that pictures tell (PostureMemory::widening).
+  std::vector<Eigen::Index> effect{};
   [[nodiscard]] Eigen::Index estimated() const { return prior_sd.size(); }
   [[nodiscard]] Eigen::Index size() const { return prior_sd.size() + considered_root.rows(); }
 };
@@ -67,7 +71,9 @@ struct Innovation {
 /// the estimate has moved on: quadratics from different places claim to know directions that no picture tells (Huang et
 /// al., 2010, on the consistency of filters for simultaneous localisation and mapping). What blocks disagree about
 /// beyond their pictures' noise is learned as an error of every posture, in the joints' angles (a variance component,
-/// by MacKay's update of its evidence, 1992). At most `most_blocks` are kept. Not thread-safe.
+/// by MacKay's update of its evidence, 1992). What is believed of effects holds as a Student t distribution of four
+/// degrees of freedom does (Lange, Little and Taylor, 1989): pictures that contradict it outright are believed, and
+/// what is left open is then as wide as they ask for. At most `most_blocks` are kept. Not thread-safe.
 class PostureMemory {
  public:
   PostureMemory(MemoryLayout layout, const MemoryOptions& options);
@@ -104,6 +110,8 @@ class PostureMemory {
   [[nodiscard]] std::span<const Eigen::Index> loose() const { return loose_; }
 
   [[nodiscard]] const MemoryEstimate& estimate() const;
+  /// Of each parameter, by how many times its belief was too narrow: MemoryLayout::effect.
+  [[nodiscard]] const Eigen::VectorXd& widening() const;
   /// How many of the estimated parameters pictures tell: each counts by how much of its prior's say they have taken
   /// over.
   [[nodiscard]] double told() const;
@@ -165,8 +173,11 @@ class PostureMemory {
   [[nodiscard]] Surprise surprise(const Quadratic& frame) const;
   [[nodiscard]] Quadratic with_posture_error(const Quadratic& block, std::span<const Eigen::Index> loose) const;
   [[nodiscard]] double own_variance(Eigen::Index joint, std::span<const Eigen::Index> loose) const;
-  [[nodiscard]] Quadratic sum(const Block* without = nullptr) const;
+  [[nodiscard]] Quadratic sum() const;
   [[nodiscard]] MemoryEstimate solve(const Quadratic& sum) const;
+  [[nodiscard]] Quadratic of_pictures() const;
+  [[nodiscard]] Quadratic prior() const;
+  [[nodiscard]] Eigen::VectorXd wider(const MemoryEstimate& estimate) const;
   [[nodiscard]] const Eigen::MatrixXd& posture_precision() const;
   void changed();
   [[nodiscard]] Eigen::MatrixXd with_considered(const MemoryEstimate& estimate) const;
@@ -175,7 +186,6 @@ class PostureMemory {
 
   MemoryLayout layout_;
   MemoryOptions options_;
-  Quadratic prior_;
   std::vector<Block> blocks_;  ///< the last one is still open
   std::vector<Eigen::Index> loose_;
   std::optional<Quadratic> old_;
@@ -186,6 +196,7 @@ class PostureMemory {
   double nis_ = 0.0, nis_dof_ = 0.0;
   double posture_variance_;
   mutable std::optional<MemoryEstimate> estimate_;
+  mutable Eigen::VectorXd widening_;           ///< as of estimate_
   mutable Eigen::MatrixXd posture_precision_;  ///< of a posture's state; empty: not worked out yet
 };
 
