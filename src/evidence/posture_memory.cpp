@@ -14,6 +14,9 @@ constexpr double kLeastTold = 0.1;
 /// Of what is believed of effects: heavy enough for a description that is plainly wrong, near a normal distribution
 /// where it is not.
 constexpr double kStudent_dof = 4.0;
+/// Postures that must have been seen before beliefs give way: one or two are fitted as well to some other outline, and
+/// what is believed is all that speaks against it.
+constexpr std::size_t kLeastPostures = 3;
 /// Blocks after which the dispersion has forgotten one.
 constexpr double kRecentBlocks = 12.0;
 /// Physical. rad; a joint whose encoder says nothing may be this far from where it was last: it has a range of motion.
@@ -125,7 +128,7 @@ const MemoryEstimate& PostureMemory::estimate() const {
     Quadratic total = pictures;
     total.add(prior());
     estimate_ = solve(total);
-    if (layout_.effect.empty() || step == kMostSteps) break;
+    if (layout_.effect.empty() || postures() < kLeastPostures || step == kMostSteps) break;
     const Eigen::VectorXd next = wider(*estimate_);
     if ((next - widening_).cwiseQuotient(widening_).cwiseAbs().maxCoeff() < kSettled) break;
     widening_ = next;
