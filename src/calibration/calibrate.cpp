@@ -10,6 +10,7 @@
 #include <memory>
 #include <set>
 #include <thread>
+#include <tuple>
 #include <utility>
 
 #include "bodyschema/calibration/camera_search.hpp"
@@ -230,7 +231,7 @@ class Calibrator {
   /// Whether some camera may be turned by more than a few degrees.
   [[nodiscard]] bool hardly_known() const {
     return std::any_of(rig_.cameras.begin(), rig_.cameras.end(), [](const CameraModel& camera) {
-      return camera.mount.knowledge == PlaceKnowledge::kRoughly && camera.mount.sd_rad > kHardlyKnown_rad;
+      return camera.mount.knowledge == PlaceKnowledge::kRoughly && camera.mount.sd_rad.maxCoeff() > kHardlyKnown_rad;
     });
   }
 
@@ -706,6 +707,7 @@ class Calibrator {
       const Eigen::MatrixXd C = J * batch.estimate().covariance * J.transpose();
       found.sd_m = std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace()));
       found.sd_rad = std::sqrt(std::max(0.0, C.bottomRightCorner<3, 3>().trace()));
+      std::tie(found.axes_sd_m, found.axes_sd_rad) = along_axes(C, found.X_link_optical);
       if (camera.mount.relative) found.beside = beside_first(batch, c);
       const Eigen::VectorXd with_first = J * batch.estimate().covariance.col(0);
       const Eigen::MatrixXd beside =
@@ -746,9 +748,18 @@ class Calibrator {
     };
     bool any = false;
     const Eigen::MatrixXd J = place_jacobian(state, place, any);
-    const Eigen::VectorXd variance = (J * batch.estimate().covariance * J.transpose()).diagonal().cwiseMax(0.0);
-    return {rig_.cameras.front().name, place(state.x()), std::sqrt(variance.head<3>().sum()),
-            std::sqrt(variance.tail<3>().sum())};
+    const Pose X = place(state.x());
+    const auto [sd_m, sd_rad] = along_axes(J * batch.estimate().covariance * J.transpose(), X);
+    return {rig_.cameras.front().name, X, sd_m, sd_rad};
+  }
+
+  /// @param C  covariance of a camera's place and of its rotation vector, both in the axes of what carries it
+  /// @return standard deviations along and about the camera's own axes, m and rad
+  static std::pair<Eigen::Vector3d, Eigen::Vector3d> along_axes(const Eigen::MatrixXd& C, const Pose& X) {
+    const auto own = [&](const Eigen::Matrix3d& block) -> Eigen::Vector3d {
+      return (X.linear().transpose() * block * X.linear()).diagonal().cwiseMax(0.0).cwiseSqrt();
+    };
+    return {own(C.topLeftCorner<3, 3>()), own(C.bottomRightCorner<3, 3>())};
   }
 
   [[nodiscard]] std::string carrier_of(std::size_t camera) const {
@@ -992,8 +1003,9 @@ class Calibrator {
     if (worst < 0) return {};
     const auto& p = state.parameters()[static_cast<std::size_t>(worst)];
     return fmt::format(
-        "Model misfit: the pictures ask for {} {:.3g} {}, {:.0f} times what is believed possible; "
-        "something else is wrong with robot or cameras (estimator.state says what is believed).",
+        "Model misfit: the pictures ask for {} {:.3g} {}, {:.0f} times what is believed possible; it is further off "
+        "than that (estimator.state and the cameras' pose_sd_mm and pose_sd_deg say what is believed), or something "
+        "else is wrong with robot or cameras.",
         p.name, state.x()[worst] / p.si_per_unit, p.unit, std::abs(away[worst]));
   }
 

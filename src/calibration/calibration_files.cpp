@@ -163,12 +163,14 @@ std::string offsets_yaml(const Calibration& c, const Correction& correction) {
 std::string cameras_yaml(const Calibration& c) {
   std::string text =
       "# Cameras as found: to be included behind robot.yaml, or put in place of its section.\ncameras:\n";
+  constexpr double kLeast_m = 1e-5, kLeast_rad = 2e-5;  // that a configuration takes
   for (const auto& camera : c.cameras) {
     const auto& k = camera.intrinsics;
     const auto& d = camera.distortion;
     const auto& beside = camera.beside;
     const Eigen::Matrix4d X = (beside ? beside->X_first_optical : camera.X_link_optical).matrix();
-    const double sd_m = beside ? beside->sd_m : camera.sd_m, sd_rad = beside ? beside->sd_rad : camera.sd_rad;
+    const Eigen::Vector3d mm = 1e3 * (beside ? beside->axes_sd_m : camera.axes_sd_m).cwiseMax(kLeast_m);
+    const Eigen::Vector3d deg = degrees(1.0) * (beside ? beside->axes_sd_rad : camera.axes_sd_rad).cwiseMax(kLeast_rad);
     // The other way to place a camera is taken out of what this is included behind.
     text += beside ? fmt::format("  {}:\n    link: ~\n    X_link_optical: ~\n    beside: {}\n    X_beside_optical:\n",
                                  camera.name, beside->camera)
@@ -178,10 +180,10 @@ std::string cameras_yaml(const Calibration& c) {
       text += fmt::format("      - [{:.9f}, {:.9f}, {:.9f}, {:.9f}]\n", X(r, 0), X(r, 1), X(r, 2), X(r, 3));
     }
     if (camera.estimated) {
-      // One figure serves all axes: their mean. That of the axis of which least is known would leave the others open.
-      text +=
-          fmt::format("    pose: roughly\n    pose_sd_deg: {:.4f}\n    pose_sd_mm: {:.3f}\n",
-                      std::max(1e-3, degrees(sd_rad) / std::sqrt(3.0)), std::max(1e-2, 1e3 * sd_m / std::sqrt(3.0)));
+      text += fmt::format(
+          "    pose: roughly                  # along and about each of its axes\n"
+          "    pose_sd_deg: [{:.4f}, {:.4f}, {:.4f}]\n    pose_sd_mm: [{:.3f}, {:.3f}, {:.3f}]\n",
+          deg.x(), deg.y(), deg.z(), mm.x(), mm.y(), mm.z());
     } else {
       text += "    pose: exact\n";
     }

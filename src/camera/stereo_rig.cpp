@@ -1,5 +1,7 @@
 #include "bodyschema/camera/stereo_rig.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -60,6 +62,16 @@ Pose read_pose(const Configuration& section, const std::string& key) {
   return X;
 }
 
+/// One number for all of the camera's axes, or one for each: x, y, z.
+Eigen::Vector3d of_each_axis(const Configuration& section, const std::string& key, double least, double most) {
+  if (!section.is_list(key)) return Eigen::Vector3d::Constant(section.number(key, least, most));
+  const Eigen::Vector3d values = three(section, key);
+  if (values.minCoeff() < least || values.maxCoeff() > most) {
+    section.fail(key, fmt::format("a number from {} to {}, or three, for the camera's x, y and z", least, most));
+  }
+  return values;
+}
+
 CameraMount read_mount(const Configuration& section) {
   CameraMount mount;
   // A file that includes another takes keys of it out again with null; so all are looked for.
@@ -85,12 +97,12 @@ CameraMount read_mount(const Configuration& section) {
       section.fail(sd, "it only with 'pose: roughly'");
   }
   if (mount.knowledge == PlaceKnowledge::kKnown) {
-    mount.sd_rad = kKnown_rad;
-    mount.sd_m = kKnown_m;
+    mount.sd_rad.setConstant(kKnown_rad);
+    mount.sd_m.setConstant(kKnown_m);
   }
   if (mount.knowledge == PlaceKnowledge::kRoughly) {
-    mount.sd_rad = radians(section.number("pose_sd_deg", 1e-3, 90.0));
-    mount.sd_m = 1e-3 * section.number("pose_sd_mm", 1e-2, 1e4);
+    mount.sd_rad = radians(1.0) * of_each_axis(section, "pose_sd_deg", 1e-3, 90.0);
+    mount.sd_m = 1e-3 * of_each_axis(section, "pose_sd_mm", 1e-2, 1e4);
   }
   return mount;
 }

@@ -469,6 +469,11 @@ bool Configuration::is_mapping(const std::string& key) const {
   return entry != nullptr && entry->mapping;
 }
 
+bool Configuration::is_list(const std::string& key) const {
+  const Entry* entry = document_->find(below(section_, key));
+  return entry != nullptr && !entry->mapping && entry->leaf.IsSequence();
+}
+
 std::vector<std::string> Configuration::keys() const {
   std::vector<std::string> names;
   if (Entry* entry = document_->find(section_)) {

@@ -8,6 +8,15 @@
 #include "limits.hpp"
 
 namespace bodyschema {
+namespace {
+
+/// Where a configuration says what is believed of an effect.
+const char* believed_at(const std::string& effect) {
+  return effect == "camera_pose" || effect == "camera_pair" ? "pose_sd_mm and pose_sd_deg of cameras"
+                                                            : "estimator.state";
+}
+
+}  // namespace
 
 double hand_sd_limit_m(const EstimatorOptions& options, const State& state, const HandUncertainty& hand,
                        double pixel_m) {
@@ -32,9 +41,10 @@ std::string misfit(const PostureMemory& memory, const State& state) {
   if (worst >= 0) {
     const auto& p = state.parameters()[static_cast<std::size_t>(worst)];
     return fmt::format(
-        "the pictures ask for {} {:.3g} {}, {:.0f} times what is believed possible (estimator.state); something else "
-        "is wrong with the model: run bodyschema diagnose on a log",
-        p.name, known.x[worst] / p.si_per_unit, p.unit, std::abs(away[worst]));
+        "the pictures ask for {} {:.3g} {}, {:.0f} times what is believed possible ({}): it is further off than that, "
+        "or something else is wrong with the model: run bodyschema diagnose on a log",
+        p.name, known.x[worst] / p.si_per_unit, p.unit, std::abs(away[worst]),
+        believed_at(state.model()[p.ref.effect].name()));
   }
   if (memory.dispersion() > limits::kDisagreement) {
     return fmt::format(

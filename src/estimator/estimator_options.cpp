@@ -72,10 +72,11 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
 std::vector<Belief> camera_beliefs(const StereoRig& rig) {
   // Physical: where nothing is known the camera is first searched for; the search leaves no more than this.
   constexpr double kSearched_m = 0.3, kSearched_rad = 0.3;
-  const auto sds = [](const CameraMount& mount) {
+  const auto sds = [&](const CameraMount& mount) {
     const bool unknown = mount.knowledge == PlaceKnowledge::kUnknown;
-    const double m = unknown ? kSearched_m : mount.sd_m, rad = unknown ? kSearched_rad : mount.sd_rad;
-    return std::vector<double>{m, m, m, rad, rad, rad};
+    const Eigen::Vector3d m = unknown ? Eigen::Vector3d::Constant(kSearched_m) : mount.sd_m;
+    const Eigen::Vector3d rad = unknown ? Eigen::Vector3d::Constant(kSearched_rad) : mount.sd_rad;
+    return std::vector<double>{m.x(), m.y(), m.z(), rad.x(), rad.y(), rad.z()};
   };
   std::vector<Belief> list;
   if (rig.cameras.empty()) return list;
@@ -84,9 +85,12 @@ std::vector<Belief> camera_beliefs(const StereoRig& rig) {
   if (rig.cameras.size() < 2) return list;
   const auto& second = rig.cameras[1].mount;
   std::vector<double> pair(6, 0.0);
-  for (const auto* mount : {&second, second.relative ? nullptr : &first}) {
-    if (mount == nullptr || mount->knowledge == PlaceKnowledge::kExact) continue;
-    const auto own = sds(*mount);
+  if (second.knowledge != PlaceKnowledge::kExact) pair = sds(second);
+  if (!second.relative && first.knowledge != PlaceKnowledge::kExact) {
+    // The pair's axes are the second camera's; the first may look anywhere, so that its widest counts along each.
+    auto own = sds(first);
+    std::fill_n(own.begin(), 3, *std::max_element(own.begin(), own.begin() + 3));
+    std::fill_n(own.begin() + 3, 3, *std::max_element(own.begin() + 3, own.end()));
     for (std::size_t k = 0; k < pair.size(); ++k) pair[k] = std::hypot(pair[k], own[k]);
   }
   if (pair[0] > 0.0) list.push_back({"camera_pair", {}, pair});

@@ -170,7 +170,9 @@ std::string mount_yaml(const CameraModel& camera, const CameraModel& first) {
   constexpr std::array<const char*, 4> kKnowledge = {"exact", "known", "roughly", "unknown"};
   text += fmt::format("    pose: {}\n", kKnowledge[static_cast<std::size_t>(mount.knowledge)]);
   if (mount.knowledge == PlaceKnowledge::kRoughly) {
-    text += fmt::format("    pose_sd_deg: {:.6g}\n    pose_sd_mm: {:.6g}\n", degrees(mount.sd_rad), 1e3 * mount.sd_m);
+    const Eigen::Vector3d deg = degrees(1.0) * mount.sd_rad, mm = 1e3 * mount.sd_m;
+    text += fmt::format("    pose_sd_deg: [{:.6g}, {:.6g}, {:.6g}]\n    pose_sd_mm: [{:.6g}, {:.6g}, {:.6g}]\n",
+                        deg.x(), deg.y(), deg.z(), mm.x(), mm.y(), mm.z());
   }
   return text;
 }

@@ -218,6 +218,7 @@ class Starter {
       cameras_.push_back(camera);
     }
     if (cameras_.empty()) {
+      if (names.empty()) names = names_with_poses();
       if (names.empty() && o_.camera_infos.size() == 2) names = {"left", "right"};
       if (names.empty()) names.push_back("camera");
       for (const auto& name : names) cameras_.emplace_back().name = name;
@@ -239,6 +240,19 @@ class Starter {
         notes_.push_back(fmt::format("camera {}: its pose is to be found (robot.yaml: pose: unknown)", camera.name));
       }
     }
+  }
+
+  /// What --camera-pose calls the cameras: those of the files of --camera-info, or the only one.
+  [[nodiscard]] std::vector<std::string> names_with_poses() const {
+    if (o_.camera_pose.empty()) return {};
+    const auto poses = CameraPoses::from_argument(o_.camera_pose).X_base_optical;
+    std::vector<std::string> names;
+    for (const fs::path& file : o_.camera_infos) {
+      if (poses.contains(file.stem())) names.push_back(file.stem());
+    }
+    if (!names.empty() && names.size() == o_.camera_infos.size()) return names;
+    if (poses.size() == 1 && o_.camera_infos.size() < 2) return {poses.begin()->first};
+    return {};
   }
 
   std::optional<CameraInfo> find_intrinsics(std::size_t c) {
@@ -304,7 +318,10 @@ class Starter {
     for (StarterCamera& camera : cameras_) {
       const auto pose = poses.X_base_optical.find(camera.name);
       if (pose == poses.X_base_optical.end()) {
-        throw FileError(fmt::format("{}: no pose of camera '{}'", o_.camera_pose, camera.name));
+        std::vector<std::string> there;
+        for (const auto& [name, X] : poses.X_base_optical) there.push_back(name);
+        throw FileError(fmt::format("{}: no pose of camera '{}'; it has {} (name cameras with --camera NAME=LINK)",
+                                    o_.camera_pose, camera.name, fmt::join(there, ", ")));
       }
       camera.link = poses.base_link;
       camera.X_base = pose->second;
@@ -511,7 +528,7 @@ class Starter {
     return text;
   }
 
-  /// What may be wrong in this recording besides what may be on any robot.
+  /// What arms and cameras are wrong by as a rule, and what may be wrong in this recording besides.
   [[nodiscard]] std::string state_yaml() const {
     std::string text;
     if (!stills_) {
@@ -524,7 +541,7 @@ class Starter {
           kBeside_sd_mm, kTilted_sd_deg);
       if (!focal_guessed()) text += fmt::format("    focal_length: {{sd_percent: {}}}\n", kFocal_sd_percent);
     }
-    if (moving_) {
+    if (moving_ || !stills_) {
       text += fmt::format("    latency: {{sd_ms: {}}}             # pictures against encoders\n", kLag_sd_ms);
     }
     if (focal_guessed()) {

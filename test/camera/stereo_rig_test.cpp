@@ -133,8 +133,8 @@ TEST(StereoRig, ReadsWhereACameraIsFixedAndHowWellThatIsKnown) {
 
   const CameraModel known = parse("cameras:\n  a: {link: base, pose: known, " + kLens + "}\n").cameras[0];
   EXPECT_EQ(known.mount.knowledge, PlaceKnowledge::kKnown);
-  EXPECT_DOUBLE_EQ(known.mount.sd_rad, radians(0.1));
-  EXPECT_DOUBLE_EQ(known.mount.sd_m, 0.001);
+  EXPECT_TRUE(known.mount.sd_rad.isConstant(radians(0.1)));
+  EXPECT_TRUE(known.mount.sd_m.isConstant(0.001));
 
   const CameraModel roughly = parse(
                                   "cameras:\n  a: {link: base, X_link_optical: [[0, 0, 1, 1], [-1, 0, 0, 2], [0, "
@@ -143,8 +143,15 @@ TEST(StereoRig, ReadsWhereACameraIsFixedAndHowWellThatIsKnown) {
                                   .cameras[0];
   EXPECT_EQ(roughly.mount.knowledge, PlaceKnowledge::kRoughly);
   EXPECT_TRUE(roughly.mount.X_PC.isApprox(exact.mount.X_PC, 1e-12));
-  EXPECT_DOUBLE_EQ(roughly.mount.sd_rad, radians(5.0));
-  EXPECT_DOUBLE_EQ(roughly.mount.sd_m, 0.05);
+  EXPECT_TRUE(roughly.mount.sd_rad.isConstant(radians(5.0)));
+  EXPECT_TRUE(roughly.mount.sd_m.isConstant(0.05));
+
+  const CameraModel by_axis =
+      parse("cameras:\n  a: {link: base, pose: roughly, pose_sd_deg: [1, 2, 3], pose_sd_mm: [5, 6, 40], " + kLens +
+            "}\n")
+          .cameras[0];
+  EXPECT_TRUE(by_axis.mount.sd_rad.isApprox(radians(1.0) * Eigen::Vector3d(1, 2, 3)));
+  EXPECT_TRUE(by_axis.mount.sd_m.isApprox(Eigen::Vector3d(0.005, 0.006, 0.04)));
 
   const CameraModel unknown = parse("cameras:\n  a: {link: base, pose: unknown, " + kLens + "}\n").cameras[0];
   EXPECT_EQ(unknown.mount.knowledge, PlaceKnowledge::kUnknown);
@@ -164,6 +171,9 @@ TEST(StereoRig, SaysWhatIsWrongWithACamerasPlace) {
   EXPECT_THAT(with("link: l, pose: perhaps"), HasSubstr("known, roughly or unknown"));
   EXPECT_THAT(with("link: l, pose: roughly"), HasSubstr("cameras.a.pose_sd_deg"));
   EXPECT_THAT(with("link: l, pose_sd_mm: 4"), HasSubstr("only with 'pose: roughly'"));
+  EXPECT_THAT(with("link: l, pose: roughly, pose_sd_deg: [1, 2], pose_sd_mm: 1"), HasSubstr("three numbers"));
+  EXPECT_THAT(with("link: l, pose: roughly, pose_sd_deg: [1, 2, -3], pose_sd_mm: 1"),
+              HasSubstr("or three, for the camera's x, y and z"));
   EXPECT_THAT(with("link: l, X_link_optical: [1, 2]"), HasSubstr("lists of numbers"));
   EXPECT_THAT(with("link: l, X_link_optical: [[1, 2]]"), HasSubstr("four rows of four numbers"));
   EXPECT_THAT(with("link: l, X_link_optical: [[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]"), HasSubstr("a rotation"));

@@ -130,6 +130,14 @@ TEST_F(BeliefsOfOwnRobot, WhereACameraSitsIsBelievedAsItsPoseSays) {
     EXPECT_NEAR(pair->sd.at(k), std::hypot(0.020, 0.010), 1e-12) << "each errs by itself";
     EXPECT_NEAR(pair->sd.at(k + 3), std::hypot(radians(2.0), radians(1.0)), 1e-12);
   }
+  // Each axis as it is known, of the first; of the second its own and the widest of the first, which looks elsewhere.
+  const auto deep = read(load({"cameras.left={pose: roughly, pose_sd_deg: [1, 2, 3], pose_sd_mm: [5, 6, 40]}",
+                               "cameras.right={pose: roughly, pose_sd_deg: 1, pose_sd_mm: [10, 20, 30]}"}));
+  EXPECT_NEAR(find(deep.state, "camera_pose")->sd.at(2), 0.040, 1e-12);
+  EXPECT_NEAR(find(deep.state, "camera_pose")->sd.at(4), radians(2.0), 1e-12);
+  EXPECT_NEAR(find(deep.state, "camera_pair")->sd.at(0), std::hypot(0.040, 0.010), 1e-12);
+  EXPECT_NEAR(find(deep.state, "camera_pair")->sd.at(1), std::hypot(0.040, 0.020), 1e-12);
+  EXPECT_NEAR(find(deep.state, "camera_pair")->sd.at(3), std::hypot(radians(3.0), radians(1.0)), 1e-12);
   // It stands with the camera, whatever the estimator's file says.
   const auto both = read(load({"cameras.left={pose: roughly, pose_sd_deg: 2, pose_sd_mm: 20}",
                                "estimator.state.camera_pose={sd_mm: 1, sd_deg: 1}"}));
@@ -141,13 +149,14 @@ TEST_F(BeliefsOfOwnRobot, TheSecondOfARigThatSitsBesideTheFirstErrsByItselfAlone
   rig.cameras[0].mount.knowledge = PlaceKnowledge::kUnknown;
   rig.cameras[1].mount.knowledge = PlaceKnowledge::kRoughly;
   rig.cameras[1].mount.relative = true;
-  rig.cameras[1].mount.sd_m = 0.001;
-  rig.cameras[1].mount.sd_rad = 0.002;
+  rig.cameras[1].mount.sd_m = {0.001, 0.001, 0.003};
+  rig.cameras[1].mount.sd_rad.setConstant(0.002);
   const auto beliefs = camera_beliefs(rig);
   ASSERT_EQ(beliefs.size(), 2u);
   EXPECT_GE(beliefs[0].sd.at(0), 0.1) << "nobody knows";
   EXPECT_EQ(beliefs[1].effect, "camera_pair");
   EXPECT_NEAR(beliefs[1].sd.at(0), 0.001, 1e-12);
+  EXPECT_NEAR(beliefs[1].sd.at(2), 0.003, 1e-12);
   EXPECT_NEAR(beliefs[1].sd.at(5), 0.002, 1e-12);
   rig.cameras.resize(1);
   EXPECT_EQ(camera_beliefs(rig).size(), 1u);

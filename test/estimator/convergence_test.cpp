@@ -91,7 +91,7 @@ TEST_F(ConvergenceOfOwnRobot, WhatNobodyBelievesIsAMisfitByName) {
   see(4, 6.0 * kLink_m);
   EXPECT_EQ(concluded(), EstimatorState::kModelMisfit);
   EXPECT_THAT(estimate_.misfit, HasSubstr("link_length of r_elbow"));
-  EXPECT_THAT(estimate_.misfit, HasSubstr("6 times what is believed possible"));
+  EXPECT_THAT(estimate_.misfit, HasSubstr("6 times what is believed possible (estimator.state)"));
 }
 
 TEST_F(ConvergenceOfOwnRobot, TheLimitIsAsConfiguredOrByAPixelAndTolerances) {

@@ -272,6 +272,7 @@ TEST_F(EffectsOnline, WhatIsBeyondBeliefIsAMisfit) {
   const Estimate estimate = follow(estimator, reach, 0, 30);
   EXPECT_EQ(estimate.state, EstimatorState::kModelMisfit);
   EXPECT_THAT(estimate.misfit, HasSubstr("camera_pose"));
+  EXPECT_THAT(estimate.misfit, HasSubstr("pose_sd_mm")) << "where to say that it may be further off";
   EXPECT_THAT(estimate.misfit, HasSubstr("bodyschema diagnose"));
 }
 

@@ -493,6 +493,51 @@ TEST_F(StarterConfiguration, ACameraPoseIsReadWhereItIsNamedAndOnlyThere) {
   }
 }
 
+/// A camera of a live robot has no folder of pictures that names it.
+TEST_F(StarterConfiguration, CamerasAreCalledWhatTheirPosesCallThem) {
+  const SmallStills stills;
+  const std::string pose = "[[0, 0, 1, 1], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]]";
+  const auto one =
+      stills.write("one.json", R"({"base_link": "base", "X_base_optical": {"a": {"head": )" + pose + "}}}");
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.out = folder_ / "one";
+  o.camera_pose = one.string();
+  o.camera_infos = {stills.write("camera_info/left.yaml",
+                                 "width: 8\nheight: 6\nd: []\nk: [8, 0, 3.6, 0, 8.1, 2.4, 0, 0, 1]\n"
+                                 "r: [1, 0, 0, 0, 1, 0, 0, 0, 1]\np: [8, 0, 3.6, 0, 0, 8.1, 2.4, 0, 0, 0, 1, 0]\n")};
+  EXPECT_TRUE(write_starter_configuration(o).usable);
+  const auto rig = Pipeline(Configuration::load(o.out / "estimator.yaml")).rig();
+  ASSERT_EQ(rig.cameras.size(), 1u);
+  EXPECT_EQ(rig.cameras[0].name, "head");
+  EXPECT_EQ(rig.cameras[0].mount.knowledge, PlaceKnowledge::kRoughly);
+
+  // By their files, where these are called as the poses are.
+  const auto two = stills.write("two.json", R"({"base_link": "base", "X_base_optical": {"a": {"chest": )" + pose +
+                                                R"(, "left": )" + pose + "}}}");
+  o.out = folder_ / "two";
+  o.camera_pose = two.string();
+  EXPECT_TRUE(write_starter_configuration(o).usable);
+  EXPECT_EQ(Pipeline(Configuration::load(o.out / "estimator.yaml")).rig().cameras.at(0).name, "left");
+
+  o.out = folder_ / "none";
+  o.camera_infos.clear();
+  EXPECT_THAT([&] { (void)write_starter_configuration(o); },
+              testing::ThrowsMessage<FileError>(testing::AllOf(
+                  HasSubstr("no pose of camera 'camera'; it has chest, left"), HasSubstr("--camera NAME=LINK"))));
+}
+
+/// What a live robot's arm and cameras are wrong by as a rule stands in its configuration, late pictures among it.
+TEST_F(StarterConfiguration, ALiveRobotsPicturesMayBeLate) {
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.out = folder_ / "live";
+  EXPECT_TRUE(write_starter_configuration(o).usable);
+  const auto state = Configuration::load(o.out / "estimator.yaml").section("estimator").section("state");
+  EXPECT_TRUE(state.has("latency"));
+  EXPECT_TRUE(state.has("joint_place"));
+}
+
 /// Robots of others: an arm without a hand, a gripper whose fingers slide, and two arms with fingers that turn.
 TEST_F(StarterConfiguration, GuessesTheHandOfOtherPeoplesRobots) {
   SKIP_WITHOUT("real");

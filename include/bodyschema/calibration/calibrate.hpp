@@ -53,14 +53,16 @@ struct CalibratedCamera {
   std::array<double, 5> distortion{};      ///< k1 k2 p1 p2 k3 as OpenCV, as estimated
   double sd_m = 0.0;                       ///< root of the summed variances of its place in the link's frame
   double sd_rad = 0.0;                     ///< ... of its rotation
+  /// One standard deviation along and about each of the camera's own axes.
+  Eigen::Vector3d axes_sd_m = Eigen::Vector3d::Zero(), axes_sd_rad = Eigen::Vector3d::Zero();
   /// The same if the arm's first joint were known: where the camera does not move with the robot's base, no picture
   /// tells that joint from a turn of the camera about its axis, and both figures above contain the turn.
   double sd_m_beside_first_joint = 0.0, sd_rad_beside_first_joint = 0.0;
-  /// Of a camera that is configured beside the rig's first: its place there, sds as above, and that one's name.
+  /// Of a camera that is configured beside the rig's first: its place there, and that one's name.
   struct Beside {
     std::string camera;
     Pose X_first_optical = Pose::Identity();
-    double sd_m = 0.0, sd_rad = 0.0;
+    Eigen::Vector3d axes_sd_m = Eigen::Vector3d::Zero(), axes_sd_rad = Eigen::Vector3d::Zero();  ///< as above
   };
   std::optional<Beside> beside;
   bool estimated = false;  ///< false: as configured

@@ -29,8 +29,8 @@ struct CameraMount {
   bool relative = false;         ///< to the rig's first camera
   Pose X_PC = Pose::Identity();  ///< the camera in its parent; identity where nothing is given
   PlaceKnowledge knowledge = PlaceKnowledge::kExact;
-  double sd_rad = 0.0;  ///< kKnown, kRoughly: of the camera's rotation about each of its axes
-  double sd_m = 0.0;    ///< kKnown, kRoughly: of its position along each of its axes
+  Eigen::Vector3d sd_rad = Eigen::Vector3d::Zero();  ///< kKnown, kRoughly: of its rotation about each of its own axes
+  Eigen::Vector3d sd_m = Eigen::Vector3d::Zero();    ///< kKnown, kRoughly: of its position along each of them
 };
 
 /// One camera: where it sits on the robot and how it maps directions to pixels.

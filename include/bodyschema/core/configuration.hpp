@@ -42,6 +42,8 @@ class Configuration {
   [[nodiscard]] bool has(const std::string& key) const;
   /// Whether the value is a mapping, for keys that may also hold a list or a word.
   [[nodiscard]] bool is_mapping(const std::string& key) const;
+  /// The same of a list.
+  [[nodiscard]] bool is_list(const std::string& key) const;
   /// Keys of this mapping in document order; marks them all as known (for maps keyed by joint).
   [[nodiscard]] std::vector<std::string> keys() const;
 
