@@ -40,7 +40,10 @@ bool holds(const std::vector<Belief>& list, const Named& effect, const EffectTar
 ArmGeometry::ArmGeometry(const JointRoles& roles, const State& state, const std::vector<Belief>& tolerances) {
   for (const auto& kind : kKinds) {
     for (const auto& target : effect_targets(kind.effect, roles)) {
-      if (holds(tolerances, kind.effect, target) || state.model().find(kind.effect, target) != nullptr) continue;
+      if (holds(tolerances, kind.effect, target) || state.model().find(kind.effect, target) != nullptr) {
+        of_every_joint_ = false;
+        continue;
+      }
       const auto parameters = make_effect(kind.effect, target, roles)->parameters().size();
       probe_.push_back({kind.effect, target, std::vector<double>(parameters, kind.unit)});
     }

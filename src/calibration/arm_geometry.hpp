@@ -16,6 +16,8 @@ class ArmGeometry {
 
   /// Each with a standard deviation of one unit, to be considered by a fit that `measure` asks.
   [[nodiscard]] const std::vector<Belief>& probe() const { return probe_; }
+  /// Whether these are all there are: nobody has said how well any joint of the arm is built.
+  [[nodiscard]] bool of_every_joint() const { return of_every_joint_; }
   struct Found {
     std::vector<Belief> beliefs;  ///< `probe`, each with the standard deviation that the log leaves possible
     double beside_sd_m = 0.0, tilted_sd_rad = 0.0;
@@ -25,6 +27,7 @@ class ArmGeometry {
 
  private:
   std::vector<Belief> probe_;
+  bool of_every_joint_ = true;
 };
 
 }  // namespace bodyschema

@@ -520,6 +520,9 @@ class Calibrator {
     BatchFit probe(fit, best.state(), with(beliefs_.tolerances, geometry.probe()), settings());
     probe.run(0.0, {});
     const auto found = geometry.measure(probe);
+    if (geometry.of_every_joint()) {
+      result_.arm_build = ArmBuild{found.beside_sd_m, found.tilted_sd_rad, found.asked_for};
+    }
     if (!found.asked_for) {
       beliefs_.tolerances = with(beliefs_.tolerances, found.beliefs);
       BatchFit considered = about_the_same(fit, best);

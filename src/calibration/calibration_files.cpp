@@ -195,16 +195,26 @@ std::string cameras_yaml(const Calibration& c) {
   return text;
 }
 
+/// What the arm may be built otherwise by, so that whoever goes on with these cameras believes it too.
+std::string arm_build_yaml(const ArmBuild& build) {
+  return fmt::format(
+      "# How far joints lie beside where the URDF has them, and axes are tilted, as the log tells (standard "
+      "deviations).\n"
+      "{}:\n  {}:\n    joint_place: {{sd_mm: {:.3f}}}\n    axis_tilt: {{sd_deg: {:.4f}}}\n",
+      build.estimated ? "estimator" : "robot", build.estimated ? "state" : "tolerances", 1e3 * build.beside_sd_m,
+      degrees(build.tilted_sd_rad));
+}
+
 /// The configuration as it was, with the cameras as found: what replay, diagnose and the service go on with.
-std::string estimator_yaml(const CalibrationOptions& options) {
+std::string estimator_yaml(const CalibrationOptions& options, const std::optional<ArmBuild>& build) {
   namespace fs = std::filesystem;
   const fs::path before = fs::proximate(fs::absolute(options.configuration), fs::absolute(options.out));
   std::string quoted;
   for (const char c : before.generic_string()) quoted += c == '\'' ? "''" : std::string(1, c);
   return fmt::format(
       "# The configuration that was calibrated, with its cameras where they were found.\ninclude: ['{}', "
-      "cameras.yaml]\n",
-      quoted);
+      "cameras.yaml]\n{}",
+      quoted, build ? arm_build_yaml(*build) : "");
 }
 
 /// Where the URDF itself places a camera, and nothing else was found, it stays with the URDF.
@@ -336,7 +346,8 @@ void write_calibration(const Calibration& calibration, const BatchFit& batch, Pi
   add_geometry(calibration, batch, log, pipeline, options.all_parameters, correction);
   replace_file(options.out / "offsets.yaml", offsets_yaml(calibration, correction));
   replace_file(options.out / "cameras.yaml", cameras_yaml(calibration));
-  if (!options.configuration.empty()) replace_file(options.out / "estimator.yaml", estimator_yaml(options));
+  if (!options.configuration.empty())
+    replace_file(options.out / "estimator.yaml", estimator_yaml(options, calibration.arm_build));
   write_corrected_urdf(pipeline.setup().model.urdf, correction, options.out / "corrected.urdf");
   write_ros_files(options.out / "ros", pipeline.setup().model.urdf, options.out / "corrected.urdf", correction,
                   ros_cameras_of(calibration, log.rig()));

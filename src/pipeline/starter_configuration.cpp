@@ -250,7 +250,8 @@ class Starter {
     for (const fs::path& file : o_.camera_infos) {
       if (poses.contains(file.stem())) names.push_back(file.stem());
     }
-    if (!names.empty() && names.size() == o_.camera_infos.size()) return names;
+    const std::set<std::string> different(names.begin(), names.end());
+    if (!names.empty() && different.size() == o_.camera_infos.size()) return names;
     if (poses.size() == 1 && o_.camera_infos.size() < 2) return {poses.begin()->first};
     return {};
   }

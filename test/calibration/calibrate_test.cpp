@@ -237,6 +237,11 @@ TEST_F(Calibrated, OffsetsAreFoundWithinWhatIsClaimedAndTheFilesSayTheSame) {
   }
   EXPECT_GE(told, 5);
   EXPECT_THAT(result.remarks, Not(::testing::Contains(HasSubstr("not built quite as its URDF"))));
+  ASSERT_TRUE(result.arm_build);
+  EXPECT_FALSE(result.arm_build->estimated);
+  EXPECT_LT(result.arm_build->beside_sd_m, 1e-3);
+  const auto robot = Configuration::load(folder_ / "out" / "estimator.yaml").section("robot");
+  EXPECT_TRUE(robot.section("tolerances").has("joint_place")) << "what may be wrong is considered, not estimated";
   EXPECT_LT(result.outline_px.after, 0.2 * result.outline_px.before);
   ASSERT_TRUE(result.outline_px.heldout_worst);
   EXPECT_LE(*result.outline_px.heldout, *result.outline_px.heldout_worst);
@@ -275,6 +280,13 @@ TEST_F(Calibrated, OffsetsOfAnArmThatIsNotBuiltAsItsUrdfSaysAreUncertainByThat) 
     EXPECT_NEAR(degrees(joint.offset_rad), kOffsets_deg.at(joint.name), 3.0 * degrees(joint.sd_rad)) << joint.name;
   }
   EXPECT_GE(told, 2);
+  // Whoever goes on from here believes it too.
+  ASSERT_TRUE(result.arm_build);
+  EXPECT_TRUE(result.arm_build->estimated);
+  EXPECT_GT(result.arm_build->beside_sd_m, 1e-3);
+  const auto state = Configuration::load(folder_ / "out" / "estimator.yaml").section("estimator").section("state");
+  EXPECT_NEAR(state.section("joint_place").number("sd_mm"), 1e3 * result.arm_build->beside_sd_m, 1e-3);
+  EXPECT_TRUE(state.has("axis_tilt"));
 }
 
 /// Offsets of six to nine degrees in five joints: the fit from the URDF as it is ended in a curled hand, 17 deg off in

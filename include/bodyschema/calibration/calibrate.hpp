@@ -102,6 +102,13 @@ struct CalibratedEffect {
   std::vector<CalibratedParameter> parameters;
 };
 
+/// How far an arm is built otherwise than its URDF says, in many small ways that no picture names, as a log tells: one
+/// standard deviation of all joints' places and axes.
+struct ArmBuild {
+  double beside_sd_m = 0.0, tilted_sd_rad = 0.0;
+  bool estimated = false;  ///< the pictures speak for it: each place was estimated; otherwise it was considered only
+};
+
 /// The answer of a whole log or a folder of stills.
 struct Calibration {
   CalibrationState state = CalibrationState::kNotConverged;
@@ -110,7 +117,8 @@ struct Calibration {
   std::vector<CalibratedCamera> cameras;
   std::vector<CalibratedParameter> parameters;
   std::vector<CalibratedEffect>
-      effects;  ///< what else was found; estimated with the rest where they do not depend on time
+      effects;                        ///< what else was found; estimated with the rest where they do not depend on time
+  std::optional<ArmBuild> arm_build;  ///< nothing: as the configuration has it, or too few postures
   OutlineDistances outline_px;
   double hand_sd_m = 0.0;             ///< of the hand's place in the first camera's picture, mean over postures
   std::vector<CalibratedView> views;  ///< of all pictures, in order of time
