@@ -236,10 +236,6 @@ Heldout BlockRegression::heldout(const AddedColumns& added) const {
     d += added.d[b];
   }
   const Eigen::VectorXd alone = kAlone * C.diagonal();
-  if (added.precision.size() > 0) {
-    C.diagonal() += added.precision;
-    d += added.precision.cwiseProduct(added.centre);
-  }
   // Both together, the base eliminated.
   Eigen::VectorXd x(n + k);
   const auto solve = [&](const Eigen::LDLT<Eigen::MatrixXd>& base, const Eigen::VectorXd& base_x,
@@ -309,18 +305,11 @@ Eigen::MatrixXd BlockRegression::covariance() const {
   return covariance;
 }
 
-Eigen::MatrixXd BlockRegression::covariance(const AddedColumns& added, const Scores& scores) const {
-  Eigen::MatrixXd information = scores.S;
-  Eigen::MatrixXd beliefs = scores.beliefs * scores.beliefs.transpose();
-  if (added.precision.size() > 0) {
-    information.diagonal() += added.precision;
-    beliefs.diagonal() += added.precision;
-  }
-  const Eigen::MatrixXd Q = symmetric_inverse(stiffened(std::move(information)));
-  const auto without_each = heldout(added);
-  const Eigen::MatrixXd moved = without_each.replicas.bottomRows(added.size()).colwise() -
-                                Eigen::VectorXd(without_each.estimate.tail(added.size()));
-  Eigen::MatrixXd covariance = moved * moved.transpose() / blocks_factor(blocks_.size()) + Q * beliefs * Q;
+Eigen::MatrixXd BlockRegression::covariance(const Scores& scores) const {
+  const Eigen::MatrixXd Q = symmetric_inverse(stiffened(scores.S));
+  const Eigen::MatrixXd meat =
+      blocks_factor(blocks_.size()) * scores.u * scores.u.transpose() + scores.beliefs * scores.beliefs.transpose();
+  Eigen::MatrixXd covariance = Q * meat * Q;
   covariance.diagonal() = covariance.diagonal().cwiseMax(Q.diagonal());
   return covariance;
 }

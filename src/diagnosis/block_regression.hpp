@@ -20,9 +20,6 @@ struct AddedColumns {
   std::vector<Eigen::MatrixXd> B;  ///< base x added
   std::vector<Eigen::MatrixXd> C;  ///< added x added
   std::vector<Eigen::VectorXd> d;  ///< their gradients
-  /// What is believed of their values: an inverse variance, 0 for nothing, and about what; empty: nothing of any.
-  /// Scores go without it, as what stands out is what the blocks say.
-  Eigen::VectorXd precision{}, centre{};
   AddedColumns() = default;
   AddedColumns(std::size_t blocks, Eigen::Index base, Eigen::Index added);
   [[nodiscard]] Eigen::Index size() const { return d.empty() ? 0 : d.front().size(); }
@@ -84,9 +81,8 @@ class BlockRegression {
   [[nodiscard]] Heldout heldout(const AddedColumns& added = {}) const;
   /// Covariance of the base's parameters from how blocks differ, never below that of white noise.
   [[nodiscard]] Eigen::MatrixXd covariance() const;
-  /// Of added columns beside the base, in the same way: about their best value, not about zero, where what they do
-  /// themselves is what blocks differ by.
-  [[nodiscard]] Eigen::MatrixXd covariance(const AddedColumns& added, const Scores& scores) const;
+  /// Of added columns, given the base.
+  [[nodiscard]] Eigen::MatrixXd covariance(const Scores& scores) const;
 
  private:
   /// The base without one block.

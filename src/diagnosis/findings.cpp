@@ -389,18 +389,19 @@ void Findings::add_estimated(const LogAbout& log, const BlockRegression& all, co
   cause.cause = targets[best];
   cause.z = scores.z();
   if (cause.z < report_.z_threshold) return;
-  // How large it is follows from what is believed of it too: a camera's place is hardly told along some directions.
-  auto believed = own;
-  believed.precision = all.precision()(columns[best]);
-  believed.centre = values_of(search_, columns[best]) - all.away()(columns[best]);
-  const Eigen::VectorXd estimate = reduced.base.heldout(believed).estimate.tail(own.size());
+  // Of a kind that has one target the state says it: with what is believed of it, and by how blocks differ about its
+  // value. One target in place of several is another model than the state's, seen from where it has none of it.
+  const bool as_in_state = targets.size() == 1;
+  const Eigen::VectorXd estimate =
+      as_in_state ? Eigen::VectorXd(values_of(search_, columns[best]) + all.step()(columns[best])) : scores.estimate();
   // Another joint of the head would make up for it: none is known in the model that it is held against.
   const auto size = size_of(log, all, columns[best], estimate, out);
   if (!matters(size)) return;
   cause.hand_mm = 1e3 * size.hand_m;
   cause.outline_px = size.outline_px;
   cause.heldout_gain = loss > 0.0 ? most / loss : 0.0;
-  const Eigen::MatrixXd covariance = reduced.base.covariance(believed, scores);
+  const Eigen::MatrixXd covariance =
+      as_in_state ? Eigen::MatrixXd(covariance_(columns[best], columns[best])) : reduced.base.covariance(scores);
   for (std::size_t k = 0; k < columns[best].size(); ++k) {
     const auto& p = state.parameters()[static_cast<std::size_t>(columns[best][k])];
     const auto i = static_cast<Eigen::Index>(k);
@@ -593,7 +594,7 @@ void Findings::exclude(const LogAbout& log, const BlockRegression& all, const st
                                     [&](const auto& n) { return n.cause == candidate.cause; });
     if (in_class || untold) continue;
     const Eigen::VectorXd estimate = candidate.scores.estimate();
-    const Eigen::MatrixXd covariance = all.covariance(candidate.columns, candidate.scores);
+    const Eigen::MatrixXd covariance = all.covariance(candidate.scores);
     const auto effect = make_effect(candidate.cause.name, {candidate.cause.joint, candidate.cause.source}, roles);
     std::vector<const EffectParameter*> fitted;
     for (const auto& p : std::as_const(*effect).parameters()) {

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "answers.hpp"
 #include "random_seed.hpp"
 #include "simulated_log.hpp"
@@ -60,6 +62,21 @@ TEST(HiddenFault, ANeckThatStandsOffIsSaidThoughTheStateTakesItUp) {
   EXPECT_EQ(report.estimated[0].cause, (CauseName{"head_offset", "neck_pitch", ""}));
   EXPECT_NEAR(report.estimated[0].parameters.at(0).estimate, 4.0, 1.0);
   EXPECT_NE(report.sentence.find("neck_pitch"), std::string::npos) << report.sentence;
+}
+
+/// What an effect of the state does is what moments of a log differ by, which is no doubt about how large it is: 60 ms
+/// were known to a third of one, and said to be "60 ms (0 to 120)".
+TEST(HiddenFault, HowLatePicturesAreIsSaidAsWellAsTheStateKnowsIt) {
+  test::Simulated what;
+  what.state = {{"latency", {}, {0.06}}};
+  const auto report = answer({"latency:value=60"}, what);
+  EXPECT_EQ(report.verdict, "none") << report.sentence;
+  const auto late = std::find_if(report.estimated.begin(), report.estimated.end(),
+                                 [](const auto& cause) { return cause.cause.name == "latency"; });
+  ASSERT_NE(late, report.estimated.end()) << report.sentence;
+  const auto& delay = late->parameters.at(0);
+  EXPECT_NEAR(delay.estimate, 60.0, delay.ci95[1] - delay.ci95[0]) << report.sentence;
+  EXPECT_LT(delay.ci95[1] - delay.ci95[0], 6.0) << report.sentence;
 }
 
 /// Within a second it goes to and fro, so that no second has an offset of its own.

@@ -22,6 +22,7 @@ struct Simulated {
   std::vector<std::string> faults{};
   std::vector<std::string> frozen{};
   bool head_moves = false;
+  std::vector<Belief> state{};  ///< what is estimated besides
   std::map<std::string, double> offsets_deg = {{"r_shoulder_pitch", 3.0}, {"r_elbow", -4.0}, {"r_wrist_yaw", 5.0}};
 };
 
@@ -36,6 +37,7 @@ class SimulatedLog {
         rig_(StereoRig::from(configuration_.section("cameras"))), robot_(load_robot(setup_, rig_)),
         pictures_(robot_, setup_, rig_), fit_(pictures_, 1), options_(EstimatorOptions::from(configuration_)),
         beliefs_(Beliefs::from(configuration_, pictures_.roles(), rig_, options_)) {
+    beliefs_.state.insert(beliefs_.state.end(), what.state.begin(), what.state.end());
     auto settings = simulator::SimulatorSettings::from(configuration_.section("simulator"));
     settings.camera_rate_hz = what.rate_hz;
     settings.supersampling = 2;
