@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kNear_px[] = {8.0, 5.0};
 constexpr double kWide_px[] = {30.0, 20.0, 14.0, 10.0, 7.0, 5.0};
+/// Of the distance at which outlines are looked for: what passes for a residual.
+constexpr double kOfReach = 0.5;
 /// Each step looks once, the last look may be two.
 constexpr int kMostRendersOfStart = static_cast<int>(std::size(kWide_px)) + limits::kMostSteps + 2;
 
@@ -30,30 +32,31 @@ OutlineFitter::OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const 
 std::vector<OutlineSearch> OutlineFitter::searches(double search_px, bool last, bool without_odd) const {
   std::vector<OutlineSearch> list;
   for (const auto& noise : noise_) {
-    const double robust_px = last ? noise.robust_px() : std::max(noise.robust_px(), 0.5 * search_px);
+    const double robust_px = last ? noise.robust_px() : std::max(noise.robust_px(), kOfReach * search_px);
     list.push_back({search_px, options_.outline_spacing_px, robust_px, part_weight_});
     if (without_odd) list.back().odd_sd_px = std::max(noise.sd_px(), limits::kLeastOdd_px);
   }
   return list;
 }
 
-void OutlineFitter::look(const Frame& frame, double search_px, bool last, OutlineFit& fit) {
+void OutlineFitter::look(const Frame& frame, double search_px, double sd_px, bool last, OutlineFit& fit) {
   fit.points.assign(noise_.size(), {});
   ++renders_;
   model_.linearise(frame, fit.x, searches(search_px, last), last, fit.evidence,
                    [&](std::size_t c, std::span<const OutlinePoint> points) {
                      if (last) fit.points[c].assign(points.begin(), points.end());
                    });
-  fit.quadratic = quadratic_of(fit.evidence, fit.x, last);
+  fit.quadratic = quadratic_of(fit.evidence, fit.x, last, sd_px);
 }
 
-Quadratic OutlineFitter::quadratic_of(const FrameEvidence& evidence, const Eigen::VectorXd& x, bool with_beside) const {
+Quadratic OutlineFitter::quadratic_of(const FrameEvidence& evidence, const Eigen::VectorXd& x, bool with_beside,
+                                      double sd_px) const {
   const auto n = x.size(), all = n + (with_beside ? model_.beside_count() : 0);
   Quadratic quadratic = Quadratic::zero(all);
   for (std::size_t c = 0; c < noise_.size(); ++c) {
     const auto& seen = evidence.cameras[c];
     if (seen.weight <= 0.0) continue;
-    const double precision = 1.0 / noise_[c].variance_px2();
+    const double precision = 1.0 / std::max(noise_[c].variance_px2(), sd_px * sd_px);
     quadratic.A += precision * seen.A.topLeftCorner(all, all);
     quadratic.b += precision * seen.b.head(all);
   }
@@ -69,10 +72,10 @@ void OutlineFitter::look_twice(const Frame& frame, double search_px, OutlineFit&
                      if (fit.points.size() != noise_.size()) fit.points.assign(noise_.size(), {});
                      fit.points[c].assign(points.begin(), points.end());
                    });
-  fit.seen.quadratic = quadratic_of(fit.seen.evidence, fit.x, true);
+  fit.seen.quadratic = quadratic_of(fit.seen.evidence, fit.x, true, 0.0);
   if (fit.seen.evidence.odd > 0.0) {
     auto points = std::move(fit.points);  // these know which are odd
-    look(frame, search_px, true, fit);
+    look(frame, search_px, 0.0, true, fit);
     fit.points = std::move(points);
   } else {
     fit.evidence = fit.seen.evidence;
@@ -80,9 +83,10 @@ void OutlineFitter::look_twice(const Frame& frame, double search_px, OutlineFit&
   }
 }
 
-double OutlineFitter::take_step(const Frame& frame, const PostureMemory& memory, double search_px, OutlineFit& fit) {
+double OutlineFitter::take_step(const Frame& frame, const PostureMemory& memory, double search_px, double sd_px,
+                                OutlineFit& fit) {
   const Eigen::Index n = fit.x.size();
-  look(frame, search_px, false, fit);
+  look(frame, search_px, sd_px, false, fit);
   Eigen::VectorXd step = memory.solve_with(fit.quadratic) - fit.x;
   const double largest = step.head(model_.state().joints()).cwiseAbs().maxCoeff();
   if (largest > limits::kMaxStep_rad) step *= limits::kMaxStep_rad / largest;
@@ -99,9 +103,13 @@ double OutlineFitter::take_step(const Frame& frame, const PostureMemory& memory,
 void OutlineFitter::refine(const Frame& frame, const PostureMemory& memory, std::span<const double> search_px,
                            int more_steps, OutlineFit& fit) {
   double moved_px = 0.0;
-  for (const double reach_px : search_px) moved_px = take_step(frame, memory, reach_px, fit);
-  for (int i = 0; i < more_steps && moved_px > limits::kSettled_px; ++i) {
-    moved_px = take_step(frame, memory, search_px.back(), fit);
+  // From afar an outline is matched with others as well, and errs by what passes for a residual: taken for as exact as
+  // pictures are, such matches would move what much is believed of (a camera's place) as readily as the joints.
+  for (const double reach_px : search_px) {
+    moved_px = take_step(frame, memory, reach_px, more_steps > 0 ? kOfReach * reach_px : 0.0, fit);
+  }
+  for (int i = 0; i < more_steps && (i == 0 || moved_px > limits::kSettled_px); ++i) {
+    moved_px = take_step(frame, memory, search_px.back(), 0.0, fit);
   }
   look_twice(frame, search_px.back(), fit);
   fit.misfit = memory.distance(fit.x);

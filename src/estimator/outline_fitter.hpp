@@ -105,14 +105,16 @@ class OutlineFitter {
   /// @param more_steps  at most, at the last distance, until the outline has settled
   void refine(const Frame& frame, const PostureMemory& memory, std::span<const double> search_px, int more_steps,
               OutlineFit& fit);
+  /// @param sd_px  px of a 320x240 picture; of what is found, where it is more than the pictures' noise
   /// @return how far it moves the outline, px of a 320x240 picture, rms
-  double take_step(const Frame& frame, const PostureMemory& memory, double search_px, OutlineFit& fit);
-  void look(const Frame& frame, double search_px, bool last, OutlineFit& fit);
+  double take_step(const Frame& frame, const PostureMemory& memory, double search_px, double sd_px, OutlineFit& fit);
+  void look(const Frame& frame, double search_px, double sd_px, bool last, OutlineFit& fit);
   /// The last look, with odd pieces and without them.
   void look_twice(const Frame& frame, double search_px, OutlineFit& fit);
   /// Points of a fit by which outlines are judged.
   [[nodiscard]] std::vector<OutlinePoint> shown(const OutlineFit& fit, std::size_t camera) const;
-  [[nodiscard]] Quadratic quadratic_of(const FrameEvidence& evidence, const Eigen::VectorXd& x, bool with_beside) const;
+  [[nodiscard]] Quadratic quadratic_of(const FrameEvidence& evidence, const Eigen::VectorXd& x, bool with_beside,
+                                       double sd_px) const;
   [[nodiscard]] std::vector<OutlineSearch> searches(double search_px, bool last, bool without_odd = false) const;
 
   FrameModel& model_;

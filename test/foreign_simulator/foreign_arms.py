@@ -56,6 +56,10 @@ class Arm(Stills):
 
     def __init__(self, urdf, condition, seed):
         super().__init__(urdf, {**PLAIN, **condition}, seed)
+        self.mount = self.bare.urdf.root  # what the cameras sit on
+        self.plan()
+
+    def plan(self):
         self.knots, t = [], 0.0
         order = list(range(len(self.postures)))
         last = self.postures[order[0]]
@@ -78,11 +82,16 @@ class Arm(Stills):
                 return between(a, b, s**3 * (10 - 15 * s + 6 * s * s))
         return dict(self.knots[-1][3])
 
+    def place(self, t):
+        angles = self.at(t)
+        self.scene.set_joints(angles)
+        return angles
+
     def play(self, out):
         out.mkdir(parents=True, exist_ok=True)
         c = self.condition
         log = lcm.EventLog(str(out / "log.lcmlog.part"), "w", overwrite=True)
-        truth = {"offsets_deg": self.offsets, "frames": [], "cameras": {
+        truth = {"offsets_deg": self.offsets, "frames": [], "mount": self.mount, "cameras": {
             n: k["X_base_optical"].tolist() for n, k in self.cameras.items()}}
         sheet, step = [], 2 * math.pi / 2**15
         steps, late = ENCODERS_HZ // c["hz"], c.get("late_ms", 0) * 1e-3
@@ -98,8 +107,7 @@ class Arm(Stills):
                 continue
             if c.get("moved") and frames % 20 == 0:
                 self.scene.move_things()
-            shown = self.at(max(0.0, t - late))
-            self.scene.set_joints(shown)
+            shown = self.place(max(0.0, t - late))
             pictures = [self.scene.picture(n) for n in self.cameras]
             truth["frames"].append({"utime": utime, "rad": shown})
             log.write_event(utime + 4000, "ROBOT_CAMERAS", picture_message(pictures, utime, c.get("jpeg", 0)))
@@ -128,14 +136,15 @@ class Arm(Stills):
                 X[:3, :3] = turned @ X[:3, :3]
                 X[:3, 3] += moved
                 by_kind[kind][name] = X.tolist()
-        file.write_text(json.dumps({"base_link": self.bare.urdf.root, "cameras": list(self.cameras),
+        file.write_text(json.dumps({"base_link": self.mount, "cameras": list(self.cameras),
                                     "X_base_optical": by_kind}))
 
 
 # ---- what the product says of it -----------------------------------------------------------------
 
-def replay(program, urdf, folder, kind, tag, believed, settings):
-    """As docs/calibrate_my_robot.md has it. @return the folder of the replay, or what went wrong."""
+def replay(program, urdf, folder, kind, tag, believed, settings, described=()):
+    """As docs/calibrate_my_robot.md has it; `described` is told new-robot besides.
+    @return the folder of the replay, or what went wrong."""
     out = folder / f"{kind}{tag}"
     shutil.rmtree(out, ignore_errors=True)
     truth = json.loads((folder / "truth.json").read_text())
@@ -145,7 +154,8 @@ def replay(program, urdf, folder, kind, tag, believed, settings):
     rough = [a for n in cameras if believed
              for a in ("--set", f"cameras.{n}.pose=roughly", "--set", f"cameras.{n}.pose_sd_mm={believed[0]}",
                        "--set", f"cameras.{n}.pose_sd_deg={believed[1]}")]
-    commands = [["new-robot", urdf, *info, "--camera-pose", f"{folder}/camera_pose.json:{kind}", "--out", out],
+    poses = [] if "--camera" in described else ["--camera-pose", f"{folder}/camera_pose.json:{kind}"]
+    commands = [["new-robot", urdf, *info, *poses, *described, "--out", out],
                 ["replay", folder / "log.lcmlog", "--config", out / "estimator.yaml", *rough,
                  *(a for key in settings for a in ("--set", key)), "--out", out / "replay"]]
     for command in commands:
@@ -159,8 +169,9 @@ def replay(program, urdf, folder, kind, tag, believed, settings):
 
 def score(out, urdf, truth):
     link = yaml.safe_load((out.parent / "robot.yaml").read_text())["robot"]["hand_link"]
-    tree, X = Urdf(urdf, [urdf.parent, *urdf.parents]), np.linalg.inv(np.array(truth["cameras"]["left"]))
-    true = {f["utime"]: X @ pose_of(tree, link, f["rad"]) for f in truth["frames"]}
+    tree, X = Urdf(urdf, [urdf.parent, *urdf.parents]), np.array(truth["cameras"]["left"])
+    true = {f["utime"]: np.linalg.inv(pose_of(tree, truth.get("mount", tree.root), f["rad"]) @ X)
+            @ pose_of(tree, link, f["rad"]) for f in truth["frames"]}
     offsets, order = truth["offsets_deg"], {u: k for k, u in enumerate(sorted(true))}
     converged, others, wrong, wrong_others, silent, hands, e = [], [], 0, 0, 0, [], {}
     for line in (out / "estimates.jsonl").open():
@@ -187,10 +198,12 @@ def score(out, urdf, truth):
     return {"hand": np.mean(converged or others[-50:] or [math.nan]), "converged": len(converged),
             "frames": len(converged) + len(others) + silent, "wrong": wrong, "others": len(others), "last": last,
             "wrong_others": wrong_others, "told": len(told), "of": len(offsets), "z": max(z, default=math.nan),
-            "state": e.get("state", "nothing published"), "said": e.get("status", "")}
+            "state": e.get("state", "nothing published"), "said": " ".join(
+                line for line in (out.parent / "replay.txt").read_text().splitlines() if "NOT CONVERGED" in line)}
 
 
-def table(arguments):
+def table(arguments, player=Arm, conditions=None, described=lambda name, kind: ()):
+    conditions = conditions or CONDITIONS
     print(f"{'log':<26} {'hand, mm':>8} {'converged':>9} {'wrong':>6} {'others wrong':>12} {'last hand (sd)':>16} "
           f"{'told':>7} {'error/sd':>8}  last state")
     bad = 0
@@ -201,10 +214,11 @@ def table(arguments):
             for seed in arguments.seeds:
                 folder = arguments.folder / f"{condition}-{name}-{seed}"
                 if not (folder / "truth.json").exists():
-                    Arm(urdf, CONDITIONS[condition], seed).play(folder)
+                    player(urdf, conditions[condition], seed).play(folder)
                 truth = json.loads((folder / "truth.json").read_text())
                 for kind in arguments.cameras:
-                    out = replay(arguments.program, urdf, folder, kind, arguments.tag, arguments.believed, arguments.set)
+                    out = replay(arguments.program, urdf, folder, kind, arguments.tag, arguments.believed,
+                                 arguments.set, described(name, kind))
                     row = f"{folder.name}/{kind}"
                     if isinstance(out, str):
                         print(f"{row:<26} {out}", flush=True)
@@ -217,25 +231,29 @@ def table(arguments):
     return 1 if bad else 0
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def arguments_of(text, conditions):
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
     one = commands.add_parser("play")
     one.add_argument("urdf", type=pathlib.Path)
-    one.add_argument("condition", choices=sorted(CONDITIONS))
+    one.add_argument("condition", choices=sorted(conditions))
     one.add_argument("seed", type=int)
     one.add_argument("folder", type=pathlib.Path)
     rows = commands.add_parser("table")
     rows.add_argument("folder", type=pathlib.Path)
     rows.add_argument("--robots", nargs="+", required=True, metavar="NAME=URDF")
-    rows.add_argument("--conditions", nargs="+", default=list(CONDITIONS))
+    rows.add_argument("--conditions", nargs="+", default=list(conditions))
     rows.add_argument("--seeds", nargs="+", type=int, default=[1])
     rows.add_argument("--cameras", nargs="+", default=["measured"], choices=["exact", "measured", "roughly", "wrong"])
     rows.add_argument("--program", default=str(SOURCE / "build/release/bin/bodyschema"))
     rows.add_argument("--believed", nargs=2, type=float, metavar=("MM", "DEG"), help="pose: roughly with these")
     rows.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="of the replay")
     rows.add_argument("--tag", default="", help="added to the names of the folders of replays")
-    arguments = parser.parse_args()
+    return parser.parse_args()
+
+
+def main():
+    arguments = arguments_of(__doc__, CONDITIONS)
     if arguments.command == "table":
         return table(arguments)
     Arm(arguments.urdf.resolve(), CONDITIONS[arguments.condition], arguments.seed).play(arguments.folder)

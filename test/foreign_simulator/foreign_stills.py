@@ -90,7 +90,7 @@ class StillScene(Scene):
 
     def __init__(self, urdf, condition, seed, cameras):
         self.random = np.random.default_rng(seed * 7919 + 5)
-        self.urdf = Urdf(urdf, [urdf.parent, *urdf.parents])
+        self.urdf = urdf if isinstance(urdf, Urdf) else Urdf(urdf, [urdf.parent, *urdf.parents])
         self.cameras, self.condition, self.seed = cameras, condition, seed
         self.rendered = {name for name, link in self.urdf.links.items() if link.find("visual") is not None}
         self.begin()
