@@ -26,9 +26,7 @@ class OutlinesBeforeMountedCameras : public OutlinesOfOwnRobot {
     scorer_ = std::make_unique<HypothesisScorer>(*model_, silhouette_model(*robot_, setup_), nullptr, rig_.intrinsics(),
                                                  options_.silhouette, options_.filter.particles);
   }
-  [[nodiscard]] OutlineFitter fitter() {
-    return {*model_, *scorer_, options_, rig_.cameras.size(), kAllRenders};
-  }
+  [[nodiscard]] OutlineFitter fitter() { return {*model_, *scorer_, options_, rig_.cameras.size(), kAllRenders}; }
   [[nodiscard]] PostureMemory memory() const {
     const Eigen::VectorXd sd = model_->state().prior_sd();
     std::vector<bool> joints(static_cast<std::size_t>(sd.size()), false);
