@@ -17,6 +17,7 @@
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/robot/forward_kinematics.hpp"
 #include "bodyschema/robot/robot_model.hpp"
+#include "camera_axes.hpp"
 #include "urdf_outline.hpp"
 
 namespace bodyschema {
@@ -156,7 +157,7 @@ class Starter {
     try {
       const Configuration configuration = Configuration::load(o_.out / "estimator.yaml");
       const Pipeline pipeline(configuration);
-      report.text += "robot and meshes load\n";
+      report.text += "robot and meshes load\n" + doubts_about_axes(pipeline);
     } catch (const Error& e) {
       report.text += fmt::format("to be put right: {}\n", e.what());
       report.usable = false;
@@ -169,6 +170,20 @@ class Starter {
   }
 
  private:
+  /// A link of the URDF that somebody took for the camera's own.
+  [[nodiscard]] std::string doubts_about_axes(const Pipeline& pipeline) const {
+    std::string text;
+    for (std::size_t c = 0; c < cameras_.size(); ++c) {
+      if (cameras_[c].unknown() || cameras_[c].X_base) continue;
+      if (!has_body_axes(pipeline.shared_robot(), pipeline.setup(), pipeline.rig(), c)) continue;
+      text += fmt::format(
+          "camera {}: the axes of {} look like a body's (x forward, z up), not a camera's (x right, y down, z into the "
+          "picture): name its optical link, or set in robot.yaml, below link,\n    X_link_optical: {}\n",
+          cameras_[c].name, cameras_[c].link, pose_yaml(Pose(Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5))));
+    }
+    return text;
+  }
+
   void find_hand() {
     hand_ = o_.hand_link;
     if (!hand_.empty()) return urdf_.require(hand_, "--hand");

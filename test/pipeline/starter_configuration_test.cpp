@@ -18,6 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 const fs::path kSource = BODYSCHEMA_SOURCE_DIR;
 
@@ -82,6 +83,26 @@ TEST_F(StarterConfiguration, OneCameraIsEnough) {
   };
   EXPECT_TRUE(has("focal_length"));
   EXPECT_FALSE(has("principal_point"));
+}
+
+/// The links of a body's axes that the cameras sit on: the files load, and no picture fits.
+TEST_F(StarterConfiguration, DoubtsAxesByWhichNoCameraSeesTheHand) {
+  auto o = options();
+  EXPECT_THAT(write_starter_configuration(o).text, Not(HasSubstr("axes")));
+  o.camera_links = {"camera_left", "camera_right"};
+  o.out = folder_ / "body";
+  const auto told = write_starter_configuration(o);
+  EXPECT_TRUE(told.usable);
+  EXPECT_THAT(told.text, HasSubstr("the axes of camera_left look like a body's (x forward, z up)"));
+  EXPECT_THAT(told.text, HasSubstr("the axes of camera_right look like"));
+  // The line that it prints is the remedy.
+  const std::string key = "X_link_optical: ";
+  const auto at = told.text.find(key) + key.size();
+  const std::string place = told.text.substr(at, told.text.find('\n', at) - at);
+  const Configuration mended = Configuration::load(o.out / "estimator.yaml", {"cameras.left.X_link_optical=" + place});
+  const Pose& X_PC = Pipeline(mended).rig().cameras[0].mount.X_PC;
+  EXPECT_LT((X_PC.linear().col(2) - Eigen::Vector3d::UnitX()).norm(), 1e-6) << "into the picture is forward";
+  EXPECT_LT((X_PC.linear().col(1) + Eigen::Vector3d::UnitZ()).norm(), 1e-6) << "down in the picture is down";
 }
 
 TEST_F(StarterConfiguration, FindsTheFolderOfThePackageThatHoldsTheMeshes) {
