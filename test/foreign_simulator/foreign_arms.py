@@ -1,19 +1,20 @@
 #!/usr/bin/env python3
 """Any URDF arm that moves before cameras that stand, drawn by MuJoCo, and what the service says of its log.
 
-The scenes of foreign_stills.py, with the arm in motion: reaches between postures in view, minimum jerk, a second of rest
-in each. Encoders and pictures go into an LCM log, `bodyschema new-robot` writes the configuration from URDF and
+The scenes of foreign_stills.py, with the arm in motion: reaches between postures in view, minimum jerk, a second of
+rest in each. Encoders and pictures go into an LCM log, `bodyschema new-robot` writes the configuration from URDF and
 camera_info as a user would, and `bodyschema replay` runs the service's estimator on it.
 
 usage: foreign_arms.py play URDF CONDITION SEED FOLDER      a log, its truth, and a sheet of pictures
        foreign_arms.py table FOLDER --robots NAME=URDF ... [--conditions ...] [--seeds ...] [--cameras KIND ...]
 
-`table` plays what is not in FOLDER yet and prints for each log: mean error of the last link's place in the left camera in
-frames called `converged` (where none is, in the last 50), the share of frames called so from frame 45 on, of these the
-share that is wrong (hand beyond 3 of its standard deviations and 2 mm, or an offset beyond 5), and of the others the share
-whose published hand is. Exit status 1 where a `converged` frame is wrong. Where the configuration has the cameras
-(--cameras): `exact` where they are; `measured` 5 mm and 0.5 deg off, as a hand-eye calibration; `wrong` 3 cm and 3 deg
-off; `roughly` the same, and it says so. What else it says of them is as new-robot writes it.
+`table` plays what is not in FOLDER yet and prints for each log: mean error of the last link's place in the left camera
+in frames called `converged` (where none is, in the last 50), the share of frames called so from frame 45 on, how many
+of all called so are wrong, early ones too (hand beyond 3 of its standard deviations and 2 mm, or an offset beyond 5),
+and of the others from frame 45 on how many have a wrong hand. Exit status 1 where a `converged` frame is wrong. Where
+the configuration has the cameras (--cameras): `exact` where they are; `measured` 5 mm and 0.5 deg off, as a hand-eye
+calibration; `wrong` 3 cm and 3 deg off; `roughly` the same, and it says so. What else it says of them is as new-robot
+writes it.
 
 Needs what foreign_simulator.py needs.
 """
@@ -176,18 +177,20 @@ def score(out, urdf, truth):
     converged, others, wrong, wrong_others, silent, hands, e = [], [], 0, 0, 0, [], {}
     for line in (out / "estimates.jsonl").open():
         e = json.loads(line)
-        if order[e["utime"]] < FIRST_COUNTED:
-            continue
+        early = order[e["utime"]] < FIRST_COUNTED
         if "hand_pose_left_camera" not in e or e.get("hand_sd_mm") is None:
-            silent += 1
+            silent += not early
             continue
         off = 1e3 * np.linalg.norm(np.array(e["hand_pose_left_camera"])[:3, 3] - true[e["utime"]][:3, 3])
         sd = e["hand_sd_mm"]
         bad = off > max(2, 3 * sd)
-        if e["state"] == "converged":
-            converged.append(off)
+        if e["state"] == "converged":  # a promise from the first on
             wrong += bad or any(abs(e["offset_deg"][j] - offsets[j]) > 5 * e["stddev_deg"][j]
                                 for j in offsets if j in e["offset_deg"])
+        if early:
+            continue
+        if e["state"] == "converged":
+            converged.append(off)
         else:
             others.append(off)
             wrong_others += bad

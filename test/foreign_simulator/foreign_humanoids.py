@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Any humanoid whose cameras sit in its own head, drawn by MuJoCo, and what the service says of its log.
 
-As foreign_arms.py, with the cameras on the head's last link and gaze that follows the hand: the head moves with the arm,
-minimum jerk, before a room full of things. `bodyschema new-robot` writes the configuration from URDF and camera_info as a
-user would, with the cameras' links where the URDF has them with OpenCV's axes, and `bodyschema replay` runs on it.
+As foreign_arms.py, with the cameras on the head's last link and gaze that follows the hand: the head moves with the
+arm, minimum jerk, before a room full of things. `bodyschema new-robot` writes the configuration from URDF and
+camera_info as a user would, with the cameras' links where the URDF has them with OpenCV's axes, and `bodyschema replay`
+runs on it.
 
 usage: foreign_humanoids.py play URDF CONDITION SEED FOLDER      a log, its truth, and a sheet of pictures
        foreign_humanoids.py table FOLDER --robots NAME=URDF ... [--conditions ...] [--seeds ...] [--cameras KIND ...]
