@@ -14,6 +14,8 @@ constexpr double kNear_px[] = {8.0, 5.0};
 constexpr double kWide_px[] = {30.0, 20.0, 14.0, 10.0, 7.0, 5.0};
 /// Of the distance at which outlines are looked for: what passes for a residual.
 constexpr double kOfReach = 0.5;
+/// About an arm that was just found, at the pictures' own noise: what came before weighed otherwise.
+constexpr int kLeastSteps = 3;
 /// Each step looks once, the last look may be two.
 constexpr int kMostRendersOfStart = static_cast<int>(std::size(kWide_px)) + limits::kMostSteps + 2;
 
@@ -103,12 +105,14 @@ double OutlineFitter::take_step(const Frame& frame, const PostureMemory& memory,
 void OutlineFitter::refine(const Frame& frame, const PostureMemory& memory, std::span<const double> search_px,
                            int more_steps, OutlineFit& fit) {
   double moved_px = 0.0;
-  // From afar an outline is matched with others as well, and errs by what passes for a residual: taken for as exact as
-  // pictures are, such matches would move what much is believed of (a camera's place) as readily as the joints.
+  // Of an arm that is looked for from afar, outlines are matched with others as well, and err by what passes for a
+  // residual: taken for as exact as pictures are, such matches would move what much is believed of (a camera's place)
+  // as readily as the joints. A memory holds it better than that.
+  const bool first = more_steps > 0 && memory.empty();
   for (const double reach_px : search_px) {
-    moved_px = take_step(frame, memory, reach_px, more_steps > 0 ? kOfReach * reach_px : 0.0, fit);
+    moved_px = take_step(frame, memory, reach_px, first ? kOfReach * reach_px : 0.0, fit);
   }
-  for (int i = 0; i < more_steps && (i == 0 || moved_px > limits::kSettled_px); ++i) {
+  for (int i = 0; i < more_steps && ((first && i < kLeastSteps) || moved_px > limits::kSettled_px); ++i) {
     moved_px = take_step(frame, memory, search_px.back(), 0.0, fit);
   }
   look_twice(frame, search_px.back(), fit);
