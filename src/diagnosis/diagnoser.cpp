@@ -144,11 +144,20 @@ class Diagnoser {
     std::move(curves.begin(), curves.end(), std::back_inserter(candidates));
   }
 
+  /// As one takes causes in one after the other, the first may stand in for what is found later: where fewer say the
+  /// same there is room for others.
   void find_causes() {
     block_s_ = options_.block_s;
+    do {
+      take_all();
+      while (drop_one()) asked_.reset();
+    } while (search_.refits() && say_simpler());
+  }
+
+  void take_all() {
     for (std::size_t round = 0; round < limits::kMostRounds; ++round) {
       const bool full = search_.causes().size() >= limits::kMostCauses;
-      const bool taken = !full && take_one(round);
+      const bool taken = !full && take_one();
       progress(0.2 + 0.6 * static_cast<double>(round + 1) / static_cast<double>(limits::kMostRounds));
       // One that others have made needless since makes room for the next.
       if (taken || (full && drop_one())) {
@@ -160,9 +169,16 @@ class Diagnoser {
       block_s_ *= 2.0;
       asked_.reset();
     }
-    while (drop_one()) asked_.reset();
-    while (search_.refits() && say_one_simpler()) {
+  }
+
+  /// @return whether fewer causes, or simpler ones, took the place of some
+  bool say_simpler() {
+    bool any = false;
+    while (say_one_simpler() || say_two_as_one()) {
+      any = true;
+      while (drop_one()) asked_.reset();
     }
+    return any;
   }
 
   /// A cause that was taken while others were still missing may say more than the log asks for in the end: a simpler
@@ -185,7 +201,7 @@ class Diagnoser {
     auto before = search_.now();
     search_.drop(cause);
     asked_.reset();
-    if (const auto simpler = part_of(name); simpler && take_part(*simpler, name)) {
+    if (const auto simpler = part_of(name); simpler && take_instead(*simpler, {name}, before.cost)) {
       spdlog::debug("diagnosis: {} says what {} said", simpler->text(), name.text());
       return true;
     }
@@ -211,32 +227,96 @@ class Diagnoser {
     return best == nullptr ? std::nullopt : std::optional(best->cause);
   }
 
-  /// @return whether nothing of the whole stands out beside it
-  bool take_part(const CauseName& simpler, const CauseName& whole) {
+  /// @param cost  with those that it replaces
+  /// @return whether it explains as much, and nothing of those stands out beside it
+  bool take_instead(const CauseName& simpler, const std::vector<CauseName>& of, double cost) {
     const auto named = [](const Field& field, const CauseName& name) {
       return std::find_if(field.candidates.begin(), field.candidates.end(),
                           [&](const Candidate& c) { return c.cause == name; });
     };
-    const Field& without = *asked_;
+    const double cost_without = search_.cost();
+    const Field& without = field();
     const auto candidate = named(without, simpler);
+    if (candidate == without.candidates.end()) return false;
     Trial trial{&*candidate, without.base.heldout(candidate->columns), 0.0, true};
     trial.gain = without.base.heldout().total() - trial.heldout.total();
     auto model = with(without, trial);
     if (!model) return false;
     search_.take(std::move(*model));
+    if (search_.cost() - cost > limits::kAlikeShare * (cost_without - cost)) return false;
     const Field& left = field();
-    const auto rest = named(left, whole);
-    return rest == left.candidates.end() || rest->z() < threshold_of(rest->stated);
+    return std::none_of(of.begin(), of.end(), [&](const CauseName& name) {
+      const auto rest = named(left, name);
+      return rest != left.candidates.end() && rest->z() >= threshold_of(rest->stated);
+    });
+  }
+
+  /// Two causes that were found one after the other may say together what a single one says: all parts larger and the
+  /// forearm smaller by as much are a larger hand. That one takes their place where neither stands out beside it.
+  bool say_two_as_one() {
+    const auto& causes = search_.causes();
+    for (std::size_t b = 1; b < causes.size(); ++b) {
+      for (std::size_t a = 0; a < b; ++a) {
+        if (causes[a].generic() || causes[b].generic()) continue;
+        const std::pair both(causes[a].name, causes[b].name);
+        if (std::find(said_as_one_.begin(), said_as_one_.end(), both) != said_as_one_.end()) continue;
+        said_as_one_.push_back(both);  // tried once
+        if (const auto one = one_for(a, b); one && replace_by_one(a, b, *one)) return true;
+      }
+    }
+    return false;
+  }
+
+  /// The cause of fewer parameters that explains most of what these two do, about the present model; none: none
+  /// explains enough of it.
+  std::optional<CauseName> one_for(std::size_t a, std::size_t b) {
+    const Field& field = this->field();
+    auto out = search_.columns_of(a);
+    const auto more = search_.columns_of(b);
+    out.insert(out.end(), more.begin(), more.end());
+    const auto reduced = diagnosis::without(search_, field.base, out);
+    const auto explained = [](const Scores& s) { return s.total.dot(s.S.ldlt().solve(s.total)); };
+    const double both = explained(reduced.base.score(reduced.own));
+    std::optional<CauseName> best;
+    double most = limits::kRivalShare * both;
+    for (const auto& candidate : field.candidates) {
+      if (candidate.generic() || candidate.parameters.size() >= out.size()) continue;
+      const auto scores = reduced.base.score(beside(candidate.columns, reduced));
+      if (scores.independent.maxCoeff() < limits::kRounding) continue;
+      if (const double share = explained(scores); share > most) {
+        most = share;
+        best = candidate.cause;
+      }
+    }
+    return best;
+  }
+
+  /// @return whether it took their place; otherwise all is as it was
+  bool replace_by_one(std::size_t a, std::size_t b, const CauseName& one) {
+    const std::vector<CauseName> two = {search_.causes()[a].name, search_.causes()[b].name};
+    auto before = search_.now();
+    search_.drop(b);
+    search_.drop(a);
+    asked_.reset();
+    if (take_instead(one, two, before.cost)) {
+      spdlog::debug("diagnosis: {} says what {} and {} said", one.text(), two[0].text(), two[1].text());
+      return true;
+    }
+    search_.go_back_to(std::move(before));
+    asked_.reset();
+    return false;
   }
 
   /// Finds the next cause and takes it into the model; false: there is none.
-  bool take_one(std::size_t round) {
+  bool take_one() {
     const Field& field = this->field();
     report_.z_threshold = field.threshold;
-    if (round == 0) leave_out_untold(field);
-    auto trials = trials_of(field, round == 0);
+    const bool first = std::exchange(nothing_asked_, false);
+    if (first) leave_out_untold(field);
+    auto trials = trials_of(field, first);
     for (std::size_t tried = 0; !trials.empty() && tried < limits::kMostTried; ++tried) {
       const Trial* best = choose(field, trials);
+      if (best->candidate->generic() && take_known_instead(field, trials, *best)) return true;
       auto model = with(field, *best);
       if (model && best->candidate->z() >= threshold_of(best->candidate->stated)) {
         best = fits_better(field, trials, *best, *model);
@@ -293,6 +373,39 @@ class Diagnoser {
     std::sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.gain > b.gain; });
     std::stable_partition(trials.begin(), trials.end(), [](const Trial& t) { return t.plausible; });
     return trials;
+  }
+
+  /// A free curve stands in for a known cause of its joint where, with that one fitted, nothing of the curve stands out
+  /// any more: sums about a model that is far off may rank what is bent, or happens at some time, below the curve.
+  bool take_known_instead(const Field& field, const std::vector<Trial>& trials, const Trial& curve) {
+    if (!search_.refits()) return false;
+    const auto& joint = curve.candidate->cause.joint;
+    std::size_t tried = 0;
+    for (const auto& trial : trials) {
+      const auto& known = *trial.candidate;
+      if (known.generic() || known.cause.joint != joint) continue;
+      if (tried++ == limits::kMostTried) break;
+      auto model = with(field, trial);
+      if (!model) continue;
+      auto before = search_.now();
+      search_.take(std::move(*model));
+      spdlog::debug("diagnosis: {} instead of a curve: cost {:.4f}", known.cause.text(), search_.cost());
+      if (!stands_out(*curve.candidate)) return true;
+      search_.go_back_to(std::move(before));
+    }
+    return false;
+  }
+
+  /// Whether this curve does, about the present model.
+  bool stands_out(const Candidate& curve) {
+    const LogAbout log = search_.about(block_s_);
+    const BlockRegression base = search_.regression(log);
+    for (auto& candidate : free_curves(fit_, log)) {
+      if (candidate.cause.joint != curve.cause.joint || candidate.variable != curve.variable) continue;
+      candidate.scores = base.score(candidate.columns);
+      return candidate.z() >= threshold_of(false);
+    }
+    return false;
   }
 
   /// Whether it is what was found already under another name, and a little besides: a longer link that seems to lie
@@ -414,9 +527,9 @@ class Diagnoser {
     std::size_t worst = 0;
     double least = 1e300;
     for (std::size_t c = 0; c < search_.causes().size(); ++c) {
-      const auto [base, own, kept] = without(search_, all, search_.columns_of(c));
-      const double t = base.score(own).z();
-      const double gain = base.heldout().total() - with;
+      const auto reduced = without(search_, all, search_.columns_of(c));
+      const double t = reduced.base.score(reduced.own).z();
+      const double gain = reduced.base.heldout().total() - with;
       const double strength = gain > 0.0 ? t / threshold_of(search_.causes()[c].stated) : 0.0;
       if (strength >= least) continue;
       least = strength;
@@ -483,10 +596,12 @@ class Diagnoser {
   std::size_t stated_count_ = 0;       ///< of slips then, at first
   DiagnosisReport report_;
   double block_s_ = 0.0;
+  bool nothing_asked_ = true;
   std::optional<Field> asked_;  ///< about the present model
   double alike_ = 0.0;          ///< correlation of neighbouring blocks, at the last look
   std::vector<CauseName> refused_;
-  std::vector<CauseName> said_simply_;  ///< of more parameters, looked at once whether fewer do
+  std::vector<CauseName> said_simply_;                        ///< of more parameters, looked at once whether fewer do
+  std::vector<std::pair<CauseName, CauseName>> said_as_one_;  ///< looked at once whether one cause does
 };
 
 }  // namespace

@@ -24,17 +24,6 @@ Eigen::MatrixXd sum_of(const std::vector<Eigen::MatrixXd>& parts) {
   return sum;
 }
 
-/// A candidate's columns beside a base that lacks one of the model's causes, which is at zero in it.
-AddedColumns beside(const AddedColumns& columns, const std::vector<Eigen::Index>& kept,
-                    const std::vector<Eigen::Index>& out, const Eigen::VectorXd& value) {
-  AddedColumns result = columns;
-  for (std::size_t b = 0; b < columns.B.size(); ++b) {
-    result.B[b] = columns.B[b](kept, Eigen::all);
-    result.d[b] += columns.B[b](out, Eigen::all).transpose() * value;
-  }
-  return result;
-}
-
 std::vector<Eigen::Index> all_but(Eigen::Index n, const std::vector<Eigen::Index>& out) {
   std::vector<Eigen::Index> kept;
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -104,7 +93,17 @@ Reduced without(const ModelSearch& search, const BlockRegression& all, const std
     own.C[b] = block.H(out, out);
     own.d[b] = g(out);
   }
-  return {BlockRegression(std::move(blocks), all.precision()(kept), all.away()(kept)), std::move(own), std::move(kept)};
+  return {BlockRegression(std::move(blocks), all.precision()(kept), all.away()(kept)), std::move(own), std::move(kept),
+          out, value};
+}
+
+AddedColumns beside(const AddedColumns& columns, const Reduced& reduced) {
+  AddedColumns result = columns;
+  for (std::size_t b = 0; b < columns.B.size(); ++b) {
+    result.B[b] = columns.B[b](reduced.kept, Eigen::all);
+    result.d[b] += columns.B[b](reduced.out, Eigen::all).transpose() * reduced.value;
+  }
+  return result;
 }
 
 double Findings::quantile(const LogAbout& log) const {
@@ -215,13 +214,14 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
     hand += moved.head<3>().squaredNorm();
     turn += moved.tail<3>().squaredNorm();
   }
-  if (weight <= 0.0) return {};
+  const auto share = [](double part, double of) { return of > 0.0 ? part / of : 0.0; };
+  if (weight <= 0.0) return {.outline_found = share(found, sampled), .outline_where_seen = 0.0};
   const double pictures = static_cast<double>(motions.size()), rms_px = std::sqrt(square / weight);
   return {rms_px,
           1e3 * std::sqrt(hand / pictures),
           degrees(std::sqrt(turn / pictures)),
-          found / sampled,
-          where_seen / sampled_seen,
+          share(found, sampled),
+          share(where_seen, sampled_seen),
           rms_px * std::sqrt(agreed_share(motions, motion_settings())),
           std::hypot(std::sqrt(of_encoders / weight), floor_px())};
 }
@@ -409,7 +409,7 @@ void Findings::add_estimated(const LogAbout& log, const BlockRegression& all, co
                                             std::sqrt(covariance(i, i))));
   }
   cause.same = {cause.cause};
-  find_class(reduced, out, columns[best], own, candidates, cause);
+  find_class(reduced, columns[best], own, candidates, cause);
   report_.estimated.push_back(std::move(cause));
 }
 
@@ -512,7 +512,7 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
         cause.parameters.push_back(std::move(e));
         cause.implausible = cause.implausible || std::abs(value) > largest_plausible(log, *effect, parameter);
       }
-      find_class(reduced, columns, columns, reduced.own, candidates, cause);
+      find_class(reduced, columns, reduced.own, candidates, cause);
     }
     (is_small(log, all, c) ? report_.small_causes : report_.causes).push_back(std::move(cause));
   }
@@ -520,19 +520,16 @@ void Findings::describe_causes(const LogAbout& log, const BlockRegression& all,
                    [](const auto& a, const auto& b) { return a.heldout_gain > b.heldout_gain; });
 }
 
-void Findings::find_class(const Reduced& reduced, const std::vector<Eigen::Index>& out,
-                          const std::vector<Eigen::Index>& columns, const AddedColumns& own,
+void Findings::find_class(const Reduced& reduced, const std::vector<Eigen::Index>& columns, const AddedColumns& own,
                           const std::vector<Candidate>& candidates, DiagnosedCause& cause) {
-  const auto& [base, all_out, kept] = reduced;
-  static_cast<void>(all_out);
-  const Eigen::VectorXd value = values_of(search_, out);
+  const auto& base = reduced.base;
   const auto with = base.heldout(own);
   const double alone = base.heldout().total(), gain = alone - with.total();
   const double dof = static_cast<double>(base.blocks()) - 1.0;
   const auto own_columns = static_cast<Eigen::Index>(columns.size());
   for (const auto& candidate : candidates) {
     if (candidate.generic() || candidate.cause == cause.cause) continue;
-    const auto rival = beside(candidate.columns, kept, out, value);
+    const auto rival = beside(candidate.columns, reduced);
     const auto scores = base.score(rival);
     if (scores.independent.maxCoeff() < limits::kRounding) continue;
     const auto other = base.heldout(rival);

@@ -16,9 +16,12 @@ namespace bodyschema::diagnosis {
 struct Reduced {
   BlockRegression base;
   AddedColumns own;
-  std::vector<Eigen::Index> kept;
+  std::vector<Eigen::Index> kept, out;
+  Eigen::VectorXd value;  ///< that they had
 };
 Reduced without(const ModelSearch& search, const BlockRegression& all, const std::vector<Eigen::Index>& out);
+/// A candidate's columns beside it.
+AddedColumns beside(const AddedColumns& columns, const Reduced& reduced);
 
 /// What the answer says of a model: sizes with their intervals, what else would explain the same, what is excluded, and
 /// how well pictures are predicted.
@@ -71,10 +74,8 @@ class Findings {
   /// pictures alike the one is taken that explains most.
   void add_estimated(const LogAbout& log, const BlockRegression& all, const std::string& kind,
                      const std::vector<Candidate>& candidates);
-  /// @param out  positions in the base of what `reduced` lacks
-  /// @param columns  ... of those among them that are the cause's; `own` are their columns
-  void find_class(const Reduced& reduced, const std::vector<Eigen::Index>& out,
-                  const std::vector<Eigen::Index>& columns, const AddedColumns& own,
+  /// @param columns  of what `reduced` lacks those that are the cause's; `own` are their columns
+  void find_class(const Reduced& reduced, const std::vector<Eigen::Index>& columns, const AddedColumns& own,
                   const std::vector<Candidate>& candidates, DiagnosedCause& cause);
   /// A cause that no fit has taken in is judged by what it moves while it is small. Per parameter, the share of its
   /// size that is not known for that: by how much more or less it moves at its size, block by block, which pictures

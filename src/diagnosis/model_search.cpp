@@ -185,7 +185,7 @@ std::optional<ModelSearch::Extended> ModelSearch::with(const FoundCause& cause, 
                                                        Eigen::Index base) {
   auto causes = causes_;
   causes.push_back(cause);
-  if (!in_state(cause)) return Extended{std::move(causes), state_, cost_};
+  if (!in_state(cause)) return Extended{std::move(causes), state_, cost_, noise_};
   State stepped = state_;
   stepped.set(state_.x() + estimate.head(state_.size()));
   State state = state_with(causes);
@@ -202,7 +202,7 @@ std::optional<ModelSearch::Extended> ModelSearch::with(const FoundCause& cause, 
   state.set(x);
   const double cost = fit(state, 0.0);
   if (cost >= cost_ * (1.0 - limits::kLeastGain)) return std::nullopt;
-  return Extended{std::move(causes), std::move(state), cost};
+  return Extended{std::move(causes), std::move(state), cost, noise_};
 }
 
 void ModelSearch::take(Extended extended) {
@@ -219,6 +219,7 @@ void ModelSearch::go_back_to(Extended before) {
   causes_ = std::move(before.causes);
   state_ = std::move(before.state);
   cost_ = before.cost;
+  noise_ = std::move(before.noise);
 }
 
 void ModelSearch::drop(std::size_t cause) {

@@ -58,13 +58,14 @@ class ModelSearch {
     std::vector<FoundCause> causes;
     State state;
     double cost = 0.0;
+    std::vector<OutlineNoise> noise;
   };
   /// The present one with a cause more, fitted again; none: that is no better. Nothing changes yet.
   /// @param estimate  of the base's parameters (steps), then of the cause's columns
   std::optional<Extended> with(const FoundCause& cause, const Eigen::VectorXd& estimate, Eigen::Index base);
   /// Takes that cause in.
   void take(Extended extended);
-  [[nodiscard]] Extended now() const { return {causes_, state_, cost_}; }
+  [[nodiscard]] Extended now() const { return {causes_, state_, cost_, noise_}; }
   void go_back_to(Extended before);
   void drop(std::size_t cause);
   /// Where a part of the log lies out of sight of the model: tries a slip of every joint there.

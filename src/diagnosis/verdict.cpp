@@ -14,6 +14,11 @@
 namespace bodyschema::diagnosis {
 namespace {
 
+constexpr const char* kLarge =
+    " So much is more than robots are usually off by, and explains all that is seen: is this the robot's model, and "
+    "are "
+    "its units right?";
+
 /// "6.2 mm (5.9 to 6.5)": of a size and its interval, where there is one, without sign; an interval that reaches over
 /// zero says "at most".
 std::string amount_text(const DiagnosedParameter& p) {
@@ -101,6 +106,17 @@ std::string of_no_known_size(const DiagnosisReport& report) {
   return "";
 }
 
+bool larger_than_on_any_robot(const DiagnosisReport& report) {
+  return std::any_of(report.causes.begin(), report.causes.end(), [](const auto& c) { return c.implausible; });
+}
+
+/// Whether what is left differs from one part of the log to another, and never as if the arm stood elsewhere: a cause
+/// that stands in for another one leaves some of it.
+bool leaves_noise_alone(const DiagnosisReport& report) {
+  return report.noise_px > 0.0 && report.left_px <= limits::kNoiseRatio * report.noise_px &&
+         report.after.moved_px <= report.after.encoders_px;
+}
+
 /// Why no answer of this report is to be trusted; empty: it is.
 std::string why_not(const DiagnosisReport& report) {
   const auto& causes = report.causes;
@@ -110,7 +126,7 @@ std::string why_not(const DiagnosisReport& report) {
         "the pictures. The parts have another shape, or the masks miss some of them.",
         100.0 * found);
   }
-  if (std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.implausible; })) {
+  if (larger_than_on_any_robot(report) && !leaves_noise_alone(report)) {
     return "No known cause explains this log: what fits is larger than on any robot.";
   }
   if (!report.not_in_model.empty()) {
@@ -228,7 +244,8 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles, const std::v
   if (!causes.empty()) {
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });
     report.verdict = unexplained ? "unexplained" : several ? "class" : "named";
-    report.sentence = capitalised(list) + "." + besides(report) + taken_up;
+    report.sentence =
+        capitalised(list) + "." + (larger_than_on_any_robot(report) ? kLarge : "") + besides(report) + taken_up;
     return;
   }
   report.verdict = "none";

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <set>
 #include <thread>
@@ -327,10 +328,12 @@ double LogFit::mean_cost(const LinearLog& at, double usual_points, double Outlin
     points += evidence.sampled;
     worst = std::max(worst, own / evidence.sampled);
   }
+  // Nothing is predicted in any picture: that fits no log, though nothing lies off.
+  if (points <= 0.0) return std::numeric_limits<double>::infinity();
   // Some of the outline always comes and goes; much of it gone is no better fit.
   constexpr double kUsualLoss = 0.1;
   const double lost = std::max(0.0, (1.0 - kUsualLoss) * usual_points - points);
-  return (sum + worst * lost) / std::max(1.0, points + lost);
+  return (sum + worst * lost) / (points + lost);
 }
 
 double LogFit::fit(State& state, const FitSettings& settings, std::span<const std::size_t> pictures) {

@@ -293,11 +293,23 @@ class Replay {
       }
       table += '\n';
     }
+    table += effects_table();
     table += "weakest direction: " + last_.weakest.text + '\n';
     if (truth_) table += truth_table(summary);
     table += closing_lines(summary);
     write_file(options_.out / "summary.json", summary.dump(2) + '\n');
     return table;
+  }
+
+  /// What else is estimated, as far as the pictures tell it: a head's offsets, a latency.
+  [[nodiscard]] std::string effects_table() const {
+    std::string rows;
+    for (const auto& p : last_.effects) {
+      if (!p.told()) continue;
+      rows +=
+          fmt::format("{:<34} {:>10.3g} {:>8.2g} {}\n", p.name, p.value / p.si_per_unit, p.sd / p.si_per_unit, p.unit);
+    }
+    return rows.empty() ? rows : fmt::format("{:<34} {:>10} {:>8}\n", "told besides", "value", "sd") + rows;
   }
 
   /// How it ended, and what is wrong with the log as a whole.

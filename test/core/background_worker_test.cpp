@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <filesystem>
+#include <iterator>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -15,6 +17,16 @@ TEST(BackgroundWorker, IsOneThreadForAllWork) {
   const auto first = worker.begin([] { return std::this_thread::get_id(); }).get();
   EXPECT_NE(first, std::this_thread::get_id());
   for (int i = 0; i < 100; ++i) EXPECT_EQ(worker.begin([] { return std::this_thread::get_id(); }).get(), first);
+}
+
+/// The paper's filter gives it none.
+TEST(BackgroundWorker, IsNoThreadBeforeItHasWork) {
+  const auto threads = [] { return std::distance(std::filesystem::directory_iterator("/proc/self/task"), {}); };
+  const auto before = threads();
+  BackgroundWorker worker;
+  EXPECT_EQ(threads(), before);
+  worker.begin([] {}).get();
+  EXPECT_EQ(threads(), before + 1);
 }
 
 TEST(BackgroundWorker, GivesBackWhatWasReturnedOrThrown) {

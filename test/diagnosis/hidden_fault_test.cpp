@@ -38,6 +38,16 @@ TEST(HiddenFault, NothingIsNoneAndAWobbleThatFollowsNothingIsNot) {
   EXPECT_LT(report.after.moved_px, 0.5 * wobble.before.moved_px);
 }
 
+/// The answer was that nothing is wrong, with all of the outline found.
+TEST(HiddenFault, AnArmThatIsSeenNowhereIsNotNone) {
+  test::Simulated what;
+  what.offsets_deg = {{"r_shoulder_pitch", -90.0}, {"r_shoulder_roll", 60.0}};
+  what.seconds = 12.0;
+  const auto report = answer({}, what);
+  EXPECT_LT(report.after.outline_found, 0.1);
+  EXPECT_EQ(report.verdict, "unexplained") << report.sentence;
+}
+
 TEST(HiddenFault, AHandLargerThanItsMeshesIsNamedByItsPart) {
   const auto report = answer({"mesh_scale:part=hand,value=6"});
   EXPECT_TRUE(test::is_named(report)) << report.sentence;

@@ -46,6 +46,27 @@ TEST(LogDiagnosis, AStickInTheHandIsSeen) {
   EXPECT_THAT(report.sentence, HasSubstr(report.not_in_model));
 }
 
+/// Of this log the forearm is asked for first, then all parts, and of the two neither can be taken out alone. Together
+/// they say what the hand alone says: all parts 16 % larger, and the forearm smaller by as much.
+TEST(LogDiagnosis, TwoCausesThatTogetherSayWhatOneSaysGiveWayToIt) {
+  const test::RenderedLog log([](Settings& settings, Plan& plan) {
+    settings.camera_rate_hz = 5.0;
+    settings.supersampling = 2;
+    plan.seed = 1795830186;
+    plan.seconds = 35.0;
+    plan.output = simulator::Output::kSilhouettes;
+    plan.offsets_deg = {{"r_shoulder_pitch", 5.201486786}, {"r_shoulder_roll", -5.418527589},
+                        {"r_shoulder_yaw", -4.780977065},  {"r_elbow", 1.705740027},
+                        {"r_wrist_prosup", 1.993247263},   {"r_wrist_pitch", -2.932819275},
+                        {"r_wrist_yaw", 3.974855751}};
+    plan.faults = {simulator::FaultSpec::parse("mesh_scale:part=hand,value=16")};
+  });
+  const auto report = log.diagnosis("single_colour", {"vision.background_rgb=[0, 0, 0]"});
+  EXPECT_TRUE(test::is_named(report)) << report.sentence;
+  EXPECT_TRUE(test::names_only_part(report, "r_hand")) << report.sentence;
+  test::expect_size(report, {"mesh_scale", "", "r_hand"}, "scale", 16.0);
+}
+
 /// The head turns before a room and pictures are JPEG: a learned background is of no use.
 TEST(LogDiagnosis, DoesWithoutALearnedBackgroundWhereTheHeadTurnsAndWarnsOfPicturesNotUsed) {
   const test::RenderedLog log(

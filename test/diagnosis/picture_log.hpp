@@ -13,7 +13,7 @@
 
 namespace bodyschema::test {
 
-/// A log of rendered pictures, 25 s at 4 Hz, in a file that goes with this.
+/// A log of rendered pictures, or of masks where the plan has silhouettes, 25 s at 4 Hz, in a file that goes with this.
 class RenderedLog {
  public:
   using Change = std::function<void(simulator::SimulatorSettings&, simulator::SimulationPlan&)>;
@@ -36,7 +36,9 @@ class RenderedLog {
     simulator::Simulator simulator(setup.load(), setup, StereoRig::from(c.section("cameras")), settings, plan);
     begin_s_ = static_cast<double>(simulator.first_motion_frame()) / settings.camera_rate_hz;
     LogWriter log(file_);
-    simulator::FramePublisher publisher(simulator.joint_names(), {});
+    simulator::FramePublisher::Options format;
+    if (plan.output == simulator::Output::kSilhouettes) format.format = simulator::PictureFormat::kMasks;
+    simulator::FramePublisher publisher(simulator.joint_names(), format);
     for (int i = 0; auto frame = simulator.next(); ++i) {
       if (edit) edit(*frame, static_cast<double>(i) / simulator.frame_count());
       publisher.publish(*frame, log);

@@ -215,6 +215,25 @@ TEST(Verdict, TrustsNoNameOfASizeThatNoRobotHas) {
   EXPECT_THAT(report.exclusion_limits, IsEmpty());
 }
 
+/// 6 kg in the hand, and a joint that turned 29 % less than its encoder said: with them logs were explained to their
+/// noise, and nothing was named.
+TEST(Verdict, NamesWhatIsLargerThanOnAnyRobotWhereItLeavesNothingButNoise) {
+  auto cause = gain_of_elbow();
+  cause.implausible = true;
+  auto report = report_of({cause});
+  report.left_px = 0.29;
+  report.noise_px = 0.28;
+  report.after.moved_px = 0.1;
+  report.after.encoders_px = 0.2;
+  EXPECT_EQ(worded(report).verdict, "named");
+  EXPECT_THAT(worded(report).sentence, HasSubstr("So much is more than robots are usually off by"));
+  report.after.moved_px = 0.25;
+  EXPECT_THAT(worded(report).sentence, HasSubstr("larger than on any robot"));
+  report.after.moved_px = 0.1;
+  report.left_px = 0.4;
+  EXPECT_THAT(worded(report).sentence, HasSubstr("larger than on any robot"));
+}
+
 TEST(Verdict, TrustsNothingWhereMuchOfTheOutlineIsMissing) {
   for (const bool with_cause : {true, false}) {
     auto report = report_of({});

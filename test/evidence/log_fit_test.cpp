@@ -71,6 +71,20 @@ TEST_F(LogFitOfOwnRobot, TheTruthExplainsThePicturesAndNothingElseDoesAsWell) {
   EXPECT_GT(fit.misfit(at, 2.0 * at.sampled()), fit.misfit(at, at.sampled()));
 }
 
+/// Where an arm is predicted in no picture nothing lies off: a search that strayed there stayed.
+TEST_F(LogFitOfOwnRobot, AnArmThatIsPredictedInNoPictureFitsWorst) {
+  const auto log = log_of(seen_);
+  LogFit fit(*log, 1);
+  const State right = truth(state());
+  State away = right;
+  Eigen::VectorXd x = right.x();
+  x[0] += radians(170.0);
+  away.set(x);
+  const auto at = fit.linearise(right.model(), {}, {}), elsewhere = fit.linearise(away.model(), {}, {});
+  ASSERT_EQ(elsewhere.sampled(), 0.0);
+  EXPECT_GT(fit.misfit(elsewhere, 0.0), fit.misfit(at, at.sampled()));
+}
+
 /// Evidence over parameters is that over coordinates: a step along it leads to the truth.
 TEST_F(LogFitOfOwnRobot, EvidenceAboutParametersPointsToTheTruth) {
   const auto log = log_of(seen_);

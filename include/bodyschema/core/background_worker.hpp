@@ -10,10 +10,10 @@
 
 namespace bodyschema {
 
-/// One thread that lives as long as this does and does what it is given, in order.
+/// One thread that does what it is given, in order; from the first work on it lives as long as this does.
 class BackgroundWorker {
  public:
-  BackgroundWorker() : thread_([this] { live(); }) {}
+  BackgroundWorker() = default;
   /// Waits for all that was given.
   ~BackgroundWorker() {
     {
@@ -21,7 +21,7 @@ class BackgroundWorker {
       stop_ = true;
     }
     wake_.notify_one();
-    thread_.join();
+    if (thread_.joinable()) thread_.join();
   }
   BackgroundWorker(const BackgroundWorker&) = delete;
   BackgroundWorker& operator=(const BackgroundWorker&) = delete;
@@ -34,6 +34,7 @@ class BackgroundWorker {
     {
       const std::lock_guard lock(mutex_);
       waiting_.emplace_back(std::move(task));
+      if (!thread_.joinable()) thread_ = std::thread([this] { live(); });
     }
     wake_.notify_one();
     return result;

@@ -47,6 +47,8 @@ struct EstimatedParameter {
   double value = 0.0;         ///< SI
   double sd = 0.0;            ///< SI
   double prior_sd = 0.0;      ///< SI, what was believed of it before any picture
+  /// Whether the pictures tell it: its standard deviation is below a third of what was believed before.
+  [[nodiscard]] bool told() const { return sd < prior_sd / 3.0; }
 };
 
 /// Something outside the state that recent pictures ask for.
