@@ -150,6 +150,14 @@ TEST(HiddenFault, ASlipAndALatencyTogetherAreBothFound) {
   EXPECT_NEAR(seconds(*slip->parameters[0].from - report.begin_utime), 20.0, 0.5);
 }
 
+/// The drift was ranked below a curve over time, and a slip of another joint.
+TEST(HiddenFault, WhatDriftsIsNamedBesideASlip) {
+  const auto report = answer({"drift:joint=r_wrist_prosup,value=-9.6", "slip:at=13,joint=r_wrist_pitch,value=9"});
+  EXPECT_TRUE(test::is_named(report)) << report.sentence;
+  EXPECT_NE(found(report, {"drift", "r_wrist_prosup", ""}), nullptr) << report.sentence;
+  EXPECT_NE(found(report, {"slip", "r_wrist_pitch", ""}), nullptr) << report.sentence;
+}
+
 TEST(HiddenFault, AJointThatSwaysIsUnexplained) {
   const auto report = answer({"wobble:joint=r_shoulder_roll,value=1,period=6"});
   EXPECT_EQ(report.verdict, "unexplained") << report.sentence;
