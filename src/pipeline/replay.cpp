@@ -301,15 +301,16 @@ class Replay {
     return table;
   }
 
-  /// What else is estimated, as far as the pictures tell it: a head's offsets, a latency.
+  /// What else is estimated and told by the pictures to be there: a head's offsets, a latency.
   [[nodiscard]] std::string effects_table() const {
+    constexpr double kSurely_sd = 2.0;
     std::string rows;
     for (const auto& p : last_.effects) {
-      if (!p.told()) continue;
+      if (!p.told() || std::abs(p.value) < kSurely_sd * p.sd) continue;
       rows +=
           fmt::format("{:<34} {:>10.3g} {:>8.2g} {}\n", p.name, p.value / p.si_per_unit, p.sd / p.si_per_unit, p.unit);
     }
-    return rows.empty() ? rows : fmt::format("{:<34} {:>10} {:>8}\n", "told besides", "value", "sd") + rows;
+    return rows.empty() ? rows : fmt::format("{:<34} {:>10} {:>8}\n", "found besides", "value", "sd") + rows;
   }
 
   /// How it ended, and what is wrong with the log as a whole.
