@@ -64,8 +64,10 @@ class Diagnoser {
   }
 
  private:
-  void progress(double share) const {
-    if (options_.progress) options_.progress(share);
+  /// Where fewer causes say the same the search goes on, and what is shown does not go back.
+  void progress(double share) {
+    shown_ = std::max(shown_, share);
+    if (options_.progress) options_.progress(shown_);
   }
 
   [[nodiscard]] std::vector<JointSample> exposures() const {
@@ -235,7 +237,7 @@ class Diagnoser {
                           [&](const Candidate& c) { return c.cause == name; });
     };
     const double cost_without = search_.cost();
-    const Field& without = field();
+    const Field& without = asked_ ? *asked_ : field();
     const auto candidate = named(without, simpler);
     if (candidate == without.candidates.end()) return false;
     Trial trial{&*candidate, without.base.heldout(candidate->columns), 0.0, true};
@@ -596,6 +598,7 @@ class Diagnoser {
   std::size_t stated_count_ = 0;       ///< of slips then, at first
   DiagnosisReport report_;
   double block_s_ = 0.0;
+  double shown_ = 0.0;  ///< of the progress
   bool nothing_asked_ = true;
   std::optional<Field> asked_;  ///< about the present model
   double alike_ = 0.0;          ///< correlation of neighbouring blocks, at the last look

@@ -16,8 +16,7 @@ namespace {
 
 constexpr const char* kLarge =
     " So much is more than robots are usually off by, and explains all that is seen: is this the robot's model, and "
-    "are "
-    "its units right?";
+    "are its units right?";
 
 /// "6.2 mm (5.9 to 6.5)": of a size and its interval, where there is one, without sign; an interval that reaches over
 /// zero says "at most".
@@ -244,8 +243,8 @@ void word_verdict(DiagnosisReport& report, const JointRoles& roles, const std::v
   if (!causes.empty()) {
     const bool several = std::any_of(causes.begin(), causes.end(), [](const auto& c) { return c.same.size() > 1; });
     report.verdict = unexplained ? "unexplained" : several ? "class" : "named";
-    report.sentence =
-        capitalised(list) + "." + (larger_than_on_any_robot(report) ? kLarge : "") + besides(report) + taken_up;
+    const bool large = !unexplained && larger_than_on_any_robot(report);
+    report.sentence = capitalised(list) + "." + (large ? kLarge : "") + besides(report) + taken_up;
     return;
   }
   report.verdict = "none";

@@ -227,6 +227,11 @@ TEST(Verdict, NamesWhatIsLargerThanOnAnyRobotWhereItLeavesNothingButNoise) {
   report.after.encoders_px = 0.2;
   EXPECT_EQ(worded(report).verdict, "named");
   EXPECT_THAT(worded(report).sentence, HasSubstr("So much is more than robots are usually off by"));
+  // Beside a curve that nobody knows it does not explain all.
+  auto with_curve = report;
+  with_curve.causes.emplace_back().cause = {"unexplained", "prosup", ""};
+  EXPECT_EQ(worded(with_curve).verdict, "unexplained");
+  EXPECT_THAT(worded(with_curve).sentence, Not(HasSubstr("explains all that is seen")));
   report.after.moved_px = 0.25;
   EXPECT_THAT(worded(report).sentence, HasSubstr("larger than on any robot"));
   report.after.moved_px = 0.1;
