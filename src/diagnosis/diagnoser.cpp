@@ -200,8 +200,9 @@ class Diagnoser {
   /// @return whether a simpler cause took its place; otherwise all is as it was
   bool replace_by_part(std::size_t cause) {
     const CauseName name = search_.causes()[cause].name;
+    spdlog::debug("diagnosis: tries a part of {}", name.text());
     auto before = search_.now();
-    search_.drop(cause);
+    search_.drop({cause});
     asked_.reset();
     if (const auto simpler = part_of(name); simpler && take_instead(*simpler, {name}, before.cost)) {
       spdlog::debug("diagnosis: {} says what {} said", simpler->text(), name.text());
@@ -244,8 +245,11 @@ class Diagnoser {
     trial.gain = without.base.heldout().total() - trial.heldout.total();
     auto model = with(without, trial);
     if (!model) return false;
+    const auto explains_as_much = [&](double own, double share) { return own - cost <= share * (cost_without - cost); };
+    // Once the noise is measured again it may fit a little better.
+    if (!explains_as_much(model->cost, 2.0 * limits::kAlikeShare)) return false;
     search_.take(std::move(*model));
-    if (search_.cost() - cost > limits::kAlikeShare * (cost_without - cost)) return false;
+    if (!explains_as_much(search_.cost(), limits::kAlikeShare)) return false;
     const Field& left = field();
     return std::none_of(of.begin(), of.end(), [&](const CauseName& name) {
       const auto rest = named(left, name);
@@ -296,9 +300,9 @@ class Diagnoser {
   /// @return whether it took their place; otherwise all is as it was
   bool replace_by_one(std::size_t a, std::size_t b, const CauseName& one) {
     const std::vector<CauseName> two = {search_.causes()[a].name, search_.causes()[b].name};
+    spdlog::debug("diagnosis: tries {} instead of {} and {}", one.text(), two[0].text(), two[1].text());
     auto before = search_.now();
-    search_.drop(b);
-    search_.drop(a);
+    search_.drop({a, b});
     asked_.reset();
     if (take_instead(one, two, before.cost)) {
       spdlog::debug("diagnosis: {} says what {} and {} said", one.text(), two[0].text(), two[1].text());
@@ -332,7 +336,7 @@ class Diagnoser {
         // What is large bends the very sums by which it is judged: so it is judged where it is fitted.
         const double threshold = threshold_of(best->candidate->stated);
         if (best->candidate->z() >= threshold || z_of_last() >= threshold) return true;
-        search_.drop(search_.causes().size() - 1);
+        search_.drop({search_.causes().size() - 1});
       }
       if (!best->candidate->generic()) refused_.push_back(cause);
       std::erase_if(trials, [&](const Trial& t) { return &t == best || t.candidate->cause == cause; });
@@ -539,7 +543,7 @@ class Diagnoser {
     }
     if (least >= 1.0) return false;
     refused_.push_back(search_.causes()[worst].name);
-    search_.drop(worst);
+    search_.drop({worst});
     return true;
   }
 

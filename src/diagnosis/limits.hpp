@@ -41,6 +41,7 @@ constexpr std::size_t kMostTried = 4;      ///< candidates a round that are fitt
 constexpr double kWorthATrial_z = 2.5;     ///< less does not stand out even of one candidate's noise
 constexpr std::size_t kFewestBlocks = 16;  ///< blocks are not made longer where fewer would be left
 constexpr std::size_t kPicturesForSize = 60;
+constexpr std::size_t kPicturesForSizeInALook = 20;
 constexpr std::size_t kPicturesFromAfar = 120;  ///< several for each parameter of any state
 
 }  // namespace bodyschema::diagnosis::limits

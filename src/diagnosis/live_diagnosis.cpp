@@ -30,7 +30,7 @@ constexpr double kNoisePictures = 100.0;        // after so many a picture's noi
 
 /// From one look to the next, s: at least the first, then a share of what was seen (what has seen hardly anything new
 /// cannot say anything new), at most the last.
-constexpr double kLeastPeriod_s = 5.0, kPeriodShare = 0.2, kMostPeriod_s = 20.0;
+constexpr double kLeastPeriod_s = 5.0, kPeriodShare = 0.25, kMostPeriod_s = 20.0;
 constexpr double kFirstLook_s = 10.0;     // of pictures, before the first look
 constexpr double kPicturePeriod_s = 0.5;  // from one frame that is looked at to the next
 constexpr double kWindow_s = 90.0;        // older pictures are forgotten
@@ -190,13 +190,16 @@ class Window {
 
   /// @param x  what the estimator believes
   void linearise(const Eigen::VectorXd& x) {
-    auto measured = fit_.predict(best_ ? *best_ : state_.model(), joints_);
     auto now = std::make_shared<LinearLog>(fit_.predict(state_.model(), all_));
     std::vector<std::size_t> fresh;
     for (std::size_t p = 0, old = 0; p < now->instants.size(); ++p) {
       if (!keep_old(old, *now, p)) fresh.push_back(p);
     }
     others_found_ = false;
+    at_ = now;
+    spdlog::debug("live diagnosis: measures {} of {} pictures", fresh.size(), now->instants.size());
+    if (fresh.empty()) return;
+    auto measured = fit_.predict(best_ ? *best_ : state_.model(), joints_, fresh);
     bring_near(measured, fresh, x);
     measured.coordinates = all_;
     OutlineSearch search{.search_px = diagnosis::limits::kSearch_px, .spacing_px = diagnosis_.spacing_px};
@@ -208,7 +211,6 @@ class Window {
     for (const auto p : fresh) {
       move(measured.evidence[p], measured.corrections[p], now->corrections[p], now->evidence[p]);
     }
-    at_ = std::move(now);
   }
 
   /// Predictions of pictures as each of them has the arm's joints, where these lie elsewhere: outlines far off count
@@ -239,7 +241,7 @@ class Window {
     if (!best_ || far.empty()) return;
     State believed = state_;
     believed.set(x);
-    auto there = fit_.predict(believed.model(), joints_);
+    auto there = fit_.predict(believed.model(), joints_, far);
     fit_.measure(there, coarse(diagnosis::limits::kFrom_px), far);
     const auto mean_cost = [](const OutlineEvidence& e) { return e.sampled > 0.0 ? e.cost / e.sampled : 1e300; };
     for (const auto p : far) {
@@ -416,8 +418,9 @@ struct LiveDiagnosis::Impl {
     if (waiting.frames.empty() || looking.valid()) return;
     if (look_utime == 0) first_utime = look_utime = now;
     const double period_s = std::clamp(kPeriodShare * seconds(now - first_utime), kLeastPeriod_s, kMostPeriod_s);
-    // What has changed is looked at as soon as some pictures tell of it.
-    const bool changed = change_utime > look_utime && seconds(now - change_utime) >= kLeastPeriod_s;
+    // What has changed is looked at as soon as some pictures tell of it; a look that came before has seen too few.
+    const auto told_utime = change_utime + microseconds(kLeastPeriod_s);
+    const bool changed = change_utime > 0 && look_utime < told_utime && now >= told_utime;
     if (!changed && seconds(now - look_utime) < period_s) return;
     look_utime = now;
     waiting.x = x;
@@ -425,7 +428,9 @@ struct LiveDiagnosis::Impl {
       give_way(kNice);
       const double begin_s = thread_time_s();
       auto found = window.look(batch);
-      used_s = used_s + thread_time_s() - begin_s;
+      const double took_s = thread_time_s() - begin_s;
+      used_s = used_s + took_s;
+      spdlog::debug("live diagnosis: a look took {:.0f} ms", 1e3 * took_s);
       return found;
     });
   }

@@ -222,12 +222,16 @@ void ModelSearch::go_back_to(Extended before) {
   noise_ = std::move(before.noise);
 }
 
-void ModelSearch::drop(std::size_t cause) {
-  auto causes = causes_;
-  const bool beside = !in_state(causes[cause]);
-  causes.erase(causes.begin() + static_cast<std::ptrdiff_t>(cause));
+void ModelSearch::drop(const std::vector<std::size_t>& out) {
+  std::vector<FoundCause> causes;
+  bool fitted = false;
+  for (std::size_t c = 0; c < causes_.size(); ++c) {
+    const bool stays = std::find(out.begin(), out.end(), c) == out.end();
+    if (stays) causes.push_back(causes_[c]);
+    fitted = fitted || (!stays && in_state(causes_[c]));
+  }
   causes_ = causes;
-  if (beside) return;
+  if (!fitted) return;
   State state = state_with(causes);
   state.set(state_.model());
   // A nuisance that was let loose is held by its belief again.
@@ -392,37 +396,45 @@ BlockRegression ModelSearch::regression(const LogAbout& log) const {
   return {base_blocks(log), precision, away};
 }
 
+const std::vector<ModelSearch::HandInPicture>& ModelSearch::hand_in(const LogAbout& log) {
+  if (hand_at_ == log.linear) return hand_;
+  hand_.clear();
+  auto& measurement = fit_.measurement();
+  const auto link = measurement.projection().hand_link();
+  const auto most = refits() ? limits::kPicturesForSize : limits::kPicturesForSizeInALook;
+  const std::size_t every = std::max<std::size_t>(1, raster_.size() / most);
+  for (std::size_t i = 0; i < raster_.size(); i += every) {
+    const auto p = raster_[i];
+    if (log.precision[p] <= 0.0) continue;
+    const auto& picture = fit_.log().pictures()[p];
+    const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera,
+                                                    log.at.coordinates, link);
+    hand_.push_back({p, jacobian.topRows<3>(), measurement.projection().hand().translation().z()});
+  }
+  hand_at_ = log.linear;
+  return hand_;
+}
+
 Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Direction>>& columns,
                           const Eigen::VectorXd& amount, const Eigen::VectorXd& of_base) {
   Size size;
   double pictures = 0.0, weight = 0.0, depth = 0.0, focal = 0.0;
-  auto& measurement = fit_.measurement();
-  std::vector<std::size_t> some;
-  for (std::size_t i = 0; i < raster_.size();
-       i += std::max<std::size_t>(1, raster_.size() / limits::kPicturesForSize)) {
-    some.push_back(raster_[i]);
-  }
   Eigen::VectorXd moved(fit_.coordinates().size());
-  for (const auto p : some) {
-    if (log.precision[p] <= 0.0) continue;
+  const auto add = [&](const std::vector<Direction>& directions, const Eigen::VectorXd& amounts) {
+    for (Eigen::Index k = 0; k < amounts.size(); ++k) {
+      for (const auto& step : directions[static_cast<std::size_t>(k)]) moved[step.coordinate] += amounts[k] * step.amount;
+    }
+  };
+  for (const auto& hand : hand_in(log)) {
     moved.setZero();
-    for (Eigen::Index k = 0; k < amount.size(); ++k) {
-      for (const auto& step : columns[p][static_cast<std::size_t>(k)])
-        moved[step.coordinate] += amount[k] * step.amount;
-    }
-    for (Eigen::Index i = 0; i < of_base.size(); ++i) {
-      for (const auto& step : log.base[p][static_cast<std::size_t>(i)])
-        moved[step.coordinate] += of_base[i] * step.amount;
-    }
-    const auto& picture = fit_.log().pictures()[p];
-    const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera,
-                                                    log.at.coordinates, measurement.projection().hand_link());
-    const auto& evidence = log.at.evidence[p];
-    size.hand_m += (jacobian.topRows<3>() * moved).squaredNorm();
+    add(columns[hand.picture], amount);
+    add(log.base[hand.picture], of_base);
+    const auto& evidence = log.at.evidence[hand.picture];
+    size.hand_m += (hand.jacobian * moved).squaredNorm();
     size.outline_px += moved.dot(evidence.A * moved) / slope_;
     weight += evidence.weight;
-    depth += measurement.projection().hand().translation().z();
-    focal += fit_.log().rig().cameras[picture.camera].intrinsics.fx;
+    depth += hand.depth;
+    focal += fit_.log().rig().cameras[fit_.log().pictures()[hand.picture].camera].intrinsics.fx;
     pictures += 1.0;
   }
   if (pictures <= 0.0 || weight <= 0.0) return {};

@@ -67,7 +67,8 @@ class ModelSearch {
   void take(Extended extended);
   [[nodiscard]] Extended now() const { return {causes_, state_, cost_, noise_}; }
   void go_back_to(Extended before);
-  void drop(std::size_t cause);
+  /// Takes some causes out, by their positions.
+  void drop(const std::vector<std::size_t>& out);
   /// Where a part of the log lies out of sight of the model: tries a slip of every joint there.
   void look_for_lost_part();
 
@@ -106,6 +107,14 @@ class ModelSearch {
   double fit(State& state, double from_px);
   double fit(State& state, double from_px, std::span<const std::size_t> pictures);
   void measure_noise();
+  /// How coordinates move the hand in one picture, and where it lies.
+  struct HandInPicture {
+    std::size_t picture = 0;
+    Eigen::Matrix3Xd jacobian;
+    double depth = 0.0;
+  };
+  /// In some pictures of the raster in which the arm is seen.
+  const std::vector<HandInPicture>& hand_in(const LogAbout& log);
 
   LogFit& fit_;
   std::vector<Belief> beliefs_, tolerances_;
@@ -123,6 +132,8 @@ class ModelSearch {
     std::shared_ptr<const LinearLog> at;
   };
   std::optional<Linearised> last_;
+  std::shared_ptr<const LinearLog> hand_at_;  ///< what these are about: many sizes are asked of one log
+  std::vector<HandInPicture> hand_;
 };
 
 }  // namespace bodyschema::diagnosis

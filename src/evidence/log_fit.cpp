@@ -144,14 +144,16 @@ const Coordinates& LogFit::coordinates() const {
   return workers_.front()->coordinates();
 }
 
-LinearLog LogFit::predict(const ErrorModel& model, std::span<const std::uint32_t> coordinates) {
+LinearLog LogFit::predict(const ErrorModel& model, std::span<const std::uint32_t> coordinates,
+                          std::span<const std::size_t> pictures) {
   LinearLog result;
   const auto count = log_.pictures().size();
+  std::vector<char> wanted(count, pictures.empty() ? 1 : 0);
+  for (const auto p : pictures) wanted[p] = 1;
   result.coordinates.assign(coordinates.begin(), coordinates.end());
   result.instants.resize(count);
   result.corrections.assign(count, model.roles().no_corrections());
   result.evidence.resize(count);
-  for (auto& evidence : result.evidence) evidence.clear(static_cast<Eigen::Index>(coordinates.size()));
   auto playing = model;
   playing.forget();
   bool sags = false;
@@ -161,6 +163,7 @@ LinearLog LogFit::predict(const ErrorModel& model, std::span<const std::uint32_t
   play(
       log_, [&](const JointSample& sample) { playing.observe(sample); },
       [&](std::size_t p) {
+        if (wanted[p] == 0) return;
         log_.instant(p, offsets, result.instants[p]);
         auto& instant = result.instants[p];
         if (!sags) {
@@ -201,7 +204,10 @@ void LogFit::measure(LinearLog& result, const OutlineSearch& search, std::span<c
   const auto work = [&](OutlineMeasurement& measurement) {
     for (std::size_t p; (p = next++) < count;) {
       auto& evidence = result.evidence[p];
-      if (wanted[p] == 0) continue;
+      if (wanted[p] == 0) {
+        if (evidence.A.size() == 0) evidence.clear(static_cast<Eigen::Index>(coordinates.size()));
+        continue;
+      }
       const auto& picture = log_.pictures()[p];
       measurement.linearise(log_.edges(p), picture.joints.q, result.corrections[p], picture.camera, coordinates,
                             weighed, evidence);

@@ -103,12 +103,12 @@ std::vector<bool> PictureLog::parts_shown() const {
 
 void PictureLog::finish() {
   for (auto& picture : pictures_) {
+    // Of a picture whose path is known to its end nothing comes to light later.
+    if (picture.path.cols() > 0 && !picture.path.col(picture.path.cols() - 1).array().isNaN().all()) continue;
     joint_motion(encoders_, picture.joints.utime, picture.joints.qdot, picture.qddot);
     picture.joints.qdot.conservativeResize(picture.joints.q.size());
     picture.qddot.conservativeResize(picture.joints.q.size());
-    // Of a picture whose path is known to its end nothing comes to light later.
-    const bool ends = picture.path.cols() > 0 && !picture.path.col(picture.path.cols() - 1).array().isNaN().all();
-    if (!ends) joint_path(encoders_, picture.joints.utime, picture.path);
+    joint_path(encoders_, picture.joints.utime, picture.path);
   }
 }
 

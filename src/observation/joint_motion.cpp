@@ -84,8 +84,14 @@ class Parabola {
     inverse_ = moments.inverse();
   }
 
-  /// Where the joint is at the instant.
-  [[nodiscard]] double position(Eigen::Index joint) const { return near_.front().q[joint] + fitted(joint)[0]; }
+  /// Where all joints are at the instant.
+  void positions(Eigen::Ref<Eigen::VectorXd> q) const {
+    q = near_.front().q;
+    for (const auto& sample : near_) {
+      const double weight = inverse_.row(0).dot(powers(sample));
+      q += weight * (sample.q - near_.front().q);
+    }
+  }
 
   struct Motion {
     double velocity = 0.0, acceleration = 0.0;
@@ -150,8 +156,7 @@ void joint_path(std::span<const JointSample> ordered, Microseconds utime, Eigen:
     if (at - half < ordered.front().utime || at + half > ordered.back().utime) continue;
     const auto near = between(ordered, at - half, at + half);
     if (near.size() < kForParabola) continue;
-    const Parabola parabola(near, at);
-    for (Eigen::Index j = 0; j < joints; ++j) path(j, kPathSteps + step) = parabola.position(j);
+    Parabola(near, at).positions(path.col(kPathSteps + step));
   }
   const Microseconds reach = half + microseconds(static_cast<double>(kPathSteps) * kPathStep_s);
   const auto all = between(ordered, utime - reach, utime + reach);

@@ -17,7 +17,8 @@ std::vector<ParameterRef> fitted_parameters(const ErrorModel& model) {
 
 EffectProbes::EffectProbes(const ErrorModel& model, std::vector<ParameterRef> parameters,
                            const Coordinates& coordinates)
-    : coordinates_(coordinates), parameters_(std::move(parameters)), low_(model.roles().no_corrections()), high_(low_) {
+    : parameters_(std::move(parameters)), low_(model.roles().no_corrections()), high_(low_) {
+  for (const auto& coordinate : coordinates.all()) places_.emplace_back(&coordinate.in(low_), &coordinate.in(high_));
   for (const auto& ref : parameters_) {
     probes_.push_back({model[ref.effect].clone(), model[ref.effect].clone(), 1.0, ref.effect});
   }
@@ -89,9 +90,9 @@ void EffectProbes::directions(const Instant& at, std::vector<Direction>& out) {
     if (!std::all_of(low.parameters().begin(), low.parameters().end(), is_nothing)) low.apply(at, low_);
     high.apply(at, high_);
     out[i].clear();
-    for (std::size_t c = 0; c < coordinates_.all().size(); ++c) {
+    for (std::size_t c = 0; c < places_.size(); ++c) {
       // Only what an effect has changed is put back.
-      const double d = std::exchange(coordinates_[c].in(high_), 0.0) - std::exchange(coordinates_[c].in(low_), 0.0);
+      const double d = std::exchange(*places_[c].second, 0.0) - std::exchange(*places_[c].first, 0.0);
       if (d != 0.0) out[i].push_back({static_cast<std::uint32_t>(c), d / probes_[i].step});
     }
   }

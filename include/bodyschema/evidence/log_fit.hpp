@@ -66,8 +66,10 @@ class LogFit {
   [[nodiscard]] PictureLog& log() { return log_; }
   [[nodiscard]] OutlineMeasurement& measurement() { return *workers_.front(); }
 
-  /// What a model says of every picture, with evidence of nothing seen.
-  LinearLog predict(const ErrorModel& model, std::span<const std::uint32_t> coordinates);
+  /// What a model says of pictures; their evidence is empty.
+  /// @param pictures  which; empty: all. Nothing is said of the others
+  LinearLog predict(const ErrorModel& model, std::span<const std::uint32_t> coordinates,
+                    std::span<const std::size_t> pictures = {});
   /// Compares pictures with predictions, each with its own. Parameters as of `linearise`.
   void measure(LinearLog& predicted, const OutlineSearch& search, std::span<const std::size_t> pictures = {},
                const std::function<void(std::size_t, std::span<const OutlinePoint>)>& look = {});

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "bodyschema/effects/error_model.hpp"
@@ -26,6 +27,8 @@ std::vector<ParameterRef> fitted_parameters(const ErrorModel& model);
 class EffectProbes {
  public:
   EffectProbes(const ErrorModel& model, std::vector<ParameterRef> parameters, const Coordinates& coordinates);
+  EffectProbes(const EffectProbes&) = delete;
+  EffectProbes& operator=(const EffectProbes&) = delete;
 
   [[nodiscard]] std::span<const ParameterRef> parameters() const { return parameters_; }
   /// Takes over the values of a model with the same effects; what was observed stays.
@@ -51,11 +54,11 @@ class EffectProbes {
   void find_times(const Instant& at);
   void place(Probe& probe, std::size_t parameter, double value) const;
 
-  const Coordinates& coordinates_;
   std::vector<ParameterRef> parameters_;
   std::vector<Probe> probes_;
   std::vector<Beside> beside_;
-  Corrections low_, high_;  ///< zero between two effects
+  Corrections low_, high_;                           ///< zero between two effects
+  std::vector<std::pair<double*, double*>> places_;  ///< of each coordinate in these: looked up once, read very often
 };
 
 }  // namespace bodyschema
