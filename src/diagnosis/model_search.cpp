@@ -407,8 +407,8 @@ const std::vector<ModelSearch::HandInPicture>& ModelSearch::hand_in(const LogAbo
     const auto p = raster_[i];
     if (log.precision[p] <= 0.0) continue;
     const auto& picture = fit_.log().pictures()[p];
-    const auto jacobian = measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera,
-                                                    log.at.coordinates, link);
+    const auto jacobian =
+        measurement.link_jacobian(picture.joints.q, log.at.corrections[p], picture.camera, log.at.coordinates, link);
     hand_.push_back({p, jacobian.topRows<3>(), measurement.projection().hand().translation().z()});
   }
   hand_at_ = log.linear;
@@ -422,7 +422,8 @@ Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Dir
   Eigen::VectorXd moved(fit_.coordinates().size());
   const auto add = [&](const std::vector<Direction>& directions, const Eigen::VectorXd& amounts) {
     for (Eigen::Index k = 0; k < amounts.size(); ++k) {
-      for (const auto& step : directions[static_cast<std::size_t>(k)]) moved[step.coordinate] += amounts[k] * step.amount;
+      for (const auto& step : directions[static_cast<std::size_t>(k)])
+        moved[step.coordinate] += amounts[k] * step.amount;
     }
   };
   for (const auto& hand : hand_in(log)) {

@@ -34,10 +34,16 @@ std::string camera_place(Parameters p, std::span<const std::string> amounts) {
   return text;
 }
 
-Targets body_targets(const JointRoles& roles) {
-  Targets targets = {EffectTarget{}};
+Targets segment_targets(const JointRoles& roles) {
+  Targets targets;
   if (roles.segments.size() < 2) return targets;
   for (const auto& segment : roles.segments) targets.push_back({"", segment.name});
+  return targets;
+}
+
+Targets body_targets(const JointRoles& roles) {
+  Targets targets = segment_targets(roles);
+  targets.insert(targets.begin(), EffectTarget{});
   return targets;
 }
 

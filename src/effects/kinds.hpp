@@ -96,9 +96,11 @@ inline Targets joint_targets(const JointRoles& roles, const std::vector<Eigen::I
 inline Targets arm_targets(const JointRoles& roles) {
   return joint_targets(roles, roles.arm);
 }
-/// The whole body, then each of its segments by name where there are several.
+/// Each segment of the body by name, where there are several.
+Targets segment_targets(const JointRoles& roles);
+/// The whole body, then those.
 Targets body_targets(const JointRoles& roles);
-/// Positions in Corrections::shapes that a target of `body_targets` means.
+/// Positions in Corrections::shapes that a target of these means.
 std::vector<std::size_t> segments_of(const EffectTarget& target, const JointRoles& roles);
 
 /// "more" or "less", "longer" or "shorter", ... by the sign of a parameter.

@@ -20,7 +20,7 @@ EffectKind mesh_scale() {
                                                   : part_in_words(e.target().source) + " is ") +
                        amounts[0] + by_sign(e.parameters()[0], " larger", " smaller") + " than in the meshes";
               },
-          .lookalikes = {"silhouette_bias", "focal_length"},
+          .lookalikes = {"cover_thickness", "silhouette_bias", "focal_length"},
           .splitting_motion = "Show the hand near and far, and from palm and back.",
           .remark = "scale the visual meshes; collision meshes may be right"};
 }

@@ -32,6 +32,7 @@ auto& number(const Coordinate& coordinate, C& c) {
     case Kind::kReadout: return c.camera.readout_s;
     case Kind::kScale: return c.shapes[at].scale;
     case Kind::kSize: return c.shapes[at].size;
+    case Kind::kThickness: return c.shapes[at].thickness_m;
     case Kind::kDilation: break;
   }
   return c.shapes[at].dilation_px;
@@ -64,7 +65,7 @@ Coordinates::Coordinates(const JointRoles& roles) {
     for (Eigen::Index axis = 0; axis < 3; ++axis) add(kind, axis);
   }
   for (const auto kind : {Kind::kFocal, Kind::kCx, Kind::kCy, Kind::kK1, Kind::kReadout}) add(kind, 0);
-  for (const auto kind : {Kind::kScale, Kind::kDilation}) {
+  for (const auto kind : {Kind::kScale, Kind::kThickness, Kind::kDilation}) {
     for (std::size_t s = 0; s < roles.segments.size(); ++s) add(kind, static_cast<Eigen::Index>(s));
   }
   for (std::size_t s = 0; s < roles.segments.size(); ++s) {

@@ -20,6 +20,21 @@ bool moves_links(Kind kind) {
          kind == Kind::kCameraTurn;
 }
 
+/// d(normal . pixel) by the point in the camera's frame, px/m. @param focal  px
+Eigen::RowVector3d across(const OutlinePoint& point, const Eigen::Vector2d& focal, double k1) {
+  const double iz = 1.0 / point.p_C.z();
+  const Eigen::Vector2d x = point.p_C.head<2>() * iz;
+  const Eigen::Vector2d n_f = point.normal.cwiseProduct(focal);
+  const Eigen::RowVector2d by_x = ((1.0 + k1 * x.squaredNorm()) * n_f + 2.0 * k1 * n_f.dot(x) * x).transpose();
+  return {by_x.x() * iz, by_x.y() * iz, -by_x.dot(x) * iz};
+}
+
+/// Where a point of the camera's frame is seen, px from the principal point.
+Eigen::Vector2d seen_at(const Eigen::Vector3d& p_C, const Eigen::Vector2d& focal, double k1) {
+  const Eigen::Vector2d x = p_C.head<2>() / p_C.z();
+  return (1.0 + k1 * x.squaredNorm()) * x.cwiseProduct(focal);
+}
+
 /// When a row is exposed, from the middle one's time on, as a share of the read-out.
 double row_time(double v, const PinholeIntrinsics& k) {
   return (v - 0.5 * (k.height - 1)) / std::max(1, k.height - 1);
@@ -132,7 +147,10 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
   projection_.parts(X_CB_);
   points_.clear();
   samples_.clear();
-  for (const auto& predicted : extractor_.extract(X_CB_, camera, static_cast<float>(unit * search.spacing_px))) {
+  const auto outline = extractor_.extract(X_CB_, camera, static_cast<float>(unit * search.spacing_px));
+  find_covers(outline, corrections, focal.x());
+  for (const auto& predicted : outline) {
+    if (is_under_cover(predicted, corrections, focal.x())) continue;
     const double factor = search.part_weight.empty() ? 1.0 : search.part_weight[predicted.part];
     if (factor <= 0.0) continue;
     OutlinePoint point;
@@ -148,7 +166,14 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
           (1.0 + k1 * x.squaredNorm()) * Eigen::Matrix2d::Identity() + 2.0 * k1 * x * x.transpose();
       point.normal = (bend.inverse().transpose() * point.normal).normalized();
     }
-    point.pixel += corrections.shapes[projection_.segment_of(point.part)].dilation_px / k.reduction * point.normal;
+    const auto& shape = corrections.shapes[projection_.segment_of(point.part)];
+    if (shape.thickness_m != 0.0) {
+      // Where an outline is seen the surface's normal lies across the line of sight.
+      const Eigen::Vector3d moved = point.p_C + shape.thickness_m * across(point, focal, k1).transpose().normalized();
+      point.pixel += seen_at(moved, focal, k1) - seen_at(point.p_C, focal, k1);
+      point.p_C = moved;
+    }
+    point.pixel += shape.dilation_px / k.reduction * point.normal;
     const bool covered = is_covered(search.covered, point.pixel);
     const auto distance =
         edges != nullptr ? edges->find(point.pixel, point.normal, reach_px) : std::optional<double>(0.0);
@@ -175,6 +200,30 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
     out.weight += point.weight;
   }
   if (search.odd_sd_px > 0.0) leave_out_odd(search, unit, out);
+}
+
+void OutlineMeasurement::find_covers(std::span<const ContourPoint> outline, const Corrections& corrections,
+                                     double focal_px) {
+  covers_.clear();
+  for (const auto& point : outline) {
+    const double thickness_m = corrections.shapes[projection_.segment_of(point.part)].thickness_m;
+    if (thickness_m <= 0.0) continue;
+    covers_.push_back({point.pixel, static_cast<float>(thickness_m * focal_px / point.p_C.z())});
+  }
+}
+
+bool OutlineMeasurement::is_under_cover(const ContourPoint& point, const Corrections& corrections,
+                                        double focal_px) const {
+  if (covers_.empty()) return false;
+  const double own_m = std::max(0.0, corrections.shapes[projection_.segment_of(point.part)].thickness_m);
+  const auto own_px = static_cast<float>(own_m * focal_px / point.p_C.z());
+  // Where a cover ends beside something bare its edge may be sharp and reach further; in a notch its sides meet.
+  const float share = own_px > 0.0f ? 0.95f : 1.5f;
+  const Eigen::Vector2f pixel = point.pixel + own_px * point.normal;
+  return std::any_of(covers_.begin(), covers_.end(), [&](const Cover& cover) {
+    const float reach_px = share * cover.thickness_px;
+    return (cover.pixel - pixel).squaredNorm() < reach_px * reach_px;
+  });
 }
 
 void OutlineMeasurement::leave_out_odd(const OutlineSearch& search, double unit_px, OutlineEvidence& out) {
@@ -227,13 +276,10 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
       rows_.col(p).setZero();
       continue;
     }
-    const double iz = 1.0 / point.p_C.z();
-    const Eigen::Vector2d x = point.p_C.head<2>() * iz;
+    const Eigen::Vector2d x = point.p_C.head<2>() / point.p_C.z();
     const double bent = 1.0 + k1 * x.squaredNorm();
     const Eigen::Vector2d n_f = point.normal.cwiseProduct(focal);
-    // d(normal . pixel) by x, and from there by p_C.
-    const Eigen::RowVector2d by_x = (bent * n_f + 2.0 * k1 * n_f.dot(x) * x).transpose();
-    const Eigen::RowVector3d by_p(by_x.x() * iz, by_x.y() * iz, -by_x.dot(x) * iz);
+    const Eigen::RowVector3d by_p = across(point, focal, k1);
     const Eigen::Vector4d p_C = point.p_C.homogeneous();
     const std::size_t segment = projection_.segment_of(point.part);
     const double size = projection_.size(point.part);
@@ -260,6 +306,7 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
                          (point.p_C - projection_.origin(point.part)) / (1.0 + size));
           }
           break;
+        case Kind::kThickness: g = own ? by_p.norm() : 0.0; break;
         case Kind::kDilation: g = own ? 1.0 / k.reduction : 0.0; break;
         default:
           g = by_p.dot(motion_[i * links_.size() + point.part] * p_C);

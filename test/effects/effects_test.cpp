@@ -44,7 +44,7 @@ double size_of(const Corrections& c) {
   for (const auto& a : c.adjustments) {
     for (const double x : {a.along_m, a.tilt_1_rad, a.tilt_2_rad, a.shift_1_m, a.shift_2_m}) sum += std::abs(x);
   }
-  for (const auto& s : c.shapes) sum += std::abs(s.scale) + std::abs(s.dilation_px);
+  for (const auto& s : c.shapes) sum += std::abs(s.scale) + std::abs(s.dilation_px) + std::abs(s.thickness_m);
   const auto& k = c.camera;
   for (const auto& v : {k.rig_shift_m, k.rig_turn_rad, k.shift_m, k.turn_rad}) sum += v.lpNorm<1>();
   for (const double x : {k.focal_scale, k.cx_px, k.cy_px, k.k1, k.readout_s}) sum += std::abs(x);
@@ -53,7 +53,7 @@ double size_of(const Corrections& c) {
 
 TEST(Catalogue, HoldsEveryCauseAndEachIsNothingWhileItsParametersAreZero) {
   const auto r = roles();
-  EXPECT_EQ(shipped_effects().size(), 32u);
+  EXPECT_EQ(shipped_effects().size(), 33u);
   auto at = instant(r);
   at.q.setConstant(0.7);
   at.encoder.setConstant(0.8);
@@ -396,23 +396,34 @@ TEST(Cameras, OneCameraHasNoPair) {
 TEST(Shapes, AreThoseOfTheBodyOrOfOneSegment) {
   const auto r = roles();
   const auto at = instant(r);
-  for (const std::string name : {"mesh_scale", "silhouette_bias"}) {
-    ASSERT_EQ(effect_targets(name, r).size(), 3u);
-    const auto size = [&](const Corrections& c, std::size_t segment) {
-      return name == "mesh_scale" ? c.shapes[segment].scale : 0.01 * c.shapes[segment].dilation_px;
-    };
-    const auto all = corrections(*make_effect(name, {}, r), 2.0, at);
-    const auto hand = corrections(*make_effect(name, {"", "hand"}, r), 2.0, at);
-    EXPECT_NEAR(size(all, 0), 0.02, 1e-15) << name;
-    EXPECT_NEAR(size(all, 1), 0.02, 1e-15);
-    EXPECT_EQ(size(hand, 0), 0.0) << name;
-    EXPECT_NEAR(size(hand, 1), 0.02, 1e-15);
-  }
+  ASSERT_EQ(effect_targets("mesh_scale", r).size(), 3u);
+  const auto all = corrections(*make_effect("mesh_scale", {}, r), 2.0, at);
+  const auto hand = corrections(*make_effect("mesh_scale", {"", "hand"}, r), 2.0, at);
+  EXPECT_NEAR(all.shapes[0].scale, 0.02, 1e-15);
+  EXPECT_NEAR(all.shapes[1].scale, 0.02, 1e-15);
+  EXPECT_EQ(hand.shapes[0].scale, 0.0);
+  EXPECT_NEAR(hand.shapes[1].scale, 0.02, 1e-15);
   EXPECT_THAT(
       [&] {
         make_effect("mesh_scale", {"", "hnad"}, r);
       },
       testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr("expected forearm or hand")));
+}
+
+/// A cover is one part's, in millimetres; masks are too fat everywhere, in pixels.
+TEST(Shapes, ACoverIsAPartsAndFatMasksAreTheWholeBodys) {
+  auto r = roles();
+  const auto at = instant(r);
+  ASSERT_EQ(effect_targets("cover_thickness", r).size(), 2u);
+  const auto glove = corrections(*make_effect("cover_thickness", {"", "hand"}, r), 8.0, at);
+  EXPECT_EQ(glove.shapes[0].thickness_m, 0.0);
+  EXPECT_NEAR(glove.shapes[1].thickness_m, 0.008, 1e-15);
+  ASSERT_EQ(effect_targets("silhouette_bias", r).size(), 1u);
+  const auto fat = corrections(*make_effect("silhouette_bias", {}, r), 1.5, at);
+  EXPECT_NEAR(fat.shapes[0].dilation_px, 1.5, 1e-15);
+  EXPECT_NEAR(fat.shapes[1].dilation_px, 1.5, 1e-15);
+  r.segments.resize(1);
+  EXPECT_TRUE(effect_targets("cover_thickness", r).empty()) << "of a robot of one part nobody tells it from fat masks";
 }
 
 /// A segment with joints within as a whole: parts and places of joints.

@@ -102,7 +102,7 @@ void OutlineOfOwnRobot::derivatives_are_those_of_the_projection() {
       origins.push_back(projection_.origin(part));
       scales.push_back(projection_.scale(part));
     }
-    Eigen::MatrixXd G(points.size(), all_.size());
+    Eigen::MatrixXd G = Eigen::MatrixXd::Zero(points.size(), all_.size());
     for (std::size_t p = 0; p < points.size(); ++p) {
       const auto& point = points[p];
       const std::size_t segment = projection_.segment_of(point.part);
@@ -118,6 +118,17 @@ void OutlineOfOwnRobot::derivatives_are_those_of_the_projection() {
         double g = 0.0;
         if (coordinate.kind == Kind::kDilation) {
           g = coordinate.index == static_cast<Eigen::Index>(segment) ? 1.0 / reduction : 0.0;
+        } else if (coordinate.kind == Kind::kThickness) {
+          if (coordinate.index != static_cast<Eigen::Index>(segment)) continue;
+          // Along the surface's normal, which is where the outline moves fastest to.
+          Eigen::Vector3d fastest;
+          for (int axis = 0; axis < 3; ++axis) {
+            const Eigen::Vector3d step = 1e-6 * Eigen::Vector3d::Unit(axis);
+            fastest[axis] = point.normal.dot(appears(p_B + step, point.part, c, camera) -
+                                             appears(p_B - step, point.part, c, camera)) /
+                            2e-6;
+          }
+          g = fastest.norm() / scales[point.part];
         } else {
           Corrections plus = c, minus = c;
           coordinate.in(plus) += kStep;
@@ -238,6 +249,51 @@ TEST_F(OutlineOfOwnRobot, ADilatedPredictionLiesOutsideByAsMuch) {
   double sum = 0.0;
   for (const auto& point : measurement_.points()) sum += point.residual_px;
   EXPECT_NEAR(sum / evidence_.matched, -1.0, 0.1);
+}
+
+/// What covers the arm by 5 mm shows as those of its distance.
+TEST_F(OutlineOfOwnRobot, AThickerPredictionLiesOutsideByAsMuchAsItIsNear) {
+  Corrections thick = nothing_;
+  for (auto& shape : thick.shapes) shape.thickness_m = 0.005;
+  measurement_.linearise(edges(reach_.draw(q_, nothing_, 0), 0), q_, thick, 0, {}, {.search_px = 12.0}, evidence_);
+  ASSERT_GT(evidence_.matched_share(), 0.8);
+  const double fx = rig_.cameras[0].intrinsics.fx;
+  double sum = 0.0, predicted = 0.0;
+  for (const auto& point : measurement_.points()) {
+    sum += point.residual_px;
+    predicted += 0.005 * fx / point.p_C.z();
+  }
+  EXPECT_NEAR(-sum / predicted, 1.0, 0.1);
+}
+
+/// A glove lies over the outline of the wrist.
+TEST_F(OutlineOfOwnRobot, NoOutlineIsPredictedUnderACover) {
+  const auto found = std::find_if(roles_.segments.begin(), roles_.segments.end(),
+                                  [](const auto& segment) { return segment.name == "r_hand"; });
+  ASSERT_NE(found, roles_.segments.end());
+  const auto hand = static_cast<std::size_t>(found - roles_.segments.begin());
+  Eigen::VectorXd q = q_;
+  q(robot_->joint_index("r_shoulder_pitch")) = radians(-60.0);
+  q(robot_->joint_index("r_elbow")) = radians(40.0);
+  const auto points_of = [&](const Corrections& c) {
+    measurement_.expect(q, c, 0, {}, {.spacing_px = 1.5}, evidence_);
+    return std::vector<OutlinePoint>(measurement_.points().begin(), measurement_.points().end());
+  };
+  const auto bare = points_of(nothing_);
+  constexpr double kThickness_m = 0.02;
+  Corrections glove = nothing_;
+  glove.shapes[hand].thickness_m = kThickness_m;
+  const double fx = rig_.cameras[0].intrinsics.fx;
+  const auto under = [&](const OutlinePoint& point) {
+    return projection_.segment_of(point.part) != hand && std::any_of(bare.begin(), bare.end(), [&](const auto& near) {
+             return projection_.segment_of(near.part) == hand &&
+                    (near.pixel - point.pixel).norm() < kThickness_m * fx / near.p_C.z();
+           });
+  };
+  ASSERT_GT(std::count_if(bare.begin(), bare.end(), under), 0) << "there is something beside the hand";
+  const auto gloved = points_of(glove);
+  EXPECT_EQ(std::count_if(gloved.begin(), gloved.end(), under), 0);
+  EXPECT_GT(gloved.size(), bare.size() / 4);
 }
 
 TEST_F(OutlineOfOwnRobot, WhatLiesBeyondTheSearchIsNotMatchedAndCosts) {

@@ -47,6 +47,8 @@ struct ShapeCorrection {
   double size = 0.0;
   /// The observed outline lies this far outside the predicted one, px of the camera's own pictures.
   double dilation_px = 0.0;
+  /// The surface lies this far outside that of the meshes, along its normals: what covers it.
+  double thickness_m = 0.0;
 };
 
 /// Everything in which the prediction of one camera's picture at one instant departs from what URDF

@@ -30,10 +30,11 @@ struct Coordinate {
     kCx,           ///< px
     kCy,           ///< px
     kK1,
-    kReadout,   ///< s
-    kScale,     ///< of segment `index`, relative
-    kSize,      ///< ..., its joints with it
-    kDilation,  ///< of segment `index`, px
+    kReadout,    ///< s
+    kScale,      ///< of segment `index`, relative
+    kSize,       ///< ..., its joints with it
+    kThickness,  ///< of segment `index`, m
+    kDilation,   ///< ..., px
   };
   Kind kind;
   Eigen::Index index = 0;
