@@ -145,7 +145,7 @@ class TrialRobot {
     }
     if (part.empty()) return {{fault.name, joint, source}};
     RightAnswers answers;
-    for (const auto* name : {"mesh_scale", "cover_thickness", "segment_size"})
+    for (const auto* name : {"mesh_scale", "cover_thickness", "silhouette_bias", "segment_size"})
       answers.push_back({name, "", segment_of(part)});
     return answers;
   }

@@ -276,7 +276,8 @@ void OutlineMeasurement::differentiate(const Corrections& corrections, const Pin
       rows_.col(p).setZero();
       continue;
     }
-    const Eigen::Vector2d x = point.p_C.head<2>() / point.p_C.z();
+    const double iz = 1.0 / point.p_C.z();
+    const Eigen::Vector2d x = point.p_C.head<2>() * iz;
     const double bent = 1.0 + k1 * x.squaredNorm();
     const Eigen::Vector2d n_f = point.normal.cwiseProduct(focal);
     const Eigen::RowVector3d by_p = across(point, focal, k1);

@@ -410,18 +410,21 @@ TEST(Shapes, AreThoseOfTheBodyOrOfOneSegment) {
       testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr("expected forearm or hand")));
 }
 
-/// A cover is one part's, in millimetres; masks are too fat everywhere, in pixels.
-TEST(Shapes, ACoverIsAPartsAndFatMasksAreTheWholeBodys) {
+/// A cover is one part's, in millimetres; masks are too fat everywhere or of one part, in pixels.
+TEST(Shapes, ACoverIsInMillimetresAndFatMasksAreInPixels) {
   auto r = roles();
   const auto at = instant(r);
   ASSERT_EQ(effect_targets("cover_thickness", r).size(), 2u);
   const auto glove = corrections(*make_effect("cover_thickness", {"", "hand"}, r), 8.0, at);
   EXPECT_EQ(glove.shapes[0].thickness_m, 0.0);
   EXPECT_NEAR(glove.shapes[1].thickness_m, 0.008, 1e-15);
-  ASSERT_EQ(effect_targets("silhouette_bias", r).size(), 1u);
-  const auto fat = corrections(*make_effect("silhouette_bias", {}, r), 1.5, at);
-  EXPECT_NEAR(fat.shapes[0].dilation_px, 1.5, 1e-15);
-  EXPECT_NEAR(fat.shapes[1].dilation_px, 1.5, 1e-15);
+  ASSERT_EQ(effect_targets("silhouette_bias", r).size(), 3u);
+  const auto all = corrections(*make_effect("silhouette_bias", {}, r), 1.5, at);
+  EXPECT_NEAR(all.shapes[0].dilation_px, 1.5, 1e-15);
+  EXPECT_NEAR(all.shapes[1].dilation_px, 1.5, 1e-15);
+  const auto hand = corrections(*make_effect("silhouette_bias", {"", "hand"}, r), 1.5, at);
+  EXPECT_EQ(hand.shapes[0].dilation_px, 0.0);
+  EXPECT_NEAR(hand.shapes[1].dilation_px, 1.5, 1e-15);
   r.segments.resize(1);
   EXPECT_TRUE(effect_targets("cover_thickness", r).empty()) << "of a robot of one part nobody tells it from fat masks";
 }
