@@ -28,7 +28,7 @@ EffectKind segment_size() {
                        by_sign(e.parameters()[0], " larger", " smaller") +
                        " than in the URDF, the places of its joints with it";
               },
-          .lookalikes = {"mesh_scale", "cover_thickness"},
+          .lookalikes = {"mesh_scale", "cover_thickness", "silhouette_bias"},
           .splitting_motion = "Show the hand near and far, from palm and back, and move the fingers.",
           .remark = "scale the segment's visual meshes and the origins of the joints between its links"};
 }

@@ -396,13 +396,18 @@ TEST(Cameras, OneCameraHasNoPair) {
 TEST(Shapes, AreThoseOfTheBodyOrOfOneSegment) {
   const auto r = roles();
   const auto at = instant(r);
-  ASSERT_EQ(effect_targets("mesh_scale", r).size(), 3u);
-  const auto all = corrections(*make_effect("mesh_scale", {}, r), 2.0, at);
-  const auto hand = corrections(*make_effect("mesh_scale", {"", "hand"}, r), 2.0, at);
-  EXPECT_NEAR(all.shapes[0].scale, 0.02, 1e-15);
-  EXPECT_NEAR(all.shapes[1].scale, 0.02, 1e-15);
-  EXPECT_EQ(hand.shapes[0].scale, 0.0);
-  EXPECT_NEAR(hand.shapes[1].scale, 0.02, 1e-15);
+  for (const std::string name : {"mesh_scale", "silhouette_bias"}) {
+    ASSERT_EQ(effect_targets(name, r).size(), 3u);
+    const auto size = [&](const Corrections& c, std::size_t segment) {
+      return name == "mesh_scale" ? c.shapes[segment].scale : 0.01 * c.shapes[segment].dilation_px;
+    };
+    const auto all = corrections(*make_effect(name, {}, r), 2.0, at);
+    const auto hand = corrections(*make_effect(name, {"", "hand"}, r), 2.0, at);
+    EXPECT_NEAR(size(all, 0), 0.02, 1e-15) << name;
+    EXPECT_NEAR(size(all, 1), 0.02, 1e-15);
+    EXPECT_EQ(size(hand, 0), 0.0) << name;
+    EXPECT_NEAR(size(hand, 1), 0.02, 1e-15);
+  }
   EXPECT_THAT(
       [&] {
         make_effect("mesh_scale", {"", "hnad"}, r);
@@ -410,21 +415,13 @@ TEST(Shapes, AreThoseOfTheBodyOrOfOneSegment) {
       testing::ThrowsMessage<ConfigurationError>(testing::HasSubstr("expected forearm or hand")));
 }
 
-/// A cover is one part's, in millimetres; masks are too fat everywhere or of one part, in pixels.
-TEST(Shapes, ACoverIsInMillimetresAndFatMasksAreInPixels) {
+/// A cover is one part's, in millimetres.
+TEST(Shapes, ACoverIsSoManyMillimetresOfOneSegment) {
   auto r = roles();
-  const auto at = instant(r);
   ASSERT_EQ(effect_targets("cover_thickness", r).size(), 2u);
-  const auto glove = corrections(*make_effect("cover_thickness", {"", "hand"}, r), 8.0, at);
+  const auto glove = corrections(*make_effect("cover_thickness", {"", "hand"}, r), 8.0, instant(r));
   EXPECT_EQ(glove.shapes[0].thickness_m, 0.0);
   EXPECT_NEAR(glove.shapes[1].thickness_m, 0.008, 1e-15);
-  ASSERT_EQ(effect_targets("silhouette_bias", r).size(), 3u);
-  const auto all = corrections(*make_effect("silhouette_bias", {}, r), 1.5, at);
-  EXPECT_NEAR(all.shapes[0].dilation_px, 1.5, 1e-15);
-  EXPECT_NEAR(all.shapes[1].dilation_px, 1.5, 1e-15);
-  const auto hand = corrections(*make_effect("silhouette_bias", {"", "hand"}, r), 1.5, at);
-  EXPECT_EQ(hand.shapes[0].dilation_px, 0.0);
-  EXPECT_NEAR(hand.shapes[1].dilation_px, 1.5, 1e-15);
   r.segments.resize(1);
   EXPECT_TRUE(effect_targets("cover_thickness", r).empty()) << "of a robot of one part nobody tells it from fat masks";
 }

@@ -27,7 +27,7 @@ Outcome outcome(const char* fault, RightAnswers answers, std::vector<DiagnosedCa
 }
 
 const CauseName kLatency{"latency", "", ""}, kGain{"encoder_gain", "elbow", ""}, kCover{"mesh_scale", "", "hand"},
-    kThick{"cover_thickness", "", "hand"};
+    kBias{"silhouette_bias", "", "hand"};
 
 TEST(DiagnosisTrials, WhatIsNamedIsRightOrWrong) {
   const auto right = outcome("latency:value=40", {kLatency}, {named(kLatency)});
@@ -62,7 +62,7 @@ TEST(DiagnosisTrials, WhatIsSaidOfTheStateCounts) {
 }
 
 TEST(DiagnosisTrials, OfACoverThePartIsTheAnswer) {
-  EXPECT_TRUE(is_first(outcome("cover_dilation:part=hand,value=2", {kCover, kThick}, {named(kCover)})));
+  EXPECT_TRUE(is_first(outcome("cover_dilation:part=hand,value=2", {kCover, kBias}, {named(kCover)})));
 }
 
 /// A joint that creeps while the arm comes into view is not told to creep faster.
