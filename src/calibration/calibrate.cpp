@@ -646,6 +646,7 @@ class Calibrator {
   void describe(LogFit& fit, const BatchFit& batch) {
     const auto& state = batch.state();
     const Eigen::VectorXd x = state.x(), sd = sds_of(batch);
+    result_.model.emplace(state.model());
     for (Eigen::Index k = state.joints(); k < state.size(); ++k) {
       const auto& p = state.parameters()[static_cast<std::size_t>(k)];
       result_.parameters.push_back(

@@ -28,22 +28,16 @@ void draw_outline(cv::Mat& picture, const BinaryMask& mask, const cv::Vec3b& col
 }  // namespace
 
 void HumanoidModel::take(const Calibration& calibration) {
-  for (const auto& joint : calibration.joints) offset_rad[joint.name] = joint.offset_rad;
+  found = calibration.model;
   X_link_optical = calibration.cameras.front().X_link_optical;
   intrinsics = calibration.cameras.front().intrinsics;
   for (const auto& parameter : calibration.parameters) {
     if (parameter.name == "latency") lag_s = 1e-3 * parameter.value;
-    const std::string mount = "hand_mount of ";
-    if (parameter.name.starts_with(mount)) {
-      mounts[parameter.name.substr(mount.size())] =
-          parameter.unit == "deg" ? radians(parameter.value) : 1e-3 * parameter.value;
-    }
   }
 }
 
 HumanoidView::HumanoidView(const Configuration& configuration) : pipeline_(configuration) {
   const auto& camera = pipeline_.rig().cameras.front();
-  roles_ = JointRoles::of(pipeline_.shared_robot(), pipeline_.setup(), pipeline_.rig());
   carrier_ = camera.mount.parent.empty() ? camera.link : camera.mount.parent;
   nominal_.intrinsics = camera.intrinsics;
   const auto q = pipeline_.setup().default_joints(pipeline_.robot());
@@ -53,13 +47,11 @@ HumanoidView::HumanoidView(const Configuration& configuration) : pipeline_(confi
   nominal_.X_link_optical = X_WL[0].inverse(Eigen::Isometry) * X_WL[1];
 }
 
-Eigen::VectorXd HumanoidView::joints(const HumanoidModel& model, const std::map<std::string, double>& encoders) const {
+Eigen::VectorXd HumanoidView::readings(const std::map<std::string, double>& encoders) const {
   Eigen::VectorXd q = pipeline_.setup().default_joints(pipeline_.robot());
   for (const auto& [joint, angle] : encoders) {
     const auto at = pipeline_.robot().find_joint(joint);
-    if (!at) continue;  // number of the frame, and readings of what is not drawn
-    const auto offset = model.offset_rad.find(joint);
-    q[static_cast<Eigen::Index>(*at)] = angle - (offset == model.offset_rad.end() ? 0.0 : offset->second);
+    if (at) q[static_cast<Eigen::Index>(*at)] = angle;  // not: number of the frame, readings of what is not drawn
   }
   return q;
 }
@@ -90,14 +82,14 @@ std::vector<Pose> HumanoidView::places(const HumanoidModel& model, const std::ma
                                        const std::vector<std::string>& links) const {
   CorrectedKinematics kinematics(pipeline_.shared_robot(), links, {carrier_});
   Corrections corrections(pipeline_.robot().joint_count());
-  for (const auto& [name, value] : model.mounts) {
-    const auto space = name.find(' ');
-    auto effect = make_effect("hand_mount", {name.substr(0, space), ""}, roles_);
-    effect->parameters()[name.substr(space + 1) == "roll" ? 1 : 0].value = value;
-    effect->apply({}, corrections);
+  for (std::size_t e = 0; model.found && e < model.found->size(); ++e) {
+    const Effect& effect = (*model.found)[e];
+    // What moves with time is in the encoders already.
+    if (effect_kind(effect.name()).home == EffectHome::kUrdf) effect.apply({}, corrections);
   }
+  corrections.camera = {};  // X_link_optical has it
   std::vector<Pose> X(links.size());
-  kinematics.compute(joints(model, encoders), corrections, 0, X);  // in the carrier of the camera
+  kinematics.compute(readings(encoders), corrections, 0, X);  // in the carrier of the camera
   for (auto& pose : X) pose = model.X_link_optical.inverse(Eigen::Isometry) * pose;
   return X;
 }

@@ -2,11 +2,12 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "bodyschema/calibration/calibrate.hpp"
 #include "bodyschema/core/configuration.hpp"
-#include "bodyschema/effects/joint_roles.hpp"
+#include "bodyschema/effects/error_model.hpp"
 #include "bodyschema/geometry/binary_mask.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
 #include "bodyschema/simulator/rasterizer.hpp"
@@ -14,13 +15,12 @@
 
 namespace bodyschema {
 
-/// What a calibration says of a humanoid: offsets, the head camera, how hands are mounted.
+/// What a calibration says of a humanoid.
 struct HumanoidModel {
-  std::map<std::string, double> offset_rad;  ///< by joint; encoder = true + offset
-  Pose X_link_optical = Pose::Identity();    ///< of the camera in the link that carries it
+  std::optional<ErrorModel> found;         ///< nothing: joints and links are as configured
+  Pose X_link_optical = Pose::Identity();  ///< of the camera in the link that carries it
   PinholeIntrinsics intrinsics;
-  double lag_s = 0.0;                    ///< of pictures against encoders
-  std::map<std::string, double> mounts;  ///< parameters of hand_mount by name, "JOINT roll", SI
+  double lag_s = 0.0;  ///< of pictures against encoders
   void take(const Calibration& calibration);
 };
 
@@ -44,14 +44,13 @@ class HumanoidView {
                     const HumanoidModel& model, const std::filesystem::path& png);
 
  private:
-  [[nodiscard]] Eigen::VectorXd joints(const HumanoidModel& model, const std::map<std::string, double>& encoders) const;
+  [[nodiscard]] Eigen::VectorXd readings(const std::map<std::string, double>& encoders) const;
   /// Of links in the camera.
   [[nodiscard]] std::vector<Pose> places(const HumanoidModel& model, const std::map<std::string, double>& encoders,
                                          const std::vector<std::string>& links) const;
 
   Pipeline pipeline_;
   HumanoidModel nominal_;
-  JointRoles roles_;
   std::string carrier_;
 };
 
