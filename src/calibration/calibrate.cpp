@@ -926,6 +926,13 @@ class Calibrator {
                              "pictures, expected at least {:.0f} %; check masks, robot and cameras' intrinsics.",
                              100.0 * found.share * found.seen, 100.0 * kLeastFound));
     }
+    // That nothing fits is said of many robots; this says why.
+    if (!implausible_.empty()) {
+      return say(CalibrationState::kModelMisfit,
+                 "Model misfit: no robot is so wrong as the pictures ask for (" + implausible_ +
+                     "); something else is wrong with robot or cameras, or less is known of them than is believed "
+                     "(estimator.state).");
+    }
     if (!helps_) {
       return say(
           CalibrationState::kNotConverged,
@@ -962,12 +969,6 @@ class Calibrator {
                              result_.postures, kFewestPostures));
     }
     if (const auto wrong = beyond_belief(batch); !wrong.empty()) return say(CalibrationState::kModelMisfit, wrong);
-    if (!implausible_.empty()) {
-      return say(CalibrationState::kModelMisfit,
-                 "Model misfit: no robot is so wrong as the pictures ask for (" + implausible_ +
-                     "); something else is wrong with robot or cameras, or less is known of them than is believed "
-                     "(estimator.state).");
-    }
     if (result_.dispersion > kDisagreement) {
       return say(CalibrationState::kModelMisfit,
                  fmt::format("Model misfit: postures disagree by {:.1f} times what is claimed; run bodyschema diagnose "

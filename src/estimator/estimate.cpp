@@ -54,6 +54,7 @@ std::string Finding::text() const {
 
 bool Estimate::told(std::size_t joint) const {
   constexpr double kTold_rad = 0.5 * kPi / 180.0;
+  if (state == EstimatorState::kModelMisfit) return false;
   const auto k = static_cast<Eigen::Index>(joint);
   const double sd = std::sqrt(std::max(0.0, covariance_rad2(k, k)));
   return sd < kTold_rad && (prior_sd_rad.size() <= k || sd < prior_sd_rad(k) / 3.0);

@@ -379,10 +379,12 @@ double LogFit::fit(State& state, const FitSettings& settings, std::span<const st
     }
     best = look(best.x, settings.finest_px);
   }
-  double damping = 1e-6;
-  int retreats = 0;
+  double damping = 1e-6, lowest = best.cost;
+  int retreats = 0, idle = 0;
   for (int i = 0; i < settings.iterations && retreats < 5;) {
-    constexpr double kWorse = 1e-3;  // share: points of an outline come and go
+    // Points of an outline come and go: near the end the cost goes up and down by some ten thousandths.
+    constexpr double kWorse = 1e-3, kLower = 1e-4;  // shares
+    constexpr int kIdle = 2;                        // steps that do not lower it
     Trial trial = look(best.x + step(best, damping), settings.finest_px);
     if (trial.cost > (1.0 + kWorse) * best.cost) {
       damping = std::max(1e-3, 10.0 * damping);
@@ -395,7 +397,9 @@ double LogFit::fit(State& state, const FitSettings& settings, std::span<const st
     retreats = 0;
     ++i;
     if (settings.progress) settings.progress(static_cast<double>(i) / settings.iterations);
-    if (std::abs(gained) < 1e-5 * best.cost) break;
+    idle = best.cost < (1.0 - kLower) * lowest ? 0 : idle + 1;
+    lowest = std::min(lowest, best.cost);
+    if (idle >= kIdle || std::abs(gained) < 1e-5 * best.cost) break;
   }
   state.set(best.x);
   return best.cost;

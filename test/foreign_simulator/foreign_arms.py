@@ -58,6 +58,8 @@ class Arm(Stills):
     def __init__(self, urdf, condition, seed):
         super().__init__(urdf, {**PLAIN, **condition}, seed)
         self.mount = self.bare.urdf.root  # what the cameras sit on
+        self.held = [name for name, joint in self.bare.urdf.joints.items() if name not in self.joints
+                     and name not in self.bare.urdf.mimics and joint.get("type") in ("revolute", "prismatic")]
         self.plan()
 
     def plan(self):
@@ -103,7 +105,8 @@ class Arm(Stills):
             angles = self.at(t)
             values = [angles[j] + self.offsets[j] * DEG + self.random.normal(0, 0.01 * DEG) for j in self.joints]
             log.write_event(utime, "ROBOT_JOINT_STATE",
-                            joint_message(self.joints, [round(v / step) * step for v in values], utime))
+                            joint_message(self.joints + self.held,
+                                          [round(v / step) * step for v in values] + [0.0] * len(self.held), utime))
             if k % steps:
                 continue
             if c.get("moved") and frames % 20 == 0:

@@ -158,6 +158,7 @@ class Humanoid(Arm):
         tree = Body(urdf, robot)
         self.bare, self.mount = Room(tree, c, seed, {}), tree.mount
         self.arm, self.head, self.joints = tree.arm, tree.head, tree.arm + tree.head
+        self.held = []
         self.rest = {j: a * DEG for j, a in robot.get("rest", {}).items()}
         self.cameras = {}
         for camera in robot["cameras"]:

@@ -356,7 +356,7 @@ class Stills:
             p = points @ X[:3, :3].T + X[:3, 3]
             z = np.maximum(p[:, 2], 1e-6)
             u, v = camera["f"] * p[:, 0] / z + camera["cx"], camera["f"] * p[:, 1] / z + camera["cy"]
-            shares.append(np.mean((p[:, 2] > 0.3) & (u > 4) & (u < camera["width"] - 5) & (v > 4)
+            shares.append(np.mean((p[:, 2] > min(0.3, 0.5 * self.reach)) & (u > 4) & (u < camera["width"] - 5) & (v > 4)
                                   & (v < camera["height"] - 5)))
         return min(shares)
 
@@ -365,11 +365,11 @@ class Stills:
         points = self.points_at(angles)
         base = points[0][0]
         moving = [(link, p) for link, p in points if link != base]
-        for link, p in moving[1:]:
-            if p[:, 2].min() < 0.03:
+        for link, p in moving:
+            if link != moving[0][0] and p[:, 2].min() < 0.03:
                 return False
         for link, p in moving[len(moving) // 2:]:
-            if (np.hypot(p[:, 0], p[:, 1]) < 0.14).any() and p[:, 2].min() < 0.35 * self.reach:
+            if (np.hypot(p[:, 0], p[:, 1]) < min(0.14, 0.2 * self.reach)).any() and p[:, 2].min() < 0.35 * self.reach:
                 return False
         everything = np.concatenate([p for _, p in points])
         return self.share_in_view(everything) > 0.75 and self.share_in_view(moving[-1][1]) > 0.9

@@ -98,7 +98,7 @@ TEST_F(EstimateLine, SaysWhatTheFrameSaysOfTheMemoryAndOnlyWhatThereIsToSay) {
   EXPECT_TRUE(json.at("cameras_swapped"));
 }
 
-/// Half a degree, and a third of what was believed before: neither alone is enough.
+/// Half a degree, and a third of what was believed before: neither alone is enough, nor are both of a wrong model.
 TEST(Told, NeedsMoreThanWasBelievedAndHalfADegree) {
   Estimate estimate;
   estimate.joint_names = {"a", "b", "c"};
@@ -108,6 +108,8 @@ TEST(Told, NeedsMoreThanWasBelievedAndHalfADegree) {
   EXPECT_TRUE(estimate.told(0));
   EXPECT_FALSE(estimate.told(1));
   EXPECT_FALSE(estimate.told(2)) << "hardly more than was believed";
+  estimate.state = EstimatorState::kModelMisfit;
+  EXPECT_FALSE(estimate.told(0)) << "the pictures contradict what that rests on";
 }
 
 }  // namespace

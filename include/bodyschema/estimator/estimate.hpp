@@ -138,7 +138,7 @@ struct Estimate {
   StageTimes times;
 
   /// Whether the pictures tell a joint's offset: its standard deviation is below 0.5 deg and below a third of what was
-  /// believed before.
+  /// believed before. In kModelMisfit none is told: deviations rest on a model that the pictures contradict.
   [[nodiscard]] bool told(std::size_t joint) const;
 };
 
