@@ -138,6 +138,7 @@ class Starter {
       throw ConfigurationError(fmt::format("--hand '{}': no joint moves it against the cameras", hand_));
     }
     if (parts_.rendered.empty()) throw FileError(o_.urdf.string() + ": no link of the arm has a <visual> shape");
+    look_for_cameras();
     masks_ = o_.masks.value_or(stills_ && !stills_->masks.empty());
     const bool moving = columns_ && columns_->moving;
     learned_ = !masks_ && moving;
@@ -255,6 +256,34 @@ class Starter {
         notes_.push_back(fmt::format("camera {}: its pose is to be found (robot.yaml: pose: unknown)", camera.name));
       }
     }
+  }
+
+  /// A camera of which nothing is said is taken to stand before the robot's base: one in a head that moves would never
+  /// be found.
+  void look_for_cameras() {
+    if (std::none_of(cameras_.begin(), cameras_.end(), [](const auto& camera) { return camera.unknown(); })) return;
+    std::map<std::vector<std::string>, std::vector<std::string>> by_joints;
+    for (const auto& link : urdf_.named_like_cameras()) {
+      std::vector<std::string> joints;
+      std::size_t of_arm = 0;
+      for (const auto& joint : urdf_.chain(link)) {
+        if (!joint.movable) continue;
+        joints.push_back(joint.name);
+        of_arm += among(parts_.arm, joint.name);
+      }
+      const bool at_hand = 2 * of_arm > parts_.arm.size();
+      if (!at_hand) by_joints[joints].push_back(link);
+    }
+    if (by_joints.empty()) return;
+    std::vector<std::string> groups;
+    for (const auto& [joints, links] : by_joints) {
+      groups.push_back(fmt::format("{} ({})", fmt::join(links, ", "),
+                                   joints.empty() ? "still" : fmt::format("moved by {}", fmt::join(joints, ", "))));
+    }
+    notes_.push_back(
+        fmt::format("cameras are taken to stand before the robot's base; if one is a link of the robot, say "
+                    "so (--camera LINK); named like cameras: {}",
+                    fmt::join(groups, "; ")));
   }
 
   /// What --camera-pose calls the cameras: those of the files of --camera-info, or the only one.

@@ -1,6 +1,8 @@
 #include "urdf_outline.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cstdlib>
 #include <spdlog/fmt/fmt.h>
 #include <sstream>
@@ -146,6 +148,23 @@ int UrdfOutline::turning_above(const std::string& link) const {
   const auto joints = chain(link);
   return static_cast<int>(std::count_if(joints.begin(), joints.end(),
                                         [&](const Joint& joint) { return joint.movable && !slides(joint.name); }));
+}
+
+std::vector<std::string> UrdfOutline::named_like_cameras() const {
+  constexpr std::array kNames = {"camera", "_eye", "realsense", "d415", "d435", "d455", "zed", "kinect", "xtion"};
+  std::vector<std::string> cameras, optical;
+  for (const auto& link : names_) {
+    std::string name = link;
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
+    if (has("optical")) {
+      optical.push_back(link);
+    } else if (std::any_of(kNames.begin(), kNames.end(), has)) {
+      cameras.push_back(link);
+    }
+  }
+  return optical.empty() ? cameras : optical;
 }
 
 /// Joints that move, by themselves or as mimics, and begin at this link or one fixed to it.

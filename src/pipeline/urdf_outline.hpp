@@ -33,6 +33,8 @@ class UrdfOutline {
   [[nodiscard]] bool slides(const std::string& joint) const { return sliding_.contains(joint); }
   [[nodiscard]] bool has_shape(const std::string& link) const { return with_shape_.contains(link); }
   [[nodiscard]] std::vector<std::string> movable_joints() const;
+  /// Links that are named like cameras; where some are named optical, a frame with a camera's axes, these.
+  [[nodiscard]] std::vector<std::string> named_like_cameras() const;
 
   struct Hand {
     std::string link;

@@ -26,6 +26,10 @@ from foreign_stills import PLAIN as STILL, SEES, StillScene, pose_of
 
 ROS_AXES = [-math.pi / 2, 0, -math.pi / 2]  # from x forward, z up
 ROBOTS = {  # link whose pose is reported, the cameras' links and axes there, how what is not used is held, deg
+    "tiago_pro": {"hand": "gripper_right_base_link", "cameras": {"left": "head_front_camera_link"}, "axes": ROS_AXES,
+                  "rest": {"arm_left_1_joint": 30, "arm_left_2_joint": -60, "arm_left_4_joint": -100}},
+    "baxter": {"hand": "right_gripper_base_link", "cameras": {"left": "head_camera_link"},
+               "rest": {"left_s0": 60, "left_s1": 50}},
     "tiago": {"hand": "hand_palm_link", "cameras": {"left": "xtion_rgb_optical_frame"}},
     "pr2": {"hand": "r_gripper_palm_link",
             "cameras": {"left": "wide_stereo_gazebo_l_stereo_camera_optical_frame",

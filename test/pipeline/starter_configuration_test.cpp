@@ -340,6 +340,21 @@ TEST_F(StarterConfiguration, WithoutCamerasTheirPosesAreToBeFound) {
   EXPECT_THAT(pipeline.setup().model.rendered_links, testing::Contains("base"));
 }
 
+/// Taken to stand, a camera in a head that moves is never found.
+TEST_F(StarterConfiguration, WithoutCamerasItNamesLinksThatAreNamedLikeCameras) {
+  auto o = options();
+  o.urdf = kSource / "meshes/icub_right/icub_right.urdf";
+  o.hand_link = "r_hand";
+  o.camera_links.clear();
+  EXPECT_THAT(write_starter_configuration(o).text,
+              HasSubstr("named like cameras: l_eye_optical (moved by torso_pitch, torso_roll, torso_yaw, neck_pitch, "
+                        "neck_roll, neck_yaw, eyes_tilt, l_eye_pan); r_eye_optical (moved by"));
+  o = options();
+  o.camera_links = {"camera_left_optical"};
+  o.out = folder_ / "given";
+  EXPECT_THAT(write_starter_configuration(o).text, testing::Not(HasSubstr("named like cameras")));
+}
+
 // A guess that was taken for known to 0.2 %: calibrations were "good" and 2 deg off where the focal length was 35 %
 // less.
 TEST_F(StarterConfiguration, AFocalLengthThatIsAGuessIsToBeFound) {
