@@ -188,8 +188,19 @@ class Starter {
   void find_hand() {
     hand_ = o_.hand_link;
     if (!hand_.empty()) return urdf_.require(hand_, "--hand");
-    const auto guess = urdf_.guess_hand();
+    // A jaw that is a finger, and whose joint nobody recorded, is no hand. Columns of other names may be any joint.
+    const auto movable = urdf_.movable_joints();
+    const bool all_known = columns_ && std::all_of(columns_->names.begin(), columns_->names.end(),
+                                                   [&](const auto& name) { return among(movable, name); });
+    const auto guess = urdf_.guess_hand(all_known ? columns_->names : std::vector<std::string>{});
     hand_ = guess.link;
+    const auto longest = urdf_.guess_hand({});
+    for (const auto& joint : urdf_.chain(longest.link)) {
+      if (all_known && joint.movable && !among(columns_->names, joint.name)) {
+        notes_.push_back(
+            fmt::format("joints.csv has no column of {}: what it moves is taken for a part of the hand", joint.name));
+      }
+    }
     notes_.push_back(fmt::format(
         "hand: a guess, {}{}", hand_,
         guess.others.empty() ? "" : fmt::format("; it could be {} as well (--hand)", fmt::join(guess.others, " or "))));

@@ -201,25 +201,34 @@ std::string UrdfOutline::follow_fixed(std::string link, const std::function<bool
   return link;
 }
 
-UrdfOutline::Hand UrdfOutline::guess_hand() const {
+UrdfOutline::Hand UrdfOutline::guess_hand(const std::vector<std::string>& recorded) const {
   // A link on a joint that slides, and behind which nothing turns, is a finger of a gripper.
   const auto behind_slider = [&](const std::string& link) {
     const auto joints = chain(link);
     const auto last = std::find_if(joints.rbegin(), joints.rend(), [](const Joint& joint) { return !joint.fixed; });
     return last != joints.rend() && slides(last->name);
   };
+  const auto is_recorded = [&](const Joint& joint) {
+    return !joint.movable || recorded.empty() ||
+           std::find(recorded.begin(), recorded.end(), joint.name) != recorded.end();
+  };
   int most = 0;
+  std::vector<std::string> candidates;
   for (const auto& link : names_) {
-    if (has_shape(link) && !behind_slider(link)) most = std::max(most, turning_above(link));
+    const auto joints = chain(link);
+    if (!has_shape(link) || behind_slider(link) || !std::all_of(joints.begin(), joints.end(), is_recorded)) continue;
+    candidates.push_back(link);
+    most = std::max(most, turning_above(link));
   }
+  if (most == 0 && !recorded.empty()) return guess_hand({});
   if (most == 0) {
     throw FileError(urdf_.string() +
                     ": no link with a <visual> shape is moved by a joint that turns; say which is "
                     "the hand (--hand)");
   }
   std::vector<std::string> ends;
-  for (const auto& link : names_) {
-    if (!has_shape(link) || behind_slider(link) || turning_above(link) != most) continue;
+  for (const auto& link : candidates) {
+    if (turning_above(link) != most) continue;
     // Where several joints begin, more of the arm being above than below, a hand ends and fingers begin.
     std::string hand;
     const auto moves_fingers = [&](const std::string& part) { return moving_branches(part) >= 2; };

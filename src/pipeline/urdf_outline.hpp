@@ -42,7 +42,8 @@ class UrdfOutline {
   };
   /// The end of the longest arm: the link with a shape behind the most joints that turn; where fingers begin, the link
   /// that they hang on. Throws FileError where no link with a shape is moved.
-  [[nodiscard]] Hand guess_hand() const;
+  /// @param recorded  joints: what others move is no part of an arm; empty, or where that leaves none: any
+  [[nodiscard]] Hand guess_hand(const std::vector<std::string>& recorded) const;
 
   /// Folders outside the URDF's own in which the meshes of these links are: those of the packages they are in, above
   /// the URDF or by ROS's search paths, and those that links of the file system lead to.

@@ -473,6 +473,22 @@ TEST_F(StarterConfiguration, StillsOfACameraOfAnyNameOnALinkOfTheRobot) {
   EXPECT_THROW((void)write_starter_configuration(o), ConfigurationError);
 }
 
+/// The one jaw of a gripper (SO-101) that nobody recorded was guessed for the hand, and its joint missed.
+TEST_F(StarterConfiguration, AHandIsNotGuessedBehindAJointThatWasNotRecorded) {
+  const SmallStills stills;
+  stills.write("joints.csv", "posture,joint1,joint2,joint3,joint4,joint5,joint6\n0,1,2,3,4,5,6\n");
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.stills = stills.path();
+  o.out = folder_ / "mine";
+  const StarterReport report = write_starter_configuration(o);
+  EXPECT_TRUE(report.usable) << report.text;
+  EXPECT_THAT(report.text, HasSubstr("hand: a guess, link6\n"));
+  EXPECT_THAT(report.text,
+              HasSubstr("joints.csv has no column of joint7: what it moves is taken for a part of the hand\n"));
+  EXPECT_THAT(report.text, HasSubstr("taken as fixed at 0 unless you take them out: joint7"));
+}
+
 TEST_F(StarterConfiguration, StillsWhoseColumnsAreNoJointsAreToBePutRight) {
   const SmallStills stills;
   stills.write("joints.csv", "posture,j1,joint2,joint3,joint4,joint5,joint6,joint7\n0,90,2,3,4,5,6,7\n");
