@@ -120,7 +120,7 @@ struct Calibration {
   std::vector<CalibratedEffect>
       effects;                        ///< what else was found; estimated with the rest where they do not depend on time
   std::optional<ArmBuild> arm_build;  ///< nothing: as the configuration has it, or too few postures
-  std::optional<ErrorModel> model;    ///< all of this together, as its files hold it
+  std::optional<ErrorModel> model;    ///< all that was estimated, together
   OutlineDistances outline_px;
   double hand_sd_m = 0.0;             ///< of the hand's place in the first camera's picture, mean over postures
   std::vector<CalibratedView> views;  ///< of all pictures, in order of time
