@@ -26,16 +26,31 @@ void refuse_or_accept(Decoder&& decoder) {
   }
 }
 
-/// The input as a file, for decoders that open one; rewritten for each input.
-inline std::filesystem::path as_file(const std::uint8_t* data, std::size_t size, const std::string& name) {
-  static const std::filesystem::path folder = [] {
+/// A folder of this process, in memory where there is one; goes with it.
+class Folder {
+ public:
+  Folder() {
     const std::filesystem::path memory = "/dev/shm";
     const auto base = std::filesystem::exists(memory) ? memory : std::filesystem::temp_directory_path();
-    auto path = base / ("bodyschema_fuzz_" + std::to_string(getpid()));
-    std::filesystem::create_directories(path);
-    return path;
-  }();
-  const auto file = folder / name;
+    path_ = base / ("bodyschema_fuzz_" + std::to_string(getpid()));
+    std::filesystem::create_directories(path_);
+  }
+  ~Folder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// The input as a file, for decoders that open one; rewritten for each input.
+inline std::filesystem::path as_file(const std::uint8_t* data, std::size_t size, const std::string& name) {
+  static const Folder folder;
+  const auto file = folder.path() / name;
   std::filesystem::create_directories(file.parent_path());
   std::ofstream(file, std::ios::binary).write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
   return file;
