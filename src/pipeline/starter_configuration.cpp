@@ -194,13 +194,6 @@ class Starter {
                                                    [&](const auto& name) { return among(movable, name); });
     const auto guess = urdf_.guess_hand(all_known ? columns_->names : std::vector<std::string>{});
     hand_ = guess.link;
-    const auto longest = urdf_.guess_hand({});
-    for (const auto& joint : urdf_.chain(longest.link)) {
-      if (all_known && joint.movable && !among(columns_->names, joint.name)) {
-        notes_.push_back(
-            fmt::format("joints.csv has no column of {}: what it moves is taken for a part of the hand", joint.name));
-      }
-    }
     notes_.push_back(fmt::format(
         "hand: a guess, {}{}", hand_,
         guess.others.empty() ? "" : fmt::format("; it could be {} as well (--hand)", fmt::join(guess.others, " or "))));

@@ -473,7 +473,8 @@ TEST_F(StarterConfiguration, StillsOfACameraOfAnyNameOnALinkOfTheRobot) {
   EXPECT_THROW((void)write_starter_configuration(o), ConfigurationError);
 }
 
-/// The one jaw of a gripper (SO-101) that nobody recorded was guessed for the hand, and its joint missed.
+/// The one jaw of a gripper (SO-101) that nobody recorded was guessed for the hand, and its joint missed. What is not
+/// recorded is said once, of whichever arm it is.
 TEST_F(StarterConfiguration, AHandIsNotGuessedBehindAJointThatWasNotRecorded) {
   const SmallStills stills;
   stills.write("joints.csv", "posture,joint1,joint2,joint3,joint4,joint5,joint6\n0,1,2,3,4,5,6\n");
@@ -484,9 +485,16 @@ TEST_F(StarterConfiguration, AHandIsNotGuessedBehindAJointThatWasNotRecorded) {
   const StarterReport report = write_starter_configuration(o);
   EXPECT_TRUE(report.usable) << report.text;
   EXPECT_THAT(report.text, HasSubstr("hand: a guess, link6\n"));
-  EXPECT_THAT(report.text,
-              HasSubstr("joints.csv has no column of joint7: what it moves is taken for a part of the hand\n"));
   EXPECT_THAT(report.text, HasSubstr("taken as fixed at 0 unless you take them out: joint7"));
+
+  // A first joint that is missed is missed behind every hand: the guess is what it would have been, and that is said.
+  stills.write("joints.csv", "posture,joint2,joint3,joint4,joint5,joint6,joint7\n0,2,3,4,5,6,7\n");
+  o.out = folder_ / "without";
+  const StarterReport without = write_starter_configuration(o);
+  EXPECT_FALSE(without.usable);
+  EXPECT_THAT(without.text, HasSubstr("hand: a guess, hand\n"));
+  EXPECT_THAT(without.text, HasSubstr("to be put right: joints.csv has no column of joint1;"));
+  EXPECT_THAT(without.text, testing::Not(HasSubstr("taken for a part of the hand")));
 }
 
 TEST_F(StarterConfiguration, StillsWhoseColumnsAreNoJointsAreToBePutRight) {

@@ -83,7 +83,7 @@ struct CalibratedJoint {
   /// As it is to be applied, and the root of its mean squared error: zero, and how far off that may be, where the joint
   /// is left as it is. All else is right together with this.
   double offset_rad = 0.0, sd_rad = 0.0;
-  bool told = false;       ///< see Estimate::told
+  bool told = false;       ///< known to 0.5 deg and a third of what was believed; counts in a good result
   std::string untold_why;  ///< "cannot be told from camera_pose turn_y"; empty where it is told
   /// Told; or told too little, and further from where it is than the pictures leave open.
   bool applied = false;
