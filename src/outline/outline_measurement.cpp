@@ -148,9 +148,10 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
   points_.clear();
   samples_.clear();
   const auto outline = extractor_.extract(X_CB_, camera, static_cast<float>(unit * search.spacing_px));
-  find_covers(outline, corrections, focal.x());
-  for (const auto& predicted : outline) {
-    if (is_under_cover(predicted, corrections, focal.x())) continue;
+  find_moved(outline, corrections, camera, unit * search.spacing_px);
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    if (is_passed(i)) continue;
+    const auto& predicted = outline[i];
     const double factor = search.part_weight.empty() ? 1.0 : search.part_weight[predicted.part];
     if (factor <= 0.0) continue;
     OutlinePoint point;
@@ -202,27 +203,34 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
   if (search.odd_sd_px > 0.0) leave_out_odd(search, unit, out);
 }
 
-void OutlineMeasurement::find_covers(std::span<const ContourPoint> outline, const Corrections& corrections,
-                                     double focal_px) {
-  covers_.clear();
+void OutlineMeasurement::find_moved(std::span<const ContourPoint> outline, const Corrections& corrections,
+                                    std::size_t camera, double spacing_px) {
+  const auto& k = projection_.intrinsics(camera);
+  const double focal_px = k.fx * (1.0 + corrections.camera.focal_scale);
+  moved_points_.clear();
+  float most_px = 0.0f;
   for (const auto& point : outline) {
-    const double thickness_m = corrections.shapes[projection_.segment_of(point.part)].thickness_m;
-    if (thickness_m <= 0.0) continue;
-    covers_.push_back({point.pixel, static_cast<float>(thickness_m * focal_px / point.p_C.z())});
+    const auto& shape = corrections.shapes[projection_.segment_of(point.part)];
+    const auto by_px =
+        static_cast<float>(shape.thickness_m * focal_px / point.p_C.z() + shape.dilation_px / k.reduction);
+    most_px = std::max(most_px, std::abs(by_px));
+    moved_points_.push_back({point.pixel, point.pixel + by_px * point.normal, by_px});
   }
+  // Points lie too far apart for so little to bring one past another.
+  constexpr double kPassing = 0.25;
+  if (most_px < kPassing * spacing_px) moved_points_.clear();
 }
 
-bool OutlineMeasurement::is_under_cover(const ContourPoint& point, const Corrections& corrections,
-                                        double focal_px) const {
-  if (covers_.empty()) return false;
-  const double own_m = std::max(0.0, corrections.shapes[projection_.segment_of(point.part)].thickness_m);
-  const auto own_px = static_cast<float>(own_m * focal_px / point.p_C.z());
-  // Where a cover ends beside something bare its edge may be sharp and reach further; in a notch its sides meet.
-  const float share = own_px > 0.0f ? 0.95f : 1.5f;
-  const Eigen::Vector2f pixel = point.pixel + own_px * point.normal;
-  return std::any_of(covers_.begin(), covers_.end(), [&](const Cover& cover) {
-    const float reach_px = share * cover.thickness_px;
-    return (cover.pixel - pixel).squaredNorm() < reach_px * reach_px;
+bool OutlineMeasurement::is_passed(std::size_t index) const {
+  if (moved_points_.empty()) return false;
+  const auto& own = moved_points_[index];
+  const bool inwards = own.by_px < 0.0f;
+  return std::any_of(moved_points_.begin(), moved_points_.end(), [&](const MovedPoint& other) {
+    if (other.by_px == 0.0f || (other.by_px < 0.0f) != inwards) return false;
+    // Where a cover ends beside something bare its edge may be sharp and reach further; in a notch its sides meet.
+    const bool ends = 2.0f * std::abs(own.by_px) < std::abs(other.by_px);
+    const float reach_px = (ends ? 1.5f : 0.95f) * other.by_px;
+    return (other.from - own.to).squaredNorm() < reach_px * reach_px;
   });
 }
 

@@ -296,6 +296,26 @@ TEST_F(OutlineOfOwnRobot, NoOutlineIsPredictedUnderACover) {
   EXPECT_GT(gloved.size(), bare.size() / 4);
 }
 
+/// Between fingers the sides of a fat outline meet, and those of a thin one at their tips.
+TEST_F(OutlineOfOwnRobot, NoOutlineIsPredictedWhereItsSidesHaveMet) {
+  const auto points_of = [&](double dilation_px) {
+    Corrections c = nothing_;
+    for (auto& shape : c.shapes) shape.dilation_px = dilation_px;
+    measurement_.expect(q_, c, 0, {}, {.spacing_px = 1.0}, evidence_);
+    return std::vector<OutlinePoint>(measurement_.points().begin(), measurement_.points().end());
+  };
+  const auto bare = points_of(0.0);
+  for (const double dilation_px : {5.0, -4.0}) {
+    const auto moved = points_of(dilation_px);
+    EXPECT_GT(moved.size(), bare.size() / 2);
+    for (const auto& point : moved) {
+      double nearest_px = 1e9;
+      for (const auto& b : bare) nearest_px = std::min(nearest_px, (b.pixel - point.pixel).norm());
+      EXPECT_GT(nearest_px, 0.9 * std::abs(dilation_px)) << point.pixel.transpose();
+    }
+  }
+}
+
 TEST_F(OutlineOfOwnRobot, WhatLiesBeyondTheSearchIsNotMatchedAndCosts) {
   const auto seen = reach_.draw(q_, nothing_, 0);
   Corrections wrong = nothing_;

@@ -116,10 +116,12 @@ class OutlineMeasurement {
   /// @param edges  null: every point is where it is predicted
   void compare(const ObservedEdges* edges, const Corrections& corrections, std::size_t camera,
                const OutlineSearch& search, OutlineEvidence& out);
-  /// What lies outside its meshes, and so over the outline of what is beside it.
-  void find_covers(std::span<const ContourPoint> outline, const Corrections& corrections, double focal_px);
-  /// Whether a point of the outline of the meshes has none of the outline of what covers them.
-  [[nodiscard]] bool is_under_cover(const ContourPoint& point, const Corrections& corrections, double focal_px) const;
+  /// Where covers and fat masks move the outline of the meshes. @param spacing_px  of its points
+  void find_moved(std::span<const ContourPoint> outline, const Corrections& corrections, std::size_t camera,
+                  double spacing_px);
+  /// Whether a point that was moved has none of the outline that is seen: that of another has passed it, over a bare
+  /// part beside a cover, and in a notch whose sides have met.
+  [[nodiscard]] bool is_passed(std::size_t index) const;
   /// Leaves odd pieces of `samples_` out of the points.
   void leave_out_odd(const OutlineSearch& search, double unit_px, OutlineEvidence& out);
   /// Velocity of a part's place, per unit of coordinate `i` of `find_motions`, that is due to another size of its
@@ -139,11 +141,11 @@ class OutlineMeasurement {
   std::vector<Eigen::Matrix<double, 3, 4>> shutter_;  ///< the same per second, by link; empty: they rest
   std::vector<OutlinePoint> points_;
   std::vector<OutlineSample> samples_;
-  struct Cover {
-    Eigen::Vector2f pixel;
-    float thickness_px;
+  struct MovedPoint {
+    Eigen::Vector2f from, to;
+    float by_px;  ///< outwards
   };
-  std::vector<Cover> covers_;
+  std::vector<MovedPoint> moved_points_;  ///< of the whole outline; empty where none is moved by enough to pass another
   OddPieces odd_pieces_;
   Eigen::MatrixXd rows_;
 };
