@@ -3,14 +3,11 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <set>
 #include <thread>
-#include <tuple>
 #include <utility>
 
 #include "bodyschema/calibration/camera_search.hpp"
@@ -24,8 +21,11 @@
 #include "arm_geometry.hpp"
 #include "believed_outline.hpp"
 #include "beyond_model.hpp"
+#include "calibrated_cameras.hpp"
 #include "calibration_files.hpp"
+#include "calibration_verdict.hpp"
 #include "left_as_it_is.hpp"
+#include "limits.hpp"
 #include "loose_fingers.hpp"
 #include "next_posture.hpp"
 #include "raw_pictures.hpp"
@@ -34,28 +34,10 @@
 namespace bodyschema {
 namespace {
 
+namespace limits = calibration::limits;
+
 constexpr const char* kAdvice =
     " in at least five postures that differ in every joint, held still or moved slowly, the arm in view of all cameras";
-/// Physical. px of a 320x240 picture: how far off the outlines may be at first, joints some degrees off.
-constexpr double kFrom_px = 40.0;
-constexpr std::size_t kPlaces = 5;  ///< places of a searched camera that are tried
-/// Statistical. A place of the camera is taken for the only one where the next best fits this much worse: silhouettes
-/// of a wrong place are off by a third, of the right one by what masks get wrong.
-constexpr double kOnly = 1.25;
-constexpr double kAlone = 1e9;          ///< no other place was found at all
-constexpr double kSameAnswer_m = 0.02;  ///< physical, of the hand in the camera's frame, mean over the pictures
-/// Physical. Less of the outline found than this, and it is somebody else's.
-constexpr double kLeastFound = 0.6;
-/// Physical. A link of which less is found is hidden in the pictures, and what is left must be most of the robot.
-constexpr double kHardlyFound = 0.3, kLeastSeen = 0.6;
-constexpr double kNear_px = 2.5;  ///< physical, px of a 320x240 picture: residuals of outlines that belong together
-/// Physical, px of a 320x240 picture, median: masks that are made about a prediction follow it, right or wrong; those
-/// about the right one end at the robot itself.
-constexpr double kOwnMasks_px = 1.0;
-constexpr double kSame_px = 0.2;          ///< physical, px of a 320x240 picture: outlines that differ by less are alike
-constexpr double kBeyondBelief_sd = 4.0;  ///< statistical
-constexpr double kDisagreement = 4.0;     ///< statistical: mean NIS per direction
-constexpr std::size_t kFewestPostures = 3;  ///< fewer cannot disagree
 
 int threads_of(const CalibrationOptions& options) {
   return options.threads > 0 ? options.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
@@ -64,24 +46,6 @@ int threads_of(const CalibrationOptions& options) {
 bool to_be_searched(const CameraModel& camera) {
   return camera.mount.knowledge == PlaceKnowledge::kUnknown;
 }
-
-/// Of pictures without masks: how far off their outlines may be, round by round, px of a 320x240 picture; first where
-/// nothing is known but what is configured, then after a fit of what moved.
-constexpr std::array kReaches = {40.0, 30.0, 20.0, 12.0, 8.0, 6.0, 5.0};
-constexpr std::array kReachesMoved = {16.0, 12.0, 8.0, 6.0, 5.0, 4.0, 4.0};
-static_assert(kReaches.size() == kReachesMoved.size());
-/// Statistical. Masks never look less far than outlines still err: what lies beyond, they take for the other side.
-constexpr double kWithin_sd = 4.0;
-constexpr double kWide_px = 12.0;  ///< ... and then once more, to see whether it makes a difference
-constexpr std::array kReachesAgain = {6.0, 4.0, 4.0};
-constexpr int kMostChecks = 3;
-constexpr double kSettled_sd = 2.0;  ///< statistical
-/// Physical. Outlines that may be further off than this, px of a 320x240 picture, are looked for by what moved.
-constexpr double kRough_px = 30.0, kAnywhere_px = 1e3;
-constexpr double kHardlyKnown_rad = radians(3.0);  ///< ... and so are those of a camera that may be turned by more
-constexpr std::size_t kRawKept = 128;              ///< observations of such a log whose pictures are looked at
-constexpr std::size_t kReadAgain = 32;             ///< ... of one with masks, to hold these against them
-constexpr std::size_t kShown = 12;                 ///< ... of any other, for the report alone
 
 class Calibrator {
  public:
@@ -99,9 +63,9 @@ class Calibrator {
     WatchedLog watched = watch_log(pipeline_,
                                    {.log = options_.log,
                                     .picture_rate_hz = options_.picture_rate_hz,
-                                    .kept = raw()     ? kRawKept
-                                            : given() ? kReadAgain
-                                                      : kShown,
+                                    .kept = raw()     ? limits::kRawKept
+                                            : given() ? limits::kReadAgain
+                                                      : limits::kShown,
                                     .quiet = options_.quiet},
                                    estimator_can_begin());
     if (watched.background_turned) return std::nullopt;
@@ -114,7 +78,7 @@ class Calibrator {
     believe_what_is_configured();
     loose_ = loose_fingers(*log_, beliefs_);
     if (masks) believed_px_ = believed_px();
-    const bool rough = believed_px_ > kRough_px || hardly_known();
+    const bool rough = believed_px_ > limits::kRough_px || hardly_known();
     bool still = masks && rough && masks->cameras_stood_still();
     if (still) {
       masks->by_what_moved();
@@ -140,10 +104,12 @@ class Calibrator {
     if (given()) read_once_more(watched.kept, fit, *best);
     judge_left_out();
     describe_joints(*best);
-    if (helps_ && !options_.all_parameters) leave_untold(fit, fitted, *best);
+    if (doubts_.helps && !options_.all_parameters) leave_untold(fit, fitted, *best);
     describe(fit, *best);
     progress(0.9);
-    conclude(fit, *best);
+    doubts_.own_masks = raw();
+    doubts_.found = found_outlines(fit, *best, some_pictures(), loose_);
+    judge(*best, doubts_, picture_unit(rig_.cameras.front().intrinsics), result_);
     suggest(fit, *best);
     write_calibration(result_, *best, *log_, watched.kept, pipeline_, configuration_, options_);
     progress(1.0);
@@ -171,18 +137,17 @@ class Calibrator {
                         options_.log.string(), rig_.cameras[c].name, rig_.cameras[c].name));
       }
       CameraSearch search(*log_, threads_of(options_));
-      const auto places = search.find(c, kPlaces);
+      const auto places = search.find(c, limits::kPlaces);
       if (places.empty()) {
         throw DataError(
             fmt::format("{}: camera '{}' is to be found, and saw the robot in fewer than three postures; "
                         "record the arm{}",
                         options_.log.string(), rig_.cameras[c].name, kAdvice));
       }
-      if (places.size() > 1) ambiguity_ = std::max(ambiguity_, places[0].distance / places[1].distance);
       std::vector<StereoRig> rigs;
       for (const auto& place : places) {
         // Without a second camera to agree with, every good place of the first is tried.
-        if (place.distance > kOnly * kOnly * places.front().distance) break;
+        if (place.distance > limits::kOnly * limits::kOnly * places.front().distance) break;
         for (const auto& rig : starts_) {
           rigs.push_back(rig);
           auto& mount = rigs.back().cameras[c].mount;
@@ -208,22 +173,22 @@ class Calibrator {
   [[nodiscard]] bool most_moved() const {
     const auto shown = log_->parts_shown();
     return static_cast<double>(std::count(shown.begin(), shown.end(), true)) >=
-           kLeastSeen * static_cast<double>(shown.size());
+           limits::kLeastSeen * static_cast<double>(shown.size());
   }
 
   /// How far off the robot's outlines may be by what is configured; anything where a camera is to be found.
   [[nodiscard]] double believed_px() {
-    if (std::any_of(rig_.cameras.begin(), rig_.cameras.end(), to_be_searched)) return kAnywhere_px;
+    if (std::any_of(rig_.cameras.begin(), rig_.cameras.end(), to_be_searched)) return limits::kAnywhere_px;
     LogFit fit(*log_, 1);
     return believed_outline_sd_px(fit, State(log_->roles(), beliefs_.state), loose_);
   }
 
   /// Masks and fit by turns, masks ever nearer to what the fit of all postures says.
   void with_better_masks(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
-    const auto& reaches = best ? kReachesMoved : kReaches;
+    const auto& reaches = best ? limits::kReachesMoved : limits::kReaches;
     for (std::size_t i = 0; i < reaches.size(); ++i) {
       if (i + 1 < reaches.size() && reaches[i + 1] > believed_px_) continue;  // the next one looks far enough
-      if (best && reaches[i] < kWithin_sd * best->noise().front().sd_px()) break;
+      if (best && reaches[i] < limits::kWithin_sd * best->noise().front().sd_px()) break;
       with_masks_anew(masks, fit, best, reaches[i]);
     }
   }
@@ -231,26 +196,27 @@ class Calibrator {
   /// Whether some camera may be turned by more than a few degrees.
   [[nodiscard]] bool hardly_known() const {
     return std::any_of(rig_.cameras.begin(), rig_.cameras.end(), [](const CameraModel& camera) {
-      return camera.mount.knowledge == PlaceKnowledge::kRoughly && camera.mount.sd_rad.maxCoeff() > kHardlyKnown_rad;
+      return camera.mount.knowledge == PlaceKnowledge::kRoughly &&
+             camera.mount.sd_rad.maxCoeff() > limits::kHardlyKnown_rad;
     });
   }
 
   /// Until it makes no difference how far masks look: those that are made about a prediction follow it, right or wrong,
   /// but the wider they look the less.
   void settle(RawPictures& masks, LogFit& fit, std::optional<BatchFit>& best) {
-    for (int again = 0; again < kMostChecks; ++again) {
-      PictureLog near = masks.about(best->at().corrections, kWide_px);
+    for (int again = 0; again < limits::kMostChecks; ++again) {
+      PictureLog near = masks.about(best->at().corrections, limits::kWide_px);
       fit.refresh();
       BatchFit wide = started(fit, best->state().x());
-      wide.run(kWide_px, {});
-      unsettled_ = moved_joint(best->state(), best->estimate(), wide.estimate());
-      if (unsettled_.empty()) {
+      wide.run(limits::kWide_px, {});
+      doubts_.unsettled = moved_joint(best->state(), best->estimate(), wide.estimate());
+      if (doubts_.unsettled.empty()) {
         *log_ = std::move(near);
         fit.refresh();
         return;
       }
       best.emplace(std::move(wide));
-      for (const double reach_px : kReachesAgain) with_masks_anew(masks, fit, best, reach_px);
+      for (const double reach_px : limits::kReachesAgain) with_masks_anew(masks, fit, best, reach_px);
     }
   }
 
@@ -268,7 +234,8 @@ class Calibrator {
   static std::string moved_joint(const State& state, const MemoryEstimate& a, const MemoryEstimate& b) {
     for (Eigen::Index k = 0; k < state.joints(); ++k) {
       const double sd = std::sqrt(std::max(a.covariance(k, k), b.covariance(k, k)));
-      if (std::abs(a.x[k] - b.x[k]) > kSettled_sd * sd) return state.parameters()[static_cast<std::size_t>(k)].name;
+      if (std::abs(a.x[k] - b.x[k]) > limits::kSettled_sd * sd)
+        return state.parameters()[static_cast<std::size_t>(k)].name;
     }
     return {};
   }
@@ -288,7 +255,7 @@ class Calibrator {
                               " that the robot's model does not have: what the masks show of it is left out");
   }
 
-  [[nodiscard]] static bool is_near(const BatchFit& batch) { return batch.noise().front().sd_px() < kNear_px; }
+  [[nodiscard]] static bool is_near(const BatchFit& batch) { return batch.noise().front().sd_px() < limits::kNear_px; }
 
   [[nodiscard]] BatchFit started(LogFit& fit, const Eigen::VectorXd& x) const {
     BatchFit batch(fit, State(log_->roles(), beliefs_.state), beliefs_.tolerances, settings());
@@ -314,12 +281,13 @@ class Calibrator {
     const bool pictures = std::any_of(kept.begin(), kept.end(), [](const Observation& o) {
       return std::any_of(o.cameras.begin(), o.cameras.end(), [](const auto& c) { return c && !c->image.empty(); });
     });
-    const bool credible = implausible_.empty() && beyond_belief(best).empty();  // what is not, is not to be applied
+    const bool credible =
+        doubts_.implausible.empty() && beyond_belief(best).empty();  // what is not, is not to be applied
     if (!pictures || !credible || !is_near(best)) return;
     RawPictures masks(*log_, pipeline_.vision(), kept);
     std::optional<PictureLog> given;
     std::optional<BatchFit> own(best);
-    for (const double reach_px : kReachesAgain) {
+    for (const double reach_px : limits::kReachesAgain) {
       PictureLog before = with_masks_anew(masks, fit, own, reach_px);
       if (!given) given.emplace(std::move(before));
     }
@@ -372,9 +340,12 @@ class Calibrator {
     return starts_.size() + (watched_->offsets_at_start.empty() ? 0 : 1);
   }
 
+  /// Whether some pictures tell which start is the best.
+  [[nodiscard]] bool some_tell() const { return start_count() > 1 && log_->pictures().size() > limits::kEnough; }
+
   /// What the starts end at, each once, the best first. Which that is, some pictures tell.
   std::vector<Answer> answers(LogFit& fit) {
-    const auto some = start_count() > 1 ? spread_pictures() : std::vector<std::size_t>{};
+    const auto some = some_tell() ? some_pictures() : std::vector<std::size_t>{};
     std::vector<Answer> list;
     const auto add = [&](const StereoRig& rig, BatchFit batch) {
       auto places = views(fit, batch);
@@ -382,7 +353,7 @@ class Calibrator {
     };
     for (const auto& rig : starts_) {
       use(fit, rig);
-      add(rig, from(fit, some, kFrom_px));
+      add(rig, from(fit, some, limits::kFrom_px));
     }
     if (!watched_->offsets_at_start.empty()) add(rig_, from_the_estimator(fit, some));
     return once_each(std::move(list));
@@ -394,11 +365,11 @@ class Calibrator {
     auto answers = this->answers(fit);
     bool last = true;  // whether masks and cameras are those of the best answer
     if (masks) last = judge_by_own_masks(*masks, fit, answers);
-    only_ = answers.size() > 1 ? answers[1].fit->misfit() / std::max(1e-9, answers[0].fit->misfit()) : kAlone;
+    if (answers.size() > 1) doubts_.rival = answers[1].fit->misfit() / std::max(1e-9, answers[0].fit->misfit());
     use(fit, answers.front().rig);
     std::optional<BatchFit> best(std::move(*answers.front().fit));
-    if (!last) with_masks_anew(*masks, fit, best, kReachesMoved.back());
-    if (!masks && start_count() > 1 && !spread_pictures().empty()) best->run(0.0, {});
+    if (!last) with_masks_anew(*masks, fit, best, limits::kReachesMoved.back());
+    if (!masks && some_tell()) best->run(0.0, {});
     return std::move(*best);
   }
 
@@ -406,7 +377,7 @@ class Calibrator {
   /// each of them: a fit that the rough masks held back is a rival no longer, and a wrong place finds no outline.
   /// @return whether the masks are about the best of them now
   bool judge_by_own_masks(RawPictures& masks, LogFit& fit, std::vector<Answer>& answers) {
-    const double most = kOnly * answers.front().fit->misfit();
+    const double most = limits::kOnly * answers.front().fit->misfit();
     std::erase_if(answers, [&](const Answer& a) { return a.fit->misfit() >= most; });
     for (auto& answer : answers) {
       use(fit, answer.rig);
@@ -427,20 +398,18 @@ class Calibrator {
     std::vector<Answer> distinct;
     for (auto& answer : list) {
       const bool known = std::any_of(distinct.begin(), distinct.end(), [&](const Answer& other) {
-        return apart(answer.views, other.views) < kSameAnswer_m;
+        return apart(answer.views, other.views) < limits::kSameAnswer_m;
       });
       if (!known) distinct.push_back(std::move(answer));
     }
     return distinct;
   }
 
-  /// So many pictures, all over the log, that any start's fit of them tells how good it is; empty: all.
-  [[nodiscard]] std::vector<std::size_t> spread_pictures() const {
-    constexpr std::size_t kEnough = 24;
-    const auto count = log_->pictures().size();
+  /// So many pictures, all over the log, that any start's fit of them tells how good it is.
+  [[nodiscard]] std::vector<std::size_t> some_pictures() const {
+    const auto count = log_->pictures().size(), some = std::min(count, limits::kEnough);
     std::vector<std::size_t> list;
-    if (count <= kEnough) return list;
-    for (std::size_t i = 0; i < kEnough; ++i) list.push_back(i * (count - 1) / (kEnough - 1));
+    for (std::size_t i = 0; i < some; ++i) list.push_back(some < 2 ? i : i * (count - 1) / (some - 1));
     return list;
   }
 
@@ -479,7 +448,7 @@ class Calibrator {
     }
     auto more = beliefs_;
     for (const auto& cause : report.causes) {
-      if (cause.implausible && implausible_.empty()) implausible_ = cause.sentence;
+      if (cause.implausible && doubts_.implausible.empty()) doubts_.implausible = cause.sentence;
       CalibratedEffect effect{cause.cause.name, cause.cause.joint, cause.cause.source, cause.sentence, {}};
       for (const auto& p : cause.parameters) {
         effect.parameters.push_back({p.parameter, p.unit, p.estimate, 0.25 * (p.ci95[1] - p.ci95[0]), 0.0});
@@ -511,7 +480,7 @@ class Calibrator {
   /// An arm that is built otherwise than its URDF says in so many ways that none can be named: how far, is measured.
   /// Where the pictures ask for it, joints' places and axes are estimated, otherwise what may be wrong is considered.
   std::optional<BatchFit> with_arm_geometry(LogFit& fit, const BatchFit& best) {
-    if (best.postures() <= kFewestPostures || !is_near(best)) return std::nullopt;
+    if (best.postures() <= limits::kFewestPostures || !is_near(best)) return std::nullopt;
     const ArmGeometry geometry(log_->roles(), best.state(), beliefs_.tolerances);
     const auto with = [](std::vector<Belief> list, const std::vector<Belief>& more) {
       list.insert(list.end(), more.begin(), more.end());
@@ -588,18 +557,18 @@ class Calibrator {
       joint.name = state.parameters()[static_cast<std::size_t>(k)].name;
       joint.offset_rad = joint.seen_rad = x[k];
       joint.sd_rad = joint.seen_sd_rad = sd[k];
-      joint.told = helps_ && is_told(state, sd, k);
+      joint.told = doubts_.helps && is_told(state, sd, k);
       joint.applied = joint.told || options_.all_parameters;
       if (!joint.told) {
         joint.untold_why =
-            helps_ ? why_untold(batch, k) : "postures left out of the fit look further off with it than without";
+            doubts_.helps ? why_untold(batch, k) : "postures left out of the fit look further off with it than without";
       }
       result_.joints.push_back(std::move(joint));
     }
   }
 
   static bool is_told(const State& state, const Eigen::VectorXd& sd, Eigen::Index k) {
-    return sd[k] < kTold_rad && sd[k] < kToldShare * state.prior_sd()[k];
+    return sd[k] < limits::kTold_rad && sd[k] < limits::kToldShare * state.prior_sd()[k];
   }
 
   /// Effects of the state that move the robot's joints or hands and that the pictures tell too little of.
@@ -611,7 +580,7 @@ class Calibrator {
       const auto e = state.parameters()[static_cast<std::size_t>(k)].ref.effect;
       const auto& effect = state.model()[e].name();
       const bool joint = effect == "joint_offset" || effect == "head_offset";
-      const bool mount_is_told = sd[k] < kToldShare * state.prior_sd()[k];
+      const bool mount_is_told = sd[k] < limits::kToldShare * state.prior_sd()[k];
       if (joint ? !is_told(state, sd, k) : effect == "hand_mount" && !mount_is_told) untold.insert(e);
     }
     return {untold.begin(), untold.end()};
@@ -659,7 +628,7 @@ class Calibrator {
     result_.posture_sd_rad = batch.memory().posture_sd_rad();
     result_.outline_sd_px = batch.noise().front().sd_px() * picture_unit(rig_.cameras.front().intrinsics);
     result_.outline_points_alike = batch.noise().front().correlated_points();
-    describe_cameras(batch);
+    result_.cameras = calibrated_cameras(*log_, batch);
     result_.outline_px.before = median_outline_distance_px(fit, ErrorModel(log_->roles()));
     result_.outline_px.after = median_outline_distance_px(fit, state.model());
     result_.hand_sd_m = hand_sd_m(fit, batch);
@@ -687,110 +656,6 @@ class Calibrator {
     return "no picture tells it from " + state.parameters()[static_cast<std::size_t>(like)].name;
   }
 
-  /// Where a camera is in the frame of the link that carries it, and how that depends on the state.
-  void describe_cameras(const BatchFit& batch) {
-    const auto& state = batch.state();
-    ErrorModel lenses(log_->roles());
-    for (std::size_t e = 0; e < state.model().size(); ++e) {
-      const Effect& effect = state.model()[e];
-      if (effect_kind(effect.name()).home == EffectHome::kCameras) lenses.add(effect.clone());
-    }
-    const StereoRig corrected = lenses.corrected(rig_);
-    for (std::size_t c = 0; c < rig_.cameras.size(); ++c) {
-      const auto& camera = rig_.cameras[c];
-      CalibratedCamera found;
-      found.name = camera.name;
-      found.link = carrier_of(c);
-      found.searched = to_be_searched(camera);
-      const auto place = [&](const Eigen::VectorXd& x) { return camera_place(state, x, c); };
-      const Eigen::VectorXd x = state.x();
-      found.X_link_optical = place(x);
-      found.intrinsics = corrected.cameras[c].intrinsics;
-      found.distortion = corrected.cameras[c].distortion;
-      const Eigen::MatrixXd J = place_jacobian(state, place, found.estimated);
-      const Eigen::MatrixXd C = J * batch.estimate().covariance * J.transpose();
-      found.sd_m = std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace()));
-      found.sd_rad = std::sqrt(std::max(0.0, C.bottomRightCorner<3, 3>().trace()));
-      std::tie(found.axes_sd_m, found.axes_sd_rad) = along_axes(C, found.X_link_optical);
-      if (camera.mount.relative) found.beside = beside_first(batch, c);
-      const Eigen::VectorXd with_first = J * batch.estimate().covariance.col(0);
-      const Eigen::MatrixXd beside =
-          C - with_first * with_first.transpose() / std::max(1e-300, batch.estimate().covariance(0, 0));
-      found.sd_m_beside_first_joint = std::sqrt(std::max(0.0, beside.topLeftCorner<3, 3>().trace()));
-      found.sd_rad_beside_first_joint = std::sqrt(std::max(0.0, beside.bottomRightCorner<3, 3>().trace()));
-      result_.cameras.push_back(std::move(found));
-    }
-  }
-
-  /// How a place moves, m and rad a unit of each parameter of the state that places cameras.
-  /// @param any  set where there is one
-  template <class PlaceOf>
-  static Eigen::MatrixXd place_jacobian(const State& state, const PlaceOf& place, bool& any) {
-    constexpr double kStep = 1e-5;
-    const Eigen::VectorXd x = state.x();
-    const Pose X = place(x);
-    Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, state.size());
-    for (Eigen::Index k = 0; k < state.size(); ++k) {
-      const auto& effect = state.model()[state.parameters()[static_cast<std::size_t>(k)].ref.effect].name();
-      if (!places_cameras(effect)) continue;
-      any = true;
-      Eigen::VectorXd changed = x;
-      changed[k] += kStep;
-      const Pose moved = place(changed);
-      J.col(k).head<3>() = (moved.translation() - X.translation()) / kStep;
-      const Eigen::AngleAxisd turn(Eigen::Matrix3d(moved.linear() * X.linear().transpose()));
-      J.col(k).tail<3>() = turn.angle() * turn.axis() / kStep;
-    }
-    return J;
-  }
-
-  /// Where the pictures say that two cameras are rigid, they are better known to each other than to the robot.
-  [[nodiscard]] CalibratedCamera::Beside beside_first(const BatchFit& batch, std::size_t camera) const {
-    const auto& state = batch.state();
-    const auto place = [&](const Eigen::VectorXd& x) {
-      return camera_place(state, x, 0).inverse(Eigen::Isometry) * camera_place(state, x, camera);
-    };
-    bool any = false;
-    const Eigen::MatrixXd J = place_jacobian(state, place, any);
-    const Pose X = place(state.x());
-    const auto [sd_m, sd_rad] = along_axes(J * batch.estimate().covariance * J.transpose(), X);
-    return {rig_.cameras.front().name, X, sd_m, sd_rad};
-  }
-
-  /// @param C  covariance of a camera's place and of its rotation vector, both in the axes of what carries it
-  /// @return standard deviations along and about the camera's own axes, m and rad
-  static std::pair<Eigen::Vector3d, Eigen::Vector3d> along_axes(const Eigen::MatrixXd& C, const Pose& X) {
-    const auto own = [&](const Eigen::Matrix3d& block) -> Eigen::Vector3d {
-      return (X.linear().transpose() * block * X.linear()).diagonal().cwiseMax(0.0).cwiseSqrt();
-    };
-    return {own(C.topLeftCorner<3, 3>()), own(C.bottomRightCorner<3, 3>())};
-  }
-
-  [[nodiscard]] std::string carrier_of(std::size_t camera) const {
-    const auto& mount = rig_.cameras[camera].mount;
-    if (mount.relative) return carrier_of(0);
-    return mount.parent.empty() ? rig_.cameras[camera].link : mount.parent;
-  }
-
-  [[nodiscard]] Pose camera_place(const State& state, const Eigen::VectorXd& x, std::size_t camera) const {
-    State moved = state;
-    moved.set(x);
-    const auto q = pipeline_.setup().default_joints(*log_->robot());
-    std::vector<std::string> cameras;
-    for (const auto& c : rig_.cameras) cameras.push_back(c.link);
-    CorrectedKinematics kinematics(log_->robot(), {carrier_of(camera)}, cameras);
-    Instant at;
-    at.camera = camera;
-    at.encoder = at.q = q;
-    at.qdot = at.qddot = Eigen::VectorXd::Zero(q.size());
-    Corrections all = log_->roles().no_corrections(), own = all;
-    moved.model().corrections(at, all);
-    own.camera = all.camera;
-    std::vector<Pose> X_CL(1);
-    kinematics.compute(q, own, camera, X_CL);
-    return X_CL[0].inverse(Eigen::Isometry);
-  }
-
   [[nodiscard]] double hand_sd_m(LogFit& fit, const BatchFit& batch) const {
     const auto& state = batch.state();
     const auto directions = fit.directions(batch.at(), state.model(), state.refs());
@@ -815,14 +680,13 @@ class Calibrator {
 
   // --- does it hold -------------------------------------------------------------------------------
 
-  /// Fits without each of up to `kSections` parts of the log in turn: how far off the outlines of the part are that is
-  /// left out, and whether the parts agree as well as is claimed. Parts are of postures in a row, for what lasts a
-  /// while makes these err alike.
+  /// Fits without each of up to `limits::kSections` parts of the log in turn: how far off the outlines of the part are
+  /// that is left out, and whether the parts agree as well as is claimed. Parts are of postures in a row, for what
+  /// lasts a while makes these err alike.
   void leave_out_sections(LogFit& fit, BatchFit& batch) {
-    constexpr std::size_t kSections = 5;
     const auto postures = batch.postures();
-    if (postures <= kFewestPostures) return;
-    const std::size_t sections = std::min(kSections, postures);
+    if (postures <= limits::kFewestPostures) return;
+    const std::size_t sections = std::min(limits::kSections, postures);
     std::vector<Eigen::VectorXd> without;
     for (std::size_t section = 0; section < sections; ++section) {
       std::vector<std::size_t> kept, left_out;
@@ -840,7 +704,7 @@ class Calibrator {
     const Eigen::VectorXd sd = batch.estimate().covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
     std::vector<Eigen::Index> told;
     for (Eigen::Index k = 0; k < batch.state().joints(); ++k) {
-      if (sd[k] < kToldShare * batch.state().prior_sd()[k]) told.push_back(k);
+      if (sd[k] < limits::kToldShare * batch.state().prior_sd()[k]) told.push_back(k);
     }
     batch.widen(section_spread(without, sd, told, settings().memory.posture_prior));
   }
@@ -858,160 +722,9 @@ class Calibrator {
     std::sort(own.begin(), own.end());
     result_.outline_px.heldout = 0.5 * (own[own.size() / 2] + own[(own.size() - 1) / 2]);
     result_.outline_px.heldout_worst = own.back();
-    heldout_mean_px_ = after / pictures;
-    helps_ = after / pictures < before / pictures + kSame_px * picture_unit(rig_.cameras.front().intrinsics);
-  }
-
-  /// What of the robot's predicted outline lies near an edge in the pictures.
-  struct Found {
-    double share = 0.0;             ///< of the outlines of parts that are seen at all
-    double seen = 0.0;              ///< share of the whole outline that these parts make
-    std::vector<std::string> lost;  ///< links of which next to nothing is found
-  };
-
-  [[nodiscard]] Found found(LogFit& fit, const BatchFit& batch) const {
-    const auto& links = log_->setup().model.rendered_links;
-    const auto shown = log_->parts_shown();
-    auto pictures = spread_pictures();
-    if (pictures.empty()) {
-      for (std::size_t p = 0; p < log_->pictures().size(); ++p) pictures.push_back(p);
-    }
-    Found result;
-    double all = 0.0, seen = 0.0, matched = 0.0;
-    OutlineEvidence evidence;
-    for (std::size_t part = 0; part < links.size(); ++part) {
-      if (!shown[part] || (!loose_.empty() && loose_[part])) continue;
-      double own = 0.0, own_matched = 0.0;
-      for (const auto p : pictures) {
-        const auto& picture = log_->pictures()[p];
-        auto search = batch.searches()[picture.camera];
-        search.part_weight.assign(links.size(), 0.0);
-        search.part_weight[part] = 1.0;
-        fit.measurement().linearise(log_->edges(p), picture.joints.q, batch.at().corrections[p], picture.camera, {},
-                                    search, evidence);
-        own += evidence.sampled;
-        own_matched += evidence.matched;
-      }
-      all += own;
-      if (own_matched < kHardlyFound * own) {
-        result.lost.push_back(links[part]);
-        continue;
-      }
-      seen += own;
-      matched += own_matched;
-    }
-    result.share = matched / std::max(1.0, seen);
-    result.seen = seen / std::max(1.0, all);
-    return result;
-  }
-
-  void conclude(LogFit& fit, const BatchFit& batch) {
-    const double rms = batch.noise().front().sd_px();
-    const auto told = static_cast<std::size_t>(
-        std::count_if(result_.joints.begin(), result_.joints.end(), [](const auto& j) { return j.told; }));
-    for (const auto& joint : result_.joints) {
-      if (!joint.told) result_.remarks.push_back(joint.name + ": " + joint.untold_why);
-    }
-    const auto say = [&](CalibrationState state, std::string sentence) {
-      result_.state = state;
-      result_.sentence = std::move(sentence);
-    };
-    const Found found = this->found(fit, batch);
-    for (const auto& link : found.lost) {
-      result_.remarks.push_back(link + ": next to nothing of its outline is found; hidden, or part of the background");
-    }
-    if (found.share < kLeastFound || found.seen < kLeastSeen || rms > kNear_px) {
-      return say(CalibrationState::kNotConverged,
-                 fmt::format("Not converged: {:.0f} % of the predicted outline lies near an edge of the robot in the "
-                             "pictures, expected at least {:.0f} %; check masks, robot and cameras' intrinsics.",
-                             100.0 * found.share * found.seen, 100.0 * kLeastFound));
-    }
-    // That nothing fits is said of many robots; this says why.
-    if (!implausible_.empty()) {
-      return say(CalibrationState::kModelMisfit,
-                 "Model misfit: no robot is so wrong as the pictures ask for (" + implausible_ +
-                     "); something else is wrong with robot or cameras, or less is known of them than is believed "
-                     "(estimator.state).");
-    }
-    if (!helps_) {
-      return say(
-          CalibrationState::kNotConverged,
-          fmt::format(
-              "Not converged: on postures left out of the fit outlines lie {:.1f} px off on average, no nearer than "
-              "with robot and cameras as they are configured; nothing of it is to be applied.",
-              heldout_mean_px_));
-    }
-    const double after_px = result_.outline_px.after / picture_unit(rig_.cameras.front().intrinsics);
-    if (pipeline_.masks_need_estimates() && after_px > kOwnMasks_px) {
-      return say(CalibrationState::kNotConverged,
-                 fmt::format("Not converged: the masks were made about a prediction of the robot and lie {:.1f} px off "
-                             "the result, so that one of the two is wrong; give masks (vision.method: given) or say "
-                             "better where the cameras are.",
-                             result_.outline_px.after));
-    }
-    if (!unsettled_.empty()) {
-      return say(
-          CalibrationState::kNotConverged,
-          fmt::format("Not converged: without masks the answer depends on how far from the prediction the robot's "
-                      "outline is looked for ({} moves by more than {:.0f} standard deviations); record more "
-                      "postures, or give masks (vision.method: given).",
-                      unsettled_, kSettled_sd));
-    }
-    if (only_ < kOnly) {
-      return say(CalibrationState::kNotConverged,
-                 fmt::format("Not converged: another place of the camera explains the pictures nearly as well (misfit "
-                             "{:.2f} times as large); record more postures.",
-                             only_));
-    }
-    if (result_.postures < kFewestPostures) {
-      return say(CalibrationState::kNotConverged,
-                 fmt::format("Not converged: {} distinct postures cannot contradict each other; record at least {}.",
-                             result_.postures, kFewestPostures));
-    }
-    if (const auto wrong = beyond_belief(batch); !wrong.empty()) return say(CalibrationState::kModelMisfit, wrong);
-    if (result_.dispersion > kDisagreement) {
-      return say(CalibrationState::kModelMisfit,
-                 fmt::format("Model misfit: postures disagree by {:.1f} times what is claimed; run bodyschema diagnose "
-                             "on a moving log, and look at the overlays for masks that are wrong.",
-                             std::sqrt(result_.dispersion)));
-    }
-    if (told == 0) {
-      return say(CalibrationState::kNotConverged,
-                 "Not converged: the pictures tell no joint's offset; record postures that differ more.");
-    }
-    say(CalibrationState::kGood,
-        fmt::format("Good: {} of {} joints told; the hand is known to {:.1f} mm in the camera's frame (one sigma){}{}.",
-                    told, result_.joints.size(), 1e3 * result_.hand_sd_m,
-                    listed("; not told, and not to be applied: ", [](const auto& j) { return !j.applied; }),
-                    listed("; hardly told, and to be applied with the rest all the same: ",
-                           [](const auto& j) { return j.applied && !j.told; })));
-  }
-
-  /// Names of those joints, behind a few words; empty where there is none.
-  template <class Which>
-  [[nodiscard]] std::string listed(const char* words, const Which& which) const {
-    std::string names;
-    for (const auto& joint : result_.joints) {
-      if (which(joint)) names += (names.empty() ? words : ", ") + joint.name;
-    }
-    return names;
-  }
-
-  [[nodiscard]] std::string beyond_belief(const BatchFit& batch) const {
-    const auto& state = batch.state();
-    const Eigen::VectorXd away = (state.x() - state.prior_mean()).cwiseQuotient(state.prior_sd());
-    Eigen::Index worst = -1;
-    for (Eigen::Index k = state.joints(); k < state.size(); ++k) {
-      if (std::abs(away[k]) <= kBeyondBelief_sd || (worst >= 0 && std::abs(away[k]) <= std::abs(away[worst]))) continue;
-      worst = k;
-    }
-    if (worst < 0) return {};
-    const auto& p = state.parameters()[static_cast<std::size_t>(worst)];
-    return fmt::format(
-        "Model misfit: the pictures ask for {} {:.3g} {}, {:.0f} times what is believed possible; it is further off "
-        "than that (estimator.state and the cameras' pose_sd_mm and pose_sd_deg say what is believed), or something "
-        "else is wrong with robot or cameras.",
-        p.name, state.x()[worst] / p.si_per_unit, p.unit, std::abs(away[worst]));
+    doubts_.heldout_mean_px = after / pictures;
+    doubts_.helps =
+        after / pictures < before / pictures + limits::kSame_px * picture_unit(rig_.cameras.front().intrinsics);
   }
 
   /// The posture that would tell most of what is told worst.
@@ -1023,9 +736,6 @@ class Calibrator {
     }
   }
 
-  static constexpr double kTold_rad = 0.5 * kPi / 180.0;
-  static constexpr double kToldShare = 1.0 / 3.0;  ///< of what was believed before
-
   const Configuration& configuration_;
   CalibrationOptions options_;
   Pipeline pipeline_;
@@ -1033,19 +743,14 @@ class Calibrator {
   const WatchedLog* watched_ = nullptr;
   PictureLog* log_ = nullptr;  ///< its pictures
   std::vector<StereoRig> starts_;
-  Beliefs beliefs_;          ///< those of the configuration, with what was found besides
-  std::string implausible_;  ///< a cause that no robot has, as a diagnosis words it
-  std::string unsettled_;    ///< a joint whose offset depends on how masks were made
-  double believed_px_ = kAnywhere_px;
+  Beliefs beliefs_;  ///< those of the configuration, with what was found besides
+  double believed_px_ = limits::kAnywhere_px;
   std::vector<bool> loose_;  ///< parts that are drawn and have no say
   struct LeftOut {
     double pictures = 0.0, before_px = 0.0, after_px = 0.0;
   };
   std::vector<LeftOut> left_out_;  ///< sections of the log, each by a fit without it
-  double heldout_mean_px_ = 0.0;
-  bool helps_ = true;  ///< outlines of postures that were left out come nearer
-  double ambiguity_ = 0.0;
-  double only_ = kAlone;  ///< misfit of the second best place over that of the best
+  Doubts doubts_;
   Calibration result_;
   std::optional<ProgressBar> bar_;
 };

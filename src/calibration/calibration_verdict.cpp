@@ -1,0 +1,190 @@
+#include "calibration_verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "limits.hpp"
+
+namespace bodyschema {
+namespace {
+
+namespace limits = calibration::limits;
+
+/// Names of those joints, behind a few words; empty where there is none.
+template <class Which>
+std::string listed(const std::vector<CalibratedJoint>& joints, const char* words, const Which& which) {
+  std::string names;
+  for (const auto& joint : joints) {
+    if (which(joint)) names += (names.empty() ? words : ", ") + joint.name;
+  }
+  return names;
+}
+
+/// Why a result is not good.
+struct Objection {
+  CalibrationState state;
+  std::string sentence;
+};
+
+/// Whether pictures and model were brought together, and in one way alone.
+std::optional<Objection> objection_of_outlines(const BatchFit& batch, const Doubts& doubts, double unit_px,
+                                               const Calibration& result) {
+  const auto& found = doubts.found;
+  const double rms = batch.noise().front().sd_px();
+  if (found.share < limits::kLeastFound || found.seen < limits::kLeastSeen || rms > limits::kNear_px) {
+    return Objection{
+        CalibrationState::kNotConverged,
+        fmt::format("Not converged: {:.0f} % of the predicted outline lies near an edge of the robot in the "
+                    "pictures, expected at least {:.0f} %; check masks, robot and cameras' intrinsics.",
+                    100.0 * found.share * found.seen, 100.0 * limits::kLeastFound)};
+  }
+  // That nothing fits is said of many robots; this says why.
+  if (!doubts.implausible.empty()) {
+    return Objection{CalibrationState::kModelMisfit,
+                     "Model misfit: no robot is so wrong as the pictures ask for (" + doubts.implausible +
+                         "); something else is wrong with robot or cameras, or less is known of them than is believed "
+                         "(estimator.state)."};
+  }
+  if (!doubts.helps) {
+    return Objection{
+        CalibrationState::kNotConverged,
+        fmt::format(
+            "Not converged: on postures left out of the fit outlines lie {:.1f} px off on average, no nearer than "
+            "with robot and cameras as they are configured; nothing of it is to be applied.",
+            doubts.heldout_mean_px)};
+  }
+  const double after_px = result.outline_px.after / unit_px;
+  if (doubts.own_masks && after_px > limits::kOwnMasks_px) {
+    return Objection{
+        CalibrationState::kNotConverged,
+        fmt::format("Not converged: the masks were made about a prediction of the robot and lie {:.1f} px off "
+                    "the result, so that one of the two is wrong; give masks (vision.method: given) or say "
+                    "better where the cameras are.",
+                    result.outline_px.after)};
+  }
+  if (!doubts.unsettled.empty()) {
+    return Objection{
+        CalibrationState::kNotConverged,
+        fmt::format("Not converged: without masks the answer depends on how far from the prediction the robot's "
+                    "outline is looked for ({} moves by more than {:.0f} standard deviations); record more "
+                    "postures, or give masks (vision.method: given).",
+                    doubts.unsettled, limits::kSettled_sd)};
+  }
+  if (doubts.rival < limits::kOnly) {
+    return Objection{
+        CalibrationState::kNotConverged,
+        fmt::format("Not converged: another place of the camera explains the pictures nearly as well (misfit "
+                    "{:.2f} times as large); record more postures.",
+                    doubts.rival)};
+  }
+  return std::nullopt;
+}
+
+/// Whether postures agree, on something that may be.
+std::optional<Objection> objection_of_postures(const BatchFit& batch, std::ptrdiff_t told, const Calibration& result) {
+  if (result.postures < limits::kFewestPostures) {
+    return Objection{
+        CalibrationState::kNotConverged,
+        fmt::format("Not converged: {} distinct postures cannot contradict each other; record at least {}.",
+                    result.postures, limits::kFewestPostures)};
+  }
+  if (const auto wrong = beyond_belief(batch); !wrong.empty()) return Objection{CalibrationState::kModelMisfit, wrong};
+  if (result.dispersion > limits::kDisagreement) {
+    return Objection{
+        CalibrationState::kModelMisfit,
+        fmt::format("Model misfit: postures disagree by {:.1f} times what is claimed; run bodyschema diagnose "
+                    "on a moving log, and look at the overlays for masks that are wrong.",
+                    std::sqrt(result.dispersion))};
+  }
+  if (told == 0) {
+    return Objection{CalibrationState::kNotConverged,
+                     "Not converged: the pictures tell no joint's offset; record postures that differ more."};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+FoundOutlines found_outlines(LogFit& fit, const BatchFit& batch, std::span<const std::size_t> pictures,
+                             const std::vector<bool>& loose) {
+  const auto& log = fit.log();
+  const auto& links = log.setup().model.rendered_links;
+  const auto shown = log.parts_shown();
+  FoundOutlines result;
+  double all = 0.0, seen = 0.0, matched = 0.0;
+  OutlineEvidence evidence;
+  for (std::size_t part = 0; part < links.size(); ++part) {
+    if (!shown[part] || (!loose.empty() && loose[part])) continue;
+    double own = 0.0, own_matched = 0.0;
+    for (const auto p : pictures) {
+      const auto& picture = log.pictures()[p];
+      auto search = batch.searches()[picture.camera];
+      search.part_weight.assign(links.size(), 0.0);
+      search.part_weight[part] = 1.0;
+      fit.measurement().linearise(log.edges(p), picture.joints.q, batch.at().corrections[p], picture.camera, {}, search,
+                                  evidence);
+      own += evidence.sampled;
+      own_matched += evidence.matched;
+    }
+    all += own;
+    if (own_matched < limits::kHardlyFound * own) {
+      result.lost.push_back(links[part]);
+      continue;
+    }
+    seen += own;
+    matched += own_matched;
+  }
+  result.share = matched / std::max(1.0, seen);
+  result.seen = seen / std::max(1.0, all);
+  return result;
+}
+
+std::string beyond_belief(const BatchFit& batch) {
+  const auto& state = batch.state();
+  const Eigen::VectorXd away = (state.x() - state.prior_mean()).cwiseQuotient(state.prior_sd());
+  Eigen::Index worst = -1;
+  for (Eigen::Index k = state.joints(); k < state.size(); ++k) {
+    if (std::abs(away[k]) <= limits::kBeyondBelief_sd || (worst >= 0 && std::abs(away[k]) <= std::abs(away[worst])))
+      continue;
+    worst = k;
+  }
+  if (worst < 0) return {};
+  const auto& p = state.parameters()[static_cast<std::size_t>(worst)];
+  return fmt::format(
+      "Model misfit: the pictures ask for {} {:.3g} {}, {:.0f} times what is believed possible; it is further off "
+      "than that (estimator.state and the cameras' pose_sd_mm and pose_sd_deg say what is believed), or something "
+      "else is wrong with robot or cameras.",
+      p.name, state.x()[worst] / p.si_per_unit, p.unit, std::abs(away[worst]));
+}
+
+void judge(const BatchFit& batch, const Doubts& doubts, double unit_px, Calibration& result) {
+  for (const auto& joint : result.joints) {
+    if (!joint.told) result.remarks.push_back(joint.name + ": " + joint.untold_why);
+  }
+  for (const auto& link : doubts.found.lost) {
+    result.remarks.push_back(link + ": next to nothing of its outline is found; hidden, or part of the background");
+  }
+  const auto told =
+      std::count_if(result.joints.begin(), result.joints.end(), [](const auto& joint) { return joint.told; });
+  auto objection = objection_of_outlines(batch, doubts, unit_px, result);
+  if (!objection) objection = objection_of_postures(batch, told, result);
+  if (objection) {
+    result.state = objection->state;
+    result.sentence = std::move(objection->sentence);
+    return;
+  }
+  result.state = CalibrationState::kGood;
+  result.sentence = fmt::format(
+      "Good: {} of {} joints told; the hand is known to {:.1f} mm in the camera's frame (one sigma){}{}.", told,
+      result.joints.size(), 1e3 * result.hand_sd_m,
+      listed(result.joints, "; not told, and not to be applied: ", [](const auto& j) { return !j.applied; }),
+      listed(result.joints, "; hardly told, and to be applied with the rest all the same: ", [](const auto& j) {
+        return j.applied && !j.told;
+      }));
+}
+
+}  // namespace bodyschema
