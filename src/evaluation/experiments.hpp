@@ -54,5 +54,15 @@ void run_honesty(ExperimentContext& context, int most_logs);
 void run_everyday(ExperimentContext& context);
 void run_diagnosis(ExperimentContext& context);
 void run_live(ExperimentContext& context);
+using ExperimentRun = void (*)(ExperimentContext&);
+
+/// After each the summary is written to `file`, whatever becomes of the next one.
+void run_in_turn(std::span<const ExperimentRun> experiments, ExperimentContext& context,
+                 const std::filesystem::path& file);
+
+/// Where this program lies, and those that run_live starts.
+std::filesystem::path programs_folder();
+/// Throws FileError naming one that is not there.
+void check_live_programs(const std::filesystem::path& folder);
 
 }  // namespace bodyschema

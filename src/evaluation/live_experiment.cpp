@@ -40,11 +40,13 @@ constexpr double kLowest = 6.0, kHighest = 12.0;
 constexpr std::array<const char*, 7> kFaults = {"latency",     "slip",        "backlash",      "encoder_gain",
                                                 "link_length", "head_offset", "finger_posture"};
 
+constexpr const char *kService = "bodyschemad", *kRobot = "bodyschema-sim";
+
 /// A program that stands beside this one, its words in a file; ended with this.
 class Program {
  public:
   Program(std::vector<std::string> arguments, fs::path words) : words_(std::move(words)) {
-    arguments.front() = (fs::read_symlink("/proc/self/exe").parent_path() / arguments.front()).string();
+    arguments.front() = (programs_folder() / arguments.front()).string();
     std::vector<char*> argv;
     for (auto& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);
@@ -179,8 +181,7 @@ class Runs {
     });
     const auto configurations = context_.recorded / "icub_right";
     std::vector<std::string> arguments = {
-        "bodyschemad",       "--config", (configurations / "estimator.yaml").string(), "--lcm-url", url,
-        "--stop-after-idle", "3"};
+        kService, "--config", (configurations / "estimator.yaml").string(), "--lcm-url", url, "--stop-after-idle", "3"};
     for (const auto& choice : context_.options.overrides) arguments.insert(arguments.end(), {"--set", choice});
     Program service(std::move(arguments), folder_ / fmt::format("service_{}.txt", run.seed));
     const auto until = [&](auto condition, double limit_s) {
@@ -191,8 +192,8 @@ class Runs {
     constexpr double kStart_s = 60.0, kEnd_s = 120.0;
     if (!until([&] { return service.words().find("waiting for") != std::string::npos || !service.running(); },
                kStart_s))
-      throw DataError("bodyschemad did not start: " + service.words());
-    arguments = {"bodyschema-sim",
+      throw DataError(std::string(kService) + " did not start: " + service.words());
+    arguments = {kRobot,
                  "--config",
                  (configurations / "simulator.yaml").string(),
                  "--lcm-url",
@@ -208,8 +209,8 @@ class Runs {
     if (run.fault) arguments.insert(arguments.end(), {"--fault", run.fault->text()});
     Program robot(std::move(arguments), folder_ / fmt::format("robot_{}.txt", run.seed));
     until([&] { return !service.running(); }, kRun_s + kEnd_s);
-    if (!robot.running()) robot.check("bodyschema-sim");
-    if (!service.running()) service.check("bodyschemad");
+    if (!robot.running()) robot.check(kRobot);
+    if (!service.running()) service.check(kService);
   }
 
   ExperimentContext& context_;
@@ -239,6 +240,18 @@ Json json_of(const Run& run) {
 }
 
 }  // namespace
+
+fs::path programs_folder() {
+  return fs::read_symlink("/proc/self/exe").parent_path();
+}
+
+void check_live_programs(const fs::path& folder) {
+  for (const char* name : {kService, kRobot}) {
+    if (!fs::exists(folder / name)) {
+      throw FileError((folder / name).string() + ": no such program, and the experiment 'live' starts it");
+    }
+  }
+}
 
 void run_live(ExperimentContext& context) {
   const int asked = context.options.trials;

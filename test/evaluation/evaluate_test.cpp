@@ -5,10 +5,12 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <optional>
 
 #include "bodyschema/core/error.hpp"
+#include "experiments.hpp"
 #include "test_data.hpp"
 #include "temporary_folder.hpp"
 
@@ -79,6 +81,32 @@ TEST(Evaluate, ExperimentsThatRunAnotherNumberOfTrialsSaySo) {
                                                                       {"recording", "always one log"}}) {
     EXPECT_THAT(meanings.at(name), HasSubstr(words)) << name;
   }
+}
+
+TEST(Evaluate, AProgramThatIsNotThereIsNamedBeforeTheWork) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "bodyschemad") << "";
+  try {
+    check_live_programs(folder.path());
+    ADD_FAILURE() << "no error";
+  } catch (const FileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr((folder.path() / "bodyschema-sim").string() + ": no such program"));
+  }
+}
+
+TEST(Evaluate, WhatOneExperimentFoundIsThereWhenTheNextOneFails) {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "summary.json";
+  const auto configuration = Configuration::load(kConfigs / "icub_right/evaluation.yaml");
+  EvaluationOptions options;
+  Json summary;
+  std::string table;
+  Report report("two experiments");
+  ExperimentContext context{configuration, kConfigs, options, summary, table, report};
+  const std::vector<ExperimentRun> two = {[](ExperimentContext& c) { c.summary["first"] = 1; },
+                                          [](ExperimentContext&) { throw DataError("the second"); }};
+  EXPECT_THROW(run_in_turn(two, context, file), DataError);
+  EXPECT_EQ(Json::parse(std::ifstream(file))["first"], 1);
 }
 
 TEST(Evaluate, ARowOfHonestyThatDoesNotExistIsNamed) {
