@@ -106,6 +106,13 @@ CONDITIONS = {
     "fingers": {"room": "kitchen", "fingers_deg": 8},  # each finger somewhere else than its encoders say
     "glove": {"room": "kitchen", "glove_mm": 2.0},
     "stale": {"room": "kitchen", "right_late_ms": -100},  # the right picture is one behind
+    "monochrome": {"room": "kitchen", "monochrome": True},
+    "balance": {"room": "kitchen", "balance": 0.12},  # each camera's white wanders by this share, to and fro
+    "shakes": {"room": "kitchen", "shakes_px": 1.5},  # the neck sways, and no encoder says so
+    "jitter": {"room": "kitchen", "jitter_ms": 15},  # pictures are taken so much before or after their stamps
+    "post": {"room": "kitchen", "post": True},  # stands between eyes and arm
+    "frozen": {"room": "kitchen", "frozen": (12, 20)},  # the right camera sends its last picture again and again
+    "lamp": {"room": "kitchen", "lamp": 1.0},  # swings: shadows and shading with it
 }
 # What is wrong with the robot beside its offsets, for `bodyschema diagnose`.
 FAULTS = {
@@ -816,6 +823,15 @@ def add_cable(scene):
                                     rgba=[0.05, 0.05, 0.06, 1], contype=0, conaffinity=0)
 
 
+def add_post(scene, bare, motion):
+    """Upright, 16 mm thick, a little over half of the way from the eyes to where the hand is in the middle of the log."""
+    bare.set_joints(motion.at(bare.condition["seconds"] / 2))
+    eye = np.mean([bare.pose(k["link"])[:3, 3] for k in bare.cameras.values()], axis=0)
+    at = eye + 0.55 * (bare.pose(bare.own["hand_link"])[:3, 3] - eye)
+    scene.spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[0.008, 0, 0], contype=0, conaffinity=0,
+                                  fromto=[*at[:2], at[2] - 1.0, *at[:2], at[2] + 1.0], rgba=[0.5, 0.42, 0.35, 1])
+
+
 # ---- what cameras do to a picture ------------------------------------------------------------------
 
 class Exposure:
@@ -933,13 +949,15 @@ class Player:
         self.lenses = {name: Lens(k, self.scene.wide(k), self.condition.get("k1", 0))
                        for name, k in self.scene.cameras.items()}
         self.before = {}  # the last picture, by camera
+        self.sway = np.zeros(2)  # px
+        self.swing = self.scene.model.light_dir.copy()
         self.exposures = {name: Exposure(name) for name in self.scene.cameras}
         self.worn = {name: WornSensor(self.random, (k["width"], k["height"]))
                      for name, k in self.scene.cameras.items()} if self.condition.get("worn") else {}
 
     def build(self, robot, table_z):
         """The scene again, with its room and what moves in it."""
-        held, condition, bare = self.held, self.condition, self.bare
+        held, condition, bare, motion = self.held, self.condition, self.bare, self.motion
 
         class Furnished(Scene):
             def add_room(self, table_z):
@@ -954,6 +972,8 @@ class Player:
                         self.bodies[self.own["hand_link"]].add_geom(material="held", **held)
                 if condition.get("cable"):
                     add_cable(self)
+                if condition.get("post"):
+                    add_post(self, bare, motion)
                 if condition.get("person"):
                     person_parts(self.spec.worldbody.add_body(name="person", mocap=True, pos=[9, 9, 9]))
                 if condition.get("second_arm"):
@@ -998,14 +1018,20 @@ class Player:
         drawn = self.scene.draw(camera)
         if "gamma_light" in self.condition:
             drawn = to_light(drawn, self.condition)
-        picture = self.lenses[camera](drawn)
+        picture = self.lenses[camera](drawn) * self.balance(camera, t)
+        if "shakes_px" in self.condition:
+            picture = self.shaken(camera, picture)
         picture = cv2.GaussianBlur(picture, (0, 0), self.condition.get("blur", 0.45))
         if "gamma_light" in self.condition:
             picture = to_levels(picture, self.condition)
         picture = self.as_the_camera_has_it(camera, picture)
+        if self.condition.get("monochrome"):
+            picture = np.repeat(picture @ np.array([[0.299], [0.587], [0.114]]), 3, axis=-1)
         # Shot noise and read noise: bright pixels are noisier.
         sd = self.condition.get("noise", 1) * np.sqrt(1.2**2 + 0.03 * picture)
         picture = picture + sd * self.random.normal(0, 1, picture.shape)
+        if self.condition.get("monochrome"):
+            picture[..., 1:] = picture[..., :1]
         picture = np.clip(self.as_the_camera_sends_it(camera, picture), 0, 255)
         return np.round(picture).astype(np.uint8)
 
@@ -1018,6 +1044,18 @@ class Player:
         if haze:  # little contrast, and bright tones close together
             picture = 255 * (haze + (1 - haze) * np.clip(picture / 255, 0, 1) ** self.condition["gamma"])
         return with_fringes(picture, self.condition["fringes"]) if "fringes" in self.condition else picture
+
+    def balance(self, camera, t):
+        share, phase = self.condition.get("balance", 0), {"left": 0.0}.get(camera, 2.0)
+        return 1 + share * np.sin(2 * math.pi * t / 9 + phase + np.array([0, 2, 4]))
+
+    def shaken(self, camera, picture):
+        """Both pictures move alike, half of it from one to the next."""
+        if camera == next(iter(self.scene.cameras)):
+            sd = self.condition["shakes_px"]
+            self.sway = 0.5 * self.sway + math.sqrt(0.75) * self.random.normal(0, sd, 2)
+        M = np.array([[1, 0, self.sway[0]], [0, 1, self.sway[1]]])
+        return cv2.warpAffine(picture, M, picture.shape[1::-1], flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
     def as_the_camera_sends_it(self, camera, picture):
         sharpened, trails = self.condition.get("sharpened", 0), self.condition.get("trails", 0)
@@ -1041,6 +1079,10 @@ class Player:
             self.put("box", *box_pose(scene, self.motion, self.held, t, self.table_z))
         if self.condition.get("screen"):
             self.show(t)
+        if self.condition.get("lamp"):
+            a = self.condition["lamp"] * math.sin(2 * math.pi * t / 4)
+            turn = np.array([[math.cos(a), -math.sin(a), 0], [math.sin(a), math.cos(a), 0], [0, 0, 1]])
+            scene.model.light_dir[:] = self.swing @ turn.T
         scene.set_joints(self.motion.at(t))
 
     def put(self, name, at, q):
@@ -1064,15 +1106,22 @@ class Player:
         """Of both cameras: at once, or as `interlaced_ms` and `right_late_ms` say, every second row or one camera later."""
         later = {"right": self.condition.get("right_late_ms", 0) * 1e-3}
         field = self.condition.get("interlaced_ms", 0) * 1e-3
+        jitter = self.condition.get("jitter_ms", 0) * 1e-3
+        begin, end = self.condition.get("frozen", (0, 0))
+        off = self.random.normal(0, jitter) if jitter else 0.0
         pictures = []
         for camera in self.scene.cameras:
-            at = t + later.get(camera, 0)
+            at = max(0.0, t + later.get(camera, 0) + off)
+            if camera == "right" and begin < at <= end:
+                pictures.append(self.frozen)
+                continue
             self.place(at)
             picture = self.picture(camera, at)
             if field:
                 self.place(at + field)
                 picture[1::2] = self.picture(camera, at + field)[1::2]
             pictures.append(picture)
+        self.frozen = pictures[-1]
         return pictures
 
     def hand_poses(self):
