@@ -40,6 +40,10 @@ struct Source {
     set_up_logging(log_level);
     return Configuration::load(find_data_file(config), overrides);
   }
+  /// @param mapping  a file that says how to read the recording; empty: none
+  [[nodiscard]] ImportTarget target(const std::string& mapping) const {
+    return ImportTarget::from(load(), mapping.empty() ? "" : find_data_file(mapping));
+  }
 };
 
 /// One bar for work whose size is known once it has begun.
@@ -148,7 +152,7 @@ void add_stills(CLI::App& import) {
                    "When the first posture was taken, s since 1970; stamps begin at 0 without it")
       ->check(number_in(0.0, 8e9));
   command->callback([a] {
-    const ImportTarget target = ImportTarget::from(a->source.load(), a->mapping);
+    const ImportTarget target = a->source.target(a->mapping);
     std::optional<CameraPoses> poses;
     if (!a->camera_pose.empty()) poses = CameraPoses::from_argument(a->camera_pose);
     StillsImportOptions options;
@@ -218,7 +222,7 @@ void run_ros_bag(const BagArguments& a) {
                                  : options.masks)[key.substr(dash == std::string::npos ? 0 : dash + 1)] = topic;
     }
   }
-  const ImportTarget target = ImportTarget::from(a.source.load(), a.mapping);
+  const ImportTarget target = a.source.target(a.mapping);
   LazyBar bar;
   const auto summary = import_ros_bag(a.source.recording, target, options, a.source.out, say_set_up, std::ref(bar));
   bar.end();

@@ -14,7 +14,7 @@ namespace {
 constexpr double kErr_px = 2.0;    ///< outlines of a fit that is near err by less
 constexpr double kThick_px = 1.0;  ///< a piece is at least twice as thick: the ragged edge of a mask is none
 constexpr double kBlend_px = 3.0;  ///< so far from such a piece an outline may be part of it
-constexpr double kMost = 0.5;      ///< share of the postures in which what is fixed to a link shows
+constexpr double kMost = 0.5;      ///< share of the pictures in which what is fixed to a link shows
 
 void subtract(BinaryMask& mask, const BinaryMask& other) {
   for (int v = 0; v < mask.height(); ++v) {
@@ -86,14 +86,20 @@ BeyondModel beyond_model(const PictureLog& log, std::span<const Corrections> cor
       held[l] += meet(part, more);
     }
   }
-  std::size_t most = 0;
-  for (std::size_t l = 1; l < links; ++l) {
-    if (held[l] * std::max(1.0, seen[most]) > held[most] * std::max(1.0, seen[l])) most = l;
-  }
-  if (links > 0 && held[most] > kMost * static_cast<double>(pictures.size())) {
-    result.on_link = log.setup().model.rendered_links[most];
+  if (const auto link = link_that_holds(held, seen, pictures.size())) {
+    result.on_link = log.setup().model.rendered_links[*link];
   }
   return result;
+}
+
+std::optional<std::size_t> link_that_holds(std::span<const double> held, std::span<const double> seen,
+                                           std::size_t pictures) {
+  std::optional<std::size_t> most;
+  for (std::size_t l = 0; l < held.size(); ++l) {
+    if (held[l] <= kMost * static_cast<double>(pictures)) continue;
+    if (!most || held[l] * seen[*most] > held[*most] * seen[l]) most = l;
+  }
+  return most;
 }
 
 void leave_out(PictureLog& log, const BeyondModel& beyond) {

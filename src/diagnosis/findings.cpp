@@ -194,12 +194,14 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
     auto& out = report_.samples[p].*which;
     out = {};
     out.apparent_deg.assign(roles.arm.size(), 0.0);
+    report_.samples[p].noise = out;
     found += evidence.matched;
     sampled += evidence.sampled;
     if (log.precision[p] <= 0.0) continue;
     where_seen += evidence.matched;
     sampled_seen += evidence.sampled;
-    const Eigen::VectorXd b = left_of(log, p, held.replicas.col(static_cast<Eigen::Index>(log.block_of[p])), out);
+    Eigen::VectorXd x = held.replicas.col(static_cast<Eigen::Index>(log.block_of[p]));
+    const Eigen::VectorXd b = left_of(log, p, x, out);
     const double own = out.rms_px * out.rms_px * evidence.weight;
     square += own;
     weight += evidence.weight;
@@ -213,6 +215,13 @@ HeldoutError Findings::remainders(const LogAbout& log, const BlockRegression& ba
     out.hand_C_m = measurement.projection().hand().translation();
     hand += moved.head<3>().squaredNorm();
     turn += moved.tail<3>().squaredNorm();
+    if (which != &ResidualSample::after) continue;
+    // A curve that nothing explains is no part of the extended model: charts of what that leaves show it.
+    report_.samples[p].noise = out;
+    for (std::size_t c = 0; c < search_.causes().size(); ++c) {
+      if (search_.causes()[c].generic()) x(search_.columns_of(c)).setZero();
+    }
+    left_of(log, p, x, out);
   }
   const auto share = [](double part, double of) { return of > 0.0 ? part / of : 0.0; };
   if (weight <= 0.0) return {.outline_found = share(found, sampled), .outline_where_seen = 0.0};
@@ -283,7 +292,6 @@ void Findings::conclude(const LogAbout& log, const std::vector<Candidate>& candi
   report_.blocks = log.blocks;
   report_.block_s = log.block_s;
   report_.after = remainders(log, all, &ResidualSample::after);
-  for (auto& sample : report_.samples) sample.noise = sample.after;
   report_.extended_model = state.model();
   covariance_ = all.covariance();
   report_.extended_model->set_uncertainty(uncertainty());

@@ -43,8 +43,7 @@ class Findings {
   /// What is left of every picture, predicted from the other blocks.
   HeldoutError remainders(const LogAbout& log, const BlockRegression& base, Which which);
   /// ... of one. @param x  the base's parameters (steps) @return the gradient over all coordinates
-  [[nodiscard]] Eigen::VectorXd left_of(const LogAbout& log, std::size_t picture, const Eigen::VectorXd& x,
-                                        Remainder& out);
+  Eigen::VectorXd left_of(const LogAbout& log, std::size_t picture, const Eigen::VectorXd& x, Remainder& out);
   [[nodiscard]] AgreedMotionSettings motion_settings() const;
   /// Of a joint's reading, over all coordinates; nothing of the others.
   [[nodiscard]] Eigen::VectorXd encoder_variance() const;

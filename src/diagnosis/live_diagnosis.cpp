@@ -340,6 +340,7 @@ struct LiveDiagnosis::Impl {
   void begin_anew() {
     waiting = {};
     waiting.anew = true;
+    outdated = looking.valid();
     encoders.clear();
     last.clear();
     said = {};
@@ -398,6 +399,7 @@ struct LiveDiagnosis::Impl {
     if (!looking.valid() || seconds(now - look_utime) < kAnswer_s) return false;
     if (!waits && looking.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
     auto found = looking.get();
+    if (std::exchange(outdated, false)) return false;
     if (!found) {
       // Of pictures that are long gone nothing is said any more.
       if (said.causes.empty() || seconds(now - said.utime) <= kWindow_s) return false;
@@ -447,6 +449,7 @@ struct LiveDiagnosis::Impl {
   std::vector<Finding> last;  ///< by the last look
   LiveFindings said;
   std::future<std::optional<LiveFindings>> looking;
+  bool outdated = false;    ///< it looks at pictures from before encoders began anew
   BackgroundWorker worker;  ///< last: it ends before what it works on
 };
 

@@ -106,9 +106,10 @@ Eigen::MatrixXd read_covariance(const YAML::Node& node, const std::string& origi
         correlation(i, j) = correlation(j, i) = r;
       }
     }
+    if (n == 0) return correlation;
     constexpr double kRounding = 1e-6;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation, Eigen::EigenvaluesOnly);
-    if (n > 0 && eigen.eigenvalues()(0) < -kRounding) {
+    if (eigen.eigenvalues()(0) < -kRounding) {
       fail(origin, node.Mark(), "'correlations': contradict each other, expected those of some numbers");
     }
   }

@@ -8,6 +8,7 @@ void Keyframes::keep(const Frame& frame, std::uint64_t block, const PostureMemor
   const auto kept = memory.blocks();
   std::erase_if(frames_,
                 [&](const auto& item) { return std::find(kept.begin(), kept.end(), item.first) == kept.end(); });
+  not_found_.clear();  // the estimate has learned something, and may be nearer
   auto& keyframe = frames_[block];
   keyframe.frame = frame;
   keyframe.frame.shown = shown;
@@ -22,16 +23,25 @@ void Keyframes::keep(const Frame& frame, std::uint64_t block, const PostureMemor
   }
 }
 
-void Keyframes::look_again(PostureMemory& memory, OutlineFitter& fitter) const {
+void Keyframes::look_again(PostureMemory& memory, OutlineFitter& fitter) {
   constexpr int kAtOnce = 2;
   for (int i = 0; i < kAtOnce; ++i) {
-    const auto stale = memory.most_stale();
-    const auto keyframe = stale ? frames_.find(stale->block) : frames_.end();
-    if (keyframe == frames_.end()) return;
-    const auto first = fitter.about(keyframe->second.frame, stale->x);
-    if (!first) return;
-    memory.relinearise(stale->block, *first, stale->x);
+    const auto stale = memory.most_stale(not_found_);
+    if (!stale) return;
+    const auto keyframe = frames_.find(stale->block);
+    const auto first =
+        keyframe != frames_.end() ? fitter.about(keyframe->second.frame, stale->x) : std::optional<Quadratic>();
+    if (first) {
+      memory.relinearise(stale->block, *first, stale->x);
+    } else {
+      not_found_.push_back(stale->block);
+    }
   }
+}
+
+void Keyframes::forget() {
+  frames_.clear();
+  not_found_.clear();
 }
 
 }  // namespace bodyschema

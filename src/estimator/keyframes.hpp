@@ -17,8 +17,8 @@ class Keyframes {
   /// @param shown  whether its pictures, which are not kept, showed the robot's outline
   void keep(const Frame& frame, std::uint64_t block, const PostureMemory& memory, bool shown);
   /// Linearises anew what was linearised far from where the estimate is by now, a little in every frame.
-  void look_again(PostureMemory& memory, OutlineFitter& fitter) const;
-  void forget() { frames_.clear(); }
+  void look_again(PostureMemory& memory, OutlineFitter& fitter);
+  void forget();
 
  private:
   struct Keyframe {
@@ -26,6 +26,7 @@ class Keyframes {
     std::vector<CameraObservation> pictures;  ///< per camera: masks, not the pictures themselves
   };
   std::map<std::uint64_t, Keyframe> frames_;  ///< by the memory's blocks
+  std::vector<std::uint64_t> not_found_;      ///< blocks whose outlines were not found about the estimate
 };
 
 }  // namespace bodyschema

@@ -9,7 +9,10 @@
 namespace bodyschema {
 
 void ReadingNoise::read(std::span<const JointSample> encoders, bool begin_anew) {
-  if (begin_anew) last_.clear();
+  if (begin_anew) {
+    last_.clear();
+    fresh_ = 0;
+  }
   last_.insert(last_.end(), encoders.begin(), encoders.end());
   fresh_ += encoders.size();
   if (fresh_ < limits::kReadings) return;

@@ -19,6 +19,7 @@ bool StalledEncoders::Track::goes_on() const {
 
 std::vector<StalledEncoders::Resumed> StalledEncoders::look(const Eigen::VectorXd& reading_rad, double time_s) {
   std::vector<Resumed> again;
+  bool moved = false;
   for (Eigen::Index k = 0; k < reading_rad.size(); ++k) {
     Track& track = tracks_[static_cast<std::size_t>(k)];
     if (track.known && std::abs(track.reading_rad - reading_rad(k)) <= kStands_rad) continue;
@@ -28,8 +29,10 @@ std::vector<StalledEncoders::Resumed> StalledEncoders::look(const Eigen::VectorX
     track.reading_rad = reading_rad(k);
     track.since_s = time_s;
     track.known = true;
-    for (auto& other : tracks_) other.others_moved |= &other != &track;
+    moved = true;
   }
+  // Of those that moved together none has stood while others did.
+  for (auto& track : tracks_) track.others_moved |= moved && track.since_s != time_s;
   return again;
 }
 

@@ -2,17 +2,14 @@
 
 #include <spdlog/fmt/fmt.h>
 #include <time.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <fstream>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <thread>
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
@@ -21,6 +18,8 @@
 #include "bodyschema/diagnosis/log_diagnosis.hpp"
 #include "bodyschema/simulator/random.hpp"
 #include "bodyschema/simulator/recording.hpp"
+#include "in_parallel.hpp"
+#include "scratch.hpp"
 
 namespace bodyschema::diagnosis_trials {
 namespace {
@@ -232,15 +231,14 @@ class TrialRobot {
 };
 
 Outcome TrialRobot::outcome_of(const Kind& kind, simulator::SimulationPlan plan, bool fit_only) const {
-  static std::atomic<int> number{0};
-  const auto file = fs::temp_directory_path() / fmt::format("bodyschema_{}_diagnosis_{}.log", getpid(), number++);
+  const Scratch log("diagnosis.log");
   plan.seconds = kind.size.seconds;
   if (kind.masks) plan.output = simulator::Output::kSilhouettes;
   const double begin_s = processor_s();
-  const auto truth = simulate(kind, {robot_, setup_, rig_, kind.settings, plan}, file);
+  const auto truth = simulate(kind, {robot_, setup_, rig_, kind.settings, plan}, log.path());
   const double simulated_s = processor_s();
   LogDiagnosisOptions options;
-  options.log = file;
+  options.log = log.path();
   options.picture_rate_hz = kind.size.rate_hz;
   options.threads = 1;  // other logs run beside this one
   options.quiet = true;
@@ -255,8 +253,6 @@ Outcome TrialRobot::outcome_of(const Kind& kind, simulator::SimulationPlan plan,
   }
   outcome.simulation_s = simulated_s - begin_s;
   outcome.diagnosis_s = processor_s() - simulated_s;
-  std::error_code error;
-  fs::remove(file, error);
   outcome.size_mm = hand_error_mm(outcome.report, truth, &ResidualSample::before);
   outcome.left_mm = hand_error_mm(outcome.report, truth, &ResidualSample::after);
   outcome.size_px = outcome.report.before.rms_px;  // the noise of healthy logs comes off once that is known
@@ -548,36 +544,20 @@ std::vector<Json> run(ExperimentContext& context) {
     const std::chrono::duration<double, std::ratio<60>> passed = std::chrono::steady_clock::now() - begin;
     return options.minutes > 0.0 && passed.count() >= options.minutes;
   };
-  std::atomic<std::size_t> next{0}, done{0};
   std::mutex mutex;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    for (std::size_t i; !is_over() && (i = next++) < jobs.size();) {
-      Json line;
-      if (!lines.has(i)) {
-        try {
-          auto outcome = (jobs[i].official ? *official : own).run(jobs[i].row, jobs[i].seed);
-          outcome.official = jobs[i].official;
-          outcome.masks = options.masks;
-          line = line_of(outcome);
-        } catch (...) {
-          const std::scoped_lock lock(mutex);
-          failure = std::current_exception();
-          next = jobs.size();
-        }
-      }
-      const std::scoped_lock lock(mutex);
-      if (!line.is_null()) lines.set(i, std::move(line));
-      bar.set(++done);
+  in_parallel(jobs.size(), options.threads, [&](std::size_t i) {
+    if (is_over()) return;
+    Json line;
+    if (!lines.has(i)) {
+      auto outcome = (jobs[i].official ? *official : own).run(jobs[i].row, jobs[i].seed);
+      outcome.official = jobs[i].official;
+      outcome.masks = options.masks;
+      line = line_of(outcome);
     }
-  };
-  const int wanted =
-      options.threads > 0 ? options.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  std::vector<std::jthread> threads;
-  for (int t = 1; t < wanted; ++t) threads.emplace_back(work);
-  work();
-  threads.clear();
-  if (failure) std::rethrow_exception(failure);
+    const std::scoped_lock lock(mutex);
+    if (!line.is_null()) lines.set(i, std::move(line));
+    bar.advance(1);
+  });
   return lines.finish();
 }
 

@@ -1,6 +1,7 @@
 #include "bodyschema/evaluation/evaluate.hpp"
 
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/fmt/ranges.h>
 
 #include <algorithm>
 #include <limits>
@@ -86,6 +87,18 @@ const std::vector<std::pair<std::string, std::string>>& experiment_names() {
   return names;
 }
 
+bool is_asked_for(const EvaluationOptions& options, const std::string& row) {
+  return options.rows.empty() || std::find(options.rows.begin(), options.rows.end(), row) != options.rows.end();
+}
+
+void check_rows(const EvaluationOptions& options, const std::vector<std::string>& names) {
+  for (const auto& row : options.rows) {
+    if (std::find(names.begin(), names.end(), row) != names.end()) continue;
+    throw ConfigurationError("--rows: " + options.experiment + " has no row '" + row + "'; did you mean '" +
+                             nearest_name(row, names) + "'?");
+  }
+}
+
 void run_in_turn(std::span<const ExperimentRun> experiments, ExperimentContext& context,
                  const std::filesystem::path& file) {
   for (const auto run : experiments) {
@@ -101,6 +114,11 @@ std::string evaluate(const Configuration& simulated, const std::filesystem::path
   if (std::find(names.begin(), names.end(), options.experiment) == names.end()) {
     throw ConfigurationError("experiment '" + options.experiment + "' is not known; did you mean '" +
                              nearest_name(options.experiment, names) + "'?");
+  }
+  const auto has_rows = {"everyday", "honesty", "real"};
+  if (!options.rows.empty() && std::find(has_rows.begin(), has_rows.end(), options.experiment) == has_rows.end()) {
+    throw ConfigurationError(
+        fmt::format("--rows: '{}' has no rows; expected with {}", options.experiment, fmt::join(has_rows, ", ")));
   }
   // Whoever reads a section knows its keys; a mistyped one is an error before the work, not after.
   const Pipeline reader(simulated);

@@ -2,14 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <mutex>
 #include <random>
-#include <thread>
 
 #include "bodyschema/core/error.hpp"
-#include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/evaluation/everyday.hpp"
 #include "bodyschema/evaluation/statistics.hpp"
@@ -17,6 +13,7 @@
 #include "bodyschema/simulator/scenes.hpp"
 #include "bodyschema/simulator/simulator.hpp"
 #include "experiments.hpp"
+#include "in_parallel.hpp"
 
 /// What pictures of a working laboratory do to the whole chain, from picture to estimate: each row is one condition,
 /// played by the simulator, and nobody tells the estimator which.
@@ -148,28 +145,10 @@ std::vector<EverydayFrame> play(const ExperimentContext& context, const Everyday
 std::vector<EverydayLog> play_all(const ExperimentContext& context, const std::vector<EverydayRun>& jobs) {
   std::vector<EverydayLog> logs(jobs.size());
   ProgressBar bar("everyday pictures", jobs.size());
-  std::atomic<std::size_t> next{0};
-  std::mutex mutex;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    for (std::size_t i; (i = next++) < jobs.size();) {
-      try {
-        logs[i] = judge_everyday(play(context, jobs[i]), kFirstCounted);
-        bar.advance(1);
-      } catch (...) {
-        const std::scoped_lock lock(mutex);
-        failure = std::current_exception();
-        next = jobs.size();
-      }
-    }
-  };
-  const int cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  const int count = context.options.threads > 0 ? context.options.threads : cores;
-  std::vector<std::thread> threads;
-  for (int i = 1; i < count; ++i) threads.emplace_back(work);
-  work();
-  for (auto& thread : threads) thread.join();
-  if (failure) std::rethrow_exception(failure);
+  in_parallel(jobs.size(), context.options.threads, [&](std::size_t i) {
+    logs[i] = judge_everyday(play(context, jobs[i]), kFirstCounted);
+    bar.advance(1);
+  });
   return logs;
 }
 
@@ -204,24 +183,15 @@ EverydayLog judge_everyday(const std::vector<EverydayFrame>& frames, int first_c
 }
 
 void run_everyday(ExperimentContext& context) {
-  for (const auto& name : context.options.rows) {
-    const bool known = std::any_of(kEverydayRows.begin(), kEverydayRows.end(),
-                                   [&](const EverydayRow& row) { return name == row.name; });
-    if (known) continue;
-    std::vector<std::string> names;
-    for (const auto& row : kEverydayRows) names.emplace_back(row.name);
-    throw ConfigurationError("--rows: everyday has no row '" + name + "'; did you mean '" + nearest_name(name, names) +
-                             "'?");
-  }
+  std::vector<std::string> names;
+  for (const auto& row : kEverydayRows) names.emplace_back(row.name);
+  check_rows(context.options, names);
   const bool among_all = context.options.experiment == "all";
   const int trials = among_all ? std::min(context.options.trials, kMostEverydayTrials) : context.options.trials;
   const bool official = !context.options.data.empty() && fs::exists(context.options.data / "icub-models");
   std::vector<EverydayRun> jobs;
   for (const auto& row : kEverydayRows) {
-    if (!context.options.rows.empty() &&
-        std::find(context.options.rows.begin(), context.options.rows.end(), row.name) == context.options.rows.end()) {
-      continue;
-    }
+    if (!is_asked_for(context.options, row.name)) continue;
     for (int t = 0; t < trials; ++t) {
       const bool theirs = official && t % 2 == 1;
       jobs.push_back({&row, theirs ? "icub_v2_5" : "icub_right", context.options.seed + static_cast<std::uint64_t>(t)});

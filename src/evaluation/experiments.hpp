@@ -1,6 +1,8 @@
 #pragma once
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -54,6 +56,11 @@ void run_honesty(ExperimentContext& context, int most_logs);
 void run_everyday(ExperimentContext& context);
 void run_diagnosis(ExperimentContext& context);
 void run_live(ExperimentContext& context);
+/// Whether a row of an experiment is asked for: by its name, or as no row is named.
+bool is_asked_for(const EvaluationOptions& options, const std::string& row);
+/// Throws ConfigurationError for a row that is asked for and is none of these.
+void check_rows(const EvaluationOptions& options, const std::vector<std::string>& names);
+
 using ExperimentRun = void (*)(ExperimentContext&);
 
 /// After each the summary is written to `file`, whatever becomes of the next one.

@@ -8,7 +8,6 @@
 #include <random>
 
 #include "bodyschema/core/error.hpp"
-#include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/core/write_file.hpp"
 #include "bodyschema/evaluation/statistics.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
@@ -217,6 +216,8 @@ std::string frames_line(const char* row, const TrialRecord& trial, const Honesty
   return json.dump() + '\n';
 }
 
+constexpr const char* kHealthy = "healthy";
+
 void add_healthy(ExperimentContext& context, const Configuration& estimator, int count, Json& summary,
                  std::vector<HonestyLog>& all, std::string& frames) {
   std::vector<Contestant> contestants = {{"tolerances", options_for(context, "best")},
@@ -232,15 +233,15 @@ void add_healthy(ExperimentContext& context, const Configuration& estimator, int
   std::vector<HonestyLog> with, without;
   for (const auto& record : records) {
     with.push_back(honesty_log(record, 0));
-    summary["each_log"].push_back(log_json("healthy", record, with.back()));
-    frames += frames_line("healthy", record, with.back());
+    summary["each_log"].push_back(log_json(kHealthy, record, with.back()));
+    frames += frames_line(kHealthy, record, with.back());
     without.push_back(honesty_log(record, 1));
   }
   const auto figures = honesty_figures(pointers(with)), exact = honesty_figures(pointers(without));
-  summary["healthy"] = to_json(figures);
-  summary["healthy"]["half_width95_median_deg"] = exact.half_width95_median_deg;  // what is asked of exact robots
+  summary[kHealthy] = to_json(figures);
+  summary[kHealthy]["half_width95_median_deg"] = exact.half_width95_median_deg;  // what is asked of exact robots
   summary["exact"] = to_json(exact);
-  add_line(context, "healthy", figures);
+  add_line(context, kHealthy, figures);
   add_line(context, "healthy, nothing tolerated", exact);
   context.table += fmt::format(
       "  converged within 45 frames in {:.0f} %; nothing tolerated: {:.0f} %, half-width {:.3f} deg\n",
@@ -255,31 +256,13 @@ struct HonestyRun {
   bool twice;
 };
 
-constexpr const char* kHealthy = "healthy";
-
-bool wanted(const ExperimentContext& context, const std::string& row) {
-  const auto& rows = context.options.rows;
-  return rows.empty() || std::find(rows.begin(), rows.end(), row) != rows.end();
-}
-
-/// Throws ConfigurationError for a row that does not exist.
-void check_rows(const ExperimentContext& context) {
-  std::vector<std::string> names = {kHealthy};
-  for (const auto& row : kHonestyRows) names.emplace_back(row.key);
-  for (const auto& name : context.options.rows) {
-    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
-    throw ConfigurationError("--rows: honesty has no row '" + name + "'; did you mean '" + nearest_name(name, names) +
-                             "'?");
-  }
-}
-
 /// Errors in turn; of each, every fourth log draws at twice the size. A log's seed does not depend on which rows are
 /// asked for.
 std::vector<HonestyRun> jobs_of(const ExperimentContext& context, std::uint64_t first, std::size_t faulty) {
   std::vector<HonestyRun> jobs;
   for (std::size_t t = 0; t < faulty; ++t) {
     const HonestyRow& row = kHonestyRows[t % kHonestyRows.size()];
-    if (wanted(context, row.key)) {
+    if (is_asked_for(context.options, row.key)) {
       jobs.push_back({&row, first + t, (t / kHonestyRows.size() + t) % kEveryFourth == kEveryFourth - 1});
     }
   }
@@ -325,7 +308,9 @@ double add_rows(ExperimentContext& context, Json& summary, const std::vector<Hon
 }  // namespace
 
 void run_honesty(ExperimentContext& context, int most_logs) {
-  check_rows(context);
+  std::vector<std::string> names = {kHealthy};
+  for (const auto& row : kHonestyRows) names.emplace_back(row.key);
+  check_rows(context.options, names);
   const Configuration estimator =
       Configuration::load(context.recorded / "icub_right/honesty.yaml", context.options.overrides);
   const auto logs = static_cast<std::size_t>(std::min(2 * context.options.trials, most_logs));
@@ -336,7 +321,7 @@ void run_honesty(ExperimentContext& context, int most_logs) {
   std::vector<HonestyLog> all, usual, twice, logs_of;
   std::string frames;
   double worst_ratio = 0.0;
-  if (wanted(context, kHealthy)) {
+  if (is_asked_for(context.options, kHealthy)) {
     add_healthy(context, estimator, static_cast<int>(healthy), summary, all, frames);
     worst_ratio = summary[kHealthy]["sd_to_error_median"];
   }

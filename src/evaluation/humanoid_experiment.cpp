@@ -1,5 +1,4 @@
 #include <spdlog/fmt/fmt.h>
-#include <unistd.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -18,6 +17,7 @@
 #include "experiments.hpp"
 #include "humanoid_view.hpp"
 #include "real_trial.hpp"
+#include "scratch.hpp"
 
 /// A physical humanoid that looks at its own two hands with one camera in its head (Unitree G1): sixteen episodes, each
 /// calibrated alone, then half of them together. Nobody knows its true offsets. What is measured: whether the answers
@@ -53,14 +53,7 @@ double scatter(const std::vector<double>& values) {
 class HumanoidExperiment {
  public:
   explicit HumanoidExperiment(ExperimentContext& context)
-      : context_(context), set_(context.options.data / "real" / "g1"),
-        work_(fs::temp_directory_path() / fmt::format("bodyschema_{}_g1", getpid())) {}
-  ~HumanoidExperiment() {
-    std::error_code error;
-    fs::remove_all(work_, error);
-  }
-  HumanoidExperiment(const HumanoidExperiment&) = delete;
-  HumanoidExperiment& operator=(const HumanoidExperiment&) = delete;
+      : context_(context), set_(context.options.data / "real" / "g1") {}
 
   void run() {
     if (!fs::exists(set_)) return;
@@ -87,7 +80,7 @@ class HumanoidExperiment {
   static Configuration configuration() { return Configuration::load(find_data_file("config/g1/estimator.yaml")); }
 
   void answer(const std::set<std::int64_t>& episodes) {
-    const auto out = LerobotOutput::of(work_ / "logs");
+    const auto out = LerobotOutput::of(work_.path() / "logs");
     import(episodes, out);
     ProgressBar bar("G1", episodes.size());
     for (const auto episode : episodes) {
@@ -106,7 +99,7 @@ class HumanoidExperiment {
   [[nodiscard]] Answer answer_of(std::int64_t episode, const fs::path& log, double rate_hz) const {
     CalibrationOptions options;
     options.log = log;
-    options.out = work_ / fmt::format("calibration_{}", episode);
+    options.out = work_.path() / fmt::format("calibration_{}", episode);
     options.picture_rate_hz = rate_hz;
     options.quiet = true;
     Answer answer{episode, calibrate(configuration(), options), view_.nominal()};
@@ -125,7 +118,7 @@ class HumanoidExperiment {
     for (std::size_t half = 0; half < 2; ++half) {
       std::set<std::int64_t> own;
       for (std::size_t i = half; i < all.size(); i += 2) own.insert(all[i]);
-      const auto out = LerobotOutput::of(work_ / fmt::format("half_{}.lcmlog", half));
+      const auto out = LerobotOutput::of(work_.path() / fmt::format("half_{}.lcmlog", half));
       import(own, out);
       const auto& answer =
           halves.emplace_back(answer_of(-1 - static_cast<std::int64_t>(half), out.path, kRateTogether_hz));
@@ -345,7 +338,8 @@ class HumanoidExperiment {
   }
 
   ExperimentContext& context_;
-  fs::path set_, work_;
+  fs::path set_;
+  Scratch work_{"g1"};
   HumanoidView view_{configuration()};
   std::vector<DrawnPicture> drawn_;
   std::map<std::int64_t, JointTable> tables_;

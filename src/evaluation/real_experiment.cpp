@@ -1,5 +1,4 @@
 #include <spdlog/fmt/fmt.h>
-#include <unistd.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -12,7 +11,6 @@
 #include <thread>
 
 #include "bodyschema/core/error.hpp"
-#include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/core/progress_bar.hpp"
 #include "bodyschema/evidence/outline_distance.hpp"
 #include "bodyschema/imports/camera_pose_file.hpp"
@@ -24,6 +22,8 @@
 #include "experiments.hpp"
 #include "outline_figure.hpp"
 #include "real_trial.hpp"
+#include "in_parallel.hpp"
+#include "scratch.hpp"
 
 /// Photographs of physical robots, calibrated from pictures and intrinsics alone.
 ///
@@ -53,23 +53,6 @@ constexpr const char* kBoard = "panda_1";
 constexpr const char* kHumanoid = "g1";
 /// How far off the camera is where it is said to be known roughly.
 constexpr double kRough_deg = 5.0, kRough_m = 0.05;
-
-/// A folder for work that is gone at the end.
-class WorkFolder {
- public:
-  explicit WorkFolder(const std::string& name)
-      : path_(fs::temp_directory_path() / fmt::format("bodyschema_{}_{}", getpid(), name)) {}
-  ~WorkFolder() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 struct PoseDifference {
   double mm = 0.0, deg = 0.0, turn_deg = 0.0;
@@ -204,21 +187,16 @@ class RealExperiment {
     context_.table +=
         "witness: masks and depth; medians. Others' poses with the encoders as they are; ours with offsets hidden, "
         "before and after.\n";
-    if (wanted(kBoard)) board();
-    if (wanted(kHumanoid)) run_humanoid(context_);
+    if (is_asked_for(context_.options, kBoard)) board();
+    if (is_asked_for(context_.options, kHumanoid)) run_humanoid(context_);
   }
 
  private:
-  [[nodiscard]] bool wanted(const std::string& row) const {
-    const auto& rows = context_.options.rows;
-    return rows.empty() || std::find(rows.begin(), rows.end(), row) != rows.end();
-  }
   void each_set(const std::function<void(const Demand&)>& visit) const {
     for (const auto& demand : kSets) {
-      if (wanted(demand.set)) visit(demand);
+      if (is_asked_for(context_.options, demand.set)) visit(demand);
     }
   }
-  [[nodiscard]] std::string work_of(const std::string& name) { return fmt::format("{}_{}", name, works_++); }
 
   RealTrial trial(const Demand& demand, std::uint64_t seed, std::vector<std::int64_t> postures, bool masks = true,
                   std::vector<std::string> overrides = {}) {
@@ -226,7 +204,7 @@ class RealExperiment {
         .set = data_ / demand.set, .urdf = lbr_, .masks = masks, .overrides = std::move(overrides)};
     options.hidden.offsets_deg = draw_offsets(options.set, seed, kInjected_sd_deg);
     options.hidden.postures = std::move(postures);
-    const WorkFolder work(work_of(demand.set));
+    const Scratch work(demand.set);
     return run_real_trial(options, work.path());
   }
 
@@ -323,7 +301,7 @@ class RealExperiment {
     std::ifstream in(set / "camera_pose.json");
     const auto poses = nlohmann::json::parse(in).at("X_base_optical");
     for (const auto& [method, cameras] : poses.items()) {
-      const WorkFolder work(work_of(demand.set));
+      const Scratch work(demand.set);
       StarterOptions starter;
       starter.urdf = lbr_;
       starter.stills = set;
@@ -335,7 +313,7 @@ class RealExperiment {
       Pipeline pipeline(configuration);
       WatchedLog watched =
           watch_log(pipeline, {.log = work.path() / "log", .picture_rate_hz = 5.0, .kept = 0, .quiet = true}, false);
-      LogFit fit(watched.pictures, threads());
+      LogFit fit(watched.pictures, thread_count(0));
       const double px = median_outline_distance_px(fit, ErrorModel(watched.pictures.roles()));
       const auto published = CameraPoses::read(set / "camera_pose.json", method);
       const auto mm = depth_mm(demand, pipeline, published.X_base_optical.begin()->second, {}, {});
@@ -418,7 +396,7 @@ class RealExperiment {
     const fs::path set = data_ / "panda_1";
     const auto corners = read_checkerboard(set / "checkerboard.csv");
     RealTrialOptions options{.set = set, .urdf = data_ / "robots" / "panda" / "panda.urdf", .masks = false};
-    const WorkFolder work(work_of("panda_1"));
+    const Scratch work("panda_1");
     const auto trial = run_real_trial(options, work.path());
     const auto& c = trial.calibration;
     const auto table = JointTable::read(set);
@@ -452,12 +430,9 @@ class RealExperiment {
                                            {"lag_sd_ms", lag_sd_ms},         {"state", to_string(c.state)}};
   }
 
-  [[nodiscard]] static int threads() { return static_cast<int>(std::max(1u, std::thread::hardware_concurrency())); }
-
   ExperimentContext& context_;
   fs::path data_, lbr_;
   int trials_;
-  int works_ = 0;
   std::map<std::string, RealTrial> ours_;
 };
 
@@ -466,11 +441,7 @@ class RealExperiment {
 void run_real(ExperimentContext& context) {
   std::vector<std::string> names = {kBoard, kHumanoid};
   for (const auto& demand : kSets) names.emplace_back(demand.set);
-  for (const auto& name : context.options.rows) {
-    if (context.options.experiment != "real" || std::find(names.begin(), names.end(), name) != names.end()) continue;
-    throw ConfigurationError("--rows: real has no row '" + name + "'; did you mean '" + nearest_name(name, names) +
-                             "'?");
-  }
+  check_rows(context.options, names);
   RealExperiment(context).run();
 }
 

@@ -1,5 +1,4 @@
 #include <spdlog/fmt/fmt.h>
-#include <unistd.h>
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/imports/yarp_import.hpp"
@@ -14,6 +13,7 @@
 #include "experiments.hpp"
 #include "honesty_figures.hpp"
 #include "official_hand.hpp"
+#include "scratch.hpp"
 
 namespace bodyschema {
 namespace {
@@ -41,23 +41,6 @@ struct RecordingResult {
   std::vector<Eigen::VectorXd> offsets;  ///< deg, frame by frame (Fig. 9)
   HonestyLog honesty;                    ///< frame by frame
   Image overlay;                         ///< last frame with and without correction (Fig. 10)
-};
-
-/// A log that goes when the experiment ends.
-class ScratchFile {
- public:
-  explicit ScratchFile(const std::string& name)
-      : path_(fs::temp_directory_path() / fmt::format("bodyschema_{}_{}", getpid(), name)) {}
-  ~ScratchFile() {
-    std::error_code error;
-    fs::remove(path_, error);
-  }
-  ScratchFile(const ScratchFile&) = delete;
-  ScratchFile& operator=(const ScratchFile&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
 };
 
 /// What the diagnosis of the log makes of a configuration: its extended model, in `out`.
@@ -212,10 +195,10 @@ void run_recording(ExperimentContext& context, bool only_honesty) {
   const Truth truth = Truth::load(recording / "truth.json");
   // One log for every robot: the official hand's joints are added to the recording's own.
   const Configuration import = Configuration::load(context.recorded / "icub_unity/import_official_hand.yaml");
-  const ScratchFile log("recording.log");
+  const Scratch log("recording.log");
   const BusOptions bus = BusOptions::from(import.section("bus"));
   import_yarp(recording / "yarp", YarpImportOptions::from(import.section("yarp_import")), bus.channels(), log.path());
-  const ScratchFile official_hand("official_hand.urdf");
+  const Scratch official_hand("official_hand.urdf");
   const fs::path exact_urdf = recording / "robot/icub_unity.urdf", nominal_urdf = recording / "robot/icub_v1.urdf";
   write_grafted_urdf({.arm_urdf = exact_urdf,
                       .hand_urdf = data / kOfficialRobot,

@@ -1,12 +1,10 @@
 #include "trial_runner.hpp"
 
-#include <atomic>
-#include <mutex>
 #include <numeric>
 #include <random>
-#include <thread>
 
 #include "bodyschema/core/progress_bar.hpp"
+#include "in_parallel.hpp"
 
 namespace bodyschema {
 namespace {
@@ -78,43 +76,22 @@ std::vector<TrialRecord> run_trials(const ExperimentContext& context, const std:
                                     const std::vector<std::uint64_t>& seeds,
                                     const std::function<TrialSetting(std::uint64_t)>& setting_of,
                                     const std::vector<Contestant>& contestants) {
-  const auto trials = static_cast<int>(seeds.size());
   std::vector<TrialRecord> records(seeds.size());
   // Settings are made before the work is shared out: configuration is read by one thread at a time.
   std::vector<TrialSetting> settings;
   for (const auto seed : seeds) settings.push_back(setting_of(seed));
   constexpr std::uint64_t kStepsOfATrial = 1000;
-  ProgressBar bar(label, static_cast<std::uint64_t>(trials) * kStepsOfATrial);
-  std::atomic<int> next{0};
-  std::mutex mutex;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    for (int t = next++; t < trials; t = next++) {
-      try {
-        const auto index = static_cast<std::size_t>(t);
-        std::uint64_t done = 0;
-        const auto progress = [&](double share) {
-          const auto now = static_cast<std::uint64_t>(share * static_cast<double>(kStepsOfATrial));
-          bar.advance(now - done);
-          done = now;
-        };
-        records[index] = run_trial(settings[index], contestants, seeds[index], progress);
-        progress(1.0);
-      } catch (...) {
-        const std::lock_guard lock(mutex);
-        if (!failure) failure = std::current_exception();
-        next = trials;
-      }
-    }
-  };
-  int count = context.options.threads > 0 ? context.options.threads
-                                          : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  count = std::min(count, trials);
-  std::vector<std::thread> threads;
-  for (int i = 1; i < count; ++i) threads.emplace_back(work);
-  work();
-  for (auto& thread : threads) thread.join();
-  if (failure) std::rethrow_exception(failure);
+  ProgressBar bar(label, seeds.size() * kStepsOfATrial);
+  in_parallel(seeds.size(), context.options.threads, [&](std::size_t t) {
+    std::uint64_t done = 0;
+    const auto progress = [&](double share) {
+      const auto now = static_cast<std::uint64_t>(share * static_cast<double>(kStepsOfATrial));
+      bar.advance(now - done);
+      done = now;
+    };
+    records[t] = run_trial(settings[t], contestants, seeds[t], progress);
+    progress(1.0);
+  });
   return records;
 }
 

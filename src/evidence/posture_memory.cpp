@@ -310,7 +310,7 @@ std::vector<std::uint64_t> PostureMemory::blocks() const {
   return numbers;
 }
 
-std::optional<PostureMemory::Stale> PostureMemory::most_stale() const {
+std::optional<PostureMemory::Stale> PostureMemory::most_stale(std::span<const std::uint64_t> but) const {
   // Physical: a joint turned by this moves an outline by a tenth of a pixel otherwise than its derivative says ...
   constexpr double kLinear_rad = 0.007;
   constexpr double kLinear = 0.5;    // of what was believed, for what is no angle
@@ -319,6 +319,7 @@ std::optional<PostureMemory::Stale> PostureMemory::most_stale() const {
   std::optional<Stale> stalest;
   double most = 1.0;
   for (const auto& block : blocks_) {
+    if (std::find(but.begin(), but.end(), block.number) != but.end()) continue;
     double far = 0.0;
     Eigen::VectorXd aim = x;
     for (const auto k : block.loose) aim[k] = block.x[k];  // where it was in that posture

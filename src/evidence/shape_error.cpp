@@ -74,9 +74,9 @@ double ShapeError::variance_px2(double floor_px, double fitted) const {
   std::vector<double> errors;  // of the parts' means, squared
   for (const auto& [place, part] : parts_) {
     const double n = part.postures, mean = part.sum / n;
-    // Chance cannot be told from shape in the first few.
+    // Chance cannot be told from shape in the first few, nor in what is left of a part that is not seen any more.
     const double of_mean =
-        part.seen < kPosturesOfShape ? 0.0 : std::max(0.0, part.square / n - mean * mean) / (n - 1.0);
+        part.seen < kPosturesOfShape || n < 2.0 ? 0.0 : std::max(0.0, part.square / n - mean * mean) / (n - 1.0);
     errors.push_back(mean * mean - of_mean);
   }
   const double middle = median(errors);
@@ -98,7 +98,7 @@ double ShapeError::variance_px2(double floor_px, double fitted) const {
 Eigen::MatrixXd shape_covariance(const PostureMemory& memory, double variance_share) {
   const Eigen::Index n = memory.layout().estimated();
   if (memory.empty() || variance_share <= 0.0) return Eigen::MatrixXd::Zero(n, n);
-  const Eigen::VectorXd prior = memory.layout().prior_sd.array().square().inverse();
+  const Eigen::VectorXd prior = memory.layout().prior_sd.cwiseProduct(memory.widening()).array().square().inverse();
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(n, n);
   Eigen::MatrixXd precision = memory.estimate().own.ldlt().solve(identity);
   precision.diagonal() -= prior;

@@ -32,6 +32,10 @@ std::optional<std::int64_t> number_of(const fs::path& file) {
   return number;
 }
 
+bool is_joint_column(const std::string& name) {
+  return name != "posture" && name != "frame" && name != "time_s";
+}
+
 bool is_picture(const fs::path& file) {
   std::string ending = file.extension().string();
   for (char& c : ending) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
@@ -151,7 +155,7 @@ class StillsImport {
     time_column_ = table_.find({"time_s"});
     moving_ = time_column_ != CsvTable::kNone;
     for (std::size_t c = 0; c < table_.names.size(); ++c) {
-      if (c == number_column_ || c == time_column_) continue;
+      if (!is_joint_column(table_.names[c])) continue;
       joint_columns_.push_back(c);
       joint_names_.push_back(table_.names[c]);
     }
@@ -336,7 +340,7 @@ StillsColumns StillsColumns::read(const fs::path& folder) {
   StillsColumns columns;
   columns.moving = table.find({"time_s"}) != CsvTable::kNone;
   for (std::size_t c = 0; c < table.names.size(); ++c) {
-    if (table.names[c] == "posture" || table.names[c] == "frame" || table.names[c] == "time_s") continue;
+    if (!is_joint_column(table.names[c])) continue;
     columns.names.push_back(table.names[c]);
     double& largest = columns.largest.emplace_back(0.0);
     for (const auto& row : table.rows) {

@@ -177,8 +177,8 @@ std::string why_no_picture(const BusStatistics& bus, const StereoRig& rig, const
   if (bus.faults[static_cast<std::size_t>(MessageFault::kWrongSize)] > 0) {
     for (const auto& camera : rig.cameras) {
       const auto& k = camera.intrinsics;
-      text += "; camera '" + camera.name + "' is configured as " + std::to_string(k.width) + "x" +
-              std::to_string(k.height) + " (cameras." + camera.name + ".width, .height)";
+      text += "; camera '" + camera.name + "' is configured as " + std::to_string(k.width * k.reduction) + "x" +
+              std::to_string(k.height * k.reduction) + " (cameras." + camera.name + ".width, .height)";
     }
   }
   if (bus.synchroniser.dropped(DropReason::kNoMask) > 0) {

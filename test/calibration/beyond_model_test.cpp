@@ -83,5 +83,11 @@ TEST_F(BeyondTheModel, SomebodysArmInOnePictureIsLeftOutAndNotTakenForAThing) {
   EXPECT_TRUE(beyond.on_link.empty()) << beyond.on_link;
 }
 
+TEST(LinkThatHolds, IsNotOneThatWasSeenOnce) {
+  EXPECT_EQ(link_that_holds(std::vector{9.0, 1.0}, std::vector{10.0, 1.0}, 10), 0u);
+  EXPECT_EQ(link_that_holds(std::vector{6.0, 6.0}, std::vector{10.0, 7.0}, 10), 1u);
+  EXPECT_EQ(link_that_holds(std::vector{5.0, 1.0}, std::vector{10.0, 1.0}, 10), std::nullopt);
+}
+
 }  // namespace
 }  // namespace bodyschema

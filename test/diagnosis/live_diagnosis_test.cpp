@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
 #include "bodyschema/simulator/simulator.hpp"
 
@@ -14,6 +15,7 @@ namespace {
 struct Said {
   std::vector<LiveFindings> news;
   std::vector<std::string> per_frame;
+  std::vector<std::size_t> news_at;  ///< frames that brought them
   double span_s = 0.0;
 };
 
@@ -22,7 +24,9 @@ Configuration configuration() {
                              {"silhouette.engine=contour", "filter.particles=40"});
 }
 
-Said listen(const std::string& fault, double seconds_long, std::uint64_t seed = 3) {
+/// @param anew_at  the frame before which the encoders' clock begins anew
+Said listen(const std::string& fault, double seconds_long, std::uint64_t seed = 3,
+            std::optional<std::size_t> anew_at = {}) {
   const auto c = configuration();
   const auto setup = RobotSetup::from(c.section("robot"));
   const auto rig = StereoRig::from(c.section("cameras"));
@@ -51,7 +55,11 @@ Said listen(const std::string& fault, double seconds_long, std::uint64_t seed = 
     auto observation = simulator::to_observation(*frame, encoders);
     observation.encoders = frame->encoders;
     auto estimate = pipeline.estimate(observation);
-    if (live.watch(observation, estimate)) said.news.push_back(estimate.findings);
+    observation.encoders_begin_anew = anew_at == said.per_frame.size();
+    if (live.watch(observation, estimate)) {
+      said.news.push_back(estimate.findings);
+      said.news_at.push_back(said.per_frame.size());
+    }
     std::string all;
     for (const auto& cause : estimate.findings.causes) all += cause.text() + ";";
     said.per_frame.push_back(all);
@@ -99,6 +107,15 @@ TEST(LiveDiagnosis, MeasuresALargeLatencyAndSaysWhenAJointSlipped) {
   EXPECT_TRUE(slipped.news.back().causes.front().text().find("slip") != std::string::npos);
   const auto& sentence = slipped.news.back().causes.front().sentence;
   EXPECT_TRUE(sentence.find(" UTC") != std::string::npos) << sentence;
+}
+
+/// A look that had begun before says nothing of a robot whose clock has begun anew since.
+TEST(LiveDiagnosis, ALookIsOfNoUseWhereEncodersBeginAnew) {
+  const auto said = listen("encoder_gain:joint=r_elbow,value=5", 14.0);
+  ASSERT_FALSE(said.news_at.empty());
+  const auto first = said.news_at.front();
+  const auto anew = listen("encoder_gain:joint=r_elbow,value=5", 14.0, 3, first - 1);
+  EXPECT_EQ(std::count(anew.news_at.begin(), anew.news_at.end(), first), 0);
 }
 
 /// What the estimator itself saw happen needs no second look: some 10 s after a slip it is said, with size and time.

@@ -78,6 +78,7 @@ TEST(ErrorModel, RefusesAnUncertaintyThatIsNone) {
   const std::string three = two.substr(0, two.find("correlations")) +
                             "  - name: mesh_scale\n    parameters: {scale_percent: 0}\n    sd: {scale_percent: 1}\n";
   refused(three + "correlations: [[0.9], [0.9, -0.9]]\n", "contradict each other");
+  EXPECT_NO_THROW(ErrorModel::parse(head + "{delay_ms: 1}\ncorrelations: []\n", roles())) << "nothing is uncertain";
 }
 
 TEST(ErrorModel, CopiesAreIndependent) {

@@ -40,6 +40,22 @@ TEST_F(KeyframesOfOwnRobot, StayAsTheyWereOnceTheyAreForgotten) {
   EXPECT_EQ(memory_.estimate().x, before);
 }
 
+/// A posture whose outline is not found again is in nobody's way.
+TEST_F(KeyframesOfOwnRobot, OneThatCannotBeLookedAtHoldsUpNoOther) {
+  for (const double s : {0.1, 0.5, 0.9}) {
+    const Frame frame = at(s);
+    remember(frame, false);
+  }
+  const auto first = memory_.most_stale()->block;
+  Frame empty = at(0.5);
+  for (auto& seen : seen_.cameras) seen->valid = BinaryMask(seen->mask.width(), seen->mask.height());  // no pixel
+  keyframes_.keep(empty, first, memory_, false);
+  for (int frame = 0; frame < 20; ++frame) keyframes_.look_again(memory_, fitter_);
+  ASSERT_TRUE(memory_.most_stale());
+  EXPECT_EQ(memory_.most_stale()->block, first);
+  EXPECT_FALSE(memory_.most_stale(std::vector{first}));
+}
+
 /// Their pictures are gone: whether an outline of which masks have too little is believed, is as the pictures said.
 TEST_F(KeyframesOfOwnRobot, RememberWhetherPicturesShowedWhatMasksLack) {
   for (const bool shown : {false, true}) {

@@ -50,6 +50,16 @@ TEST_F(ReadingNoiseTest, IsNoMotion) {
   EXPECT_EQ(noise_.beyond_belief_rad2(0), 0.0);
 }
 
+/// A clock that starts again leaves few readings: of these nothing is said, and what was measured stays.
+TEST_F(ReadingNoiseTest, StaysWhereReadingsBeginAnew) {
+  for (int frame = 0; frame < 59; ++frame) noise_.read(readings(10, 0.3), frame == 0);
+  const double before = noise_.beyond_belief_rad2(0);
+  EXPECT_GT(before, 0.0);
+  time_ = 0;
+  noise_.read(readings(10, 0.3), true);
+  EXPECT_EQ(noise_.beyond_belief_rad2(0), before);
+}
+
 TEST_F(ReadingNoiseTest, FollowsAnEncoderThatGetsBetter) {
   for (int frame = 0; frame < 50; ++frame) noise_.read(readings(10, 0.3), frame == 0);
   for (int frame = 0; frame < 60; ++frame) noise_.read(readings(10, 0.02), false);

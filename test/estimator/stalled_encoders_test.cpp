@@ -131,5 +131,17 @@ TEST_F(TwoJoints, TheJointSeenToMoveMostIsNamed) {
   EXPECT_NEAR(encoders_.moved_rad(), radians(10.0), 1e-12);
 }
 
+TEST_F(TwoJoints, OnlyAReadingThatStandsStandsWhileOthersMove) {
+  look(0.0, 0.0);
+  for (int frame = 1; frame < 4; ++frame) {
+    look(frame, -frame);
+    EXPECT_TRUE(encoders_.standing_while_others_move().empty()) << "both move";
+  }
+  look(4.0, -3.0);
+  EXPECT_EQ(encoders_.standing_while_others_move(), std::vector<Eigen::Index>{1});
+  look(4.0, -4.0);
+  EXPECT_EQ(encoders_.standing_while_others_move(), std::vector<Eigen::Index>{0});
+}
+
 }  // namespace
 }  // namespace bodyschema

@@ -49,6 +49,21 @@ TEST(Evaluate, AMistypedKeyIsAnErrorBeforeTheWork) {
   EXPECT_THAT(refusal("likelihood", {"simulator.blurr_px=1"}), HasSubstr("simulator.blurr_px"));
 }
 
+TEST(Evaluate, RowsOfAnExperimentThatHasNoneAreRefused) {
+  const TemporaryFolder folder;
+  EvaluationOptions options;
+  options.experiment = "all";
+  options.rows = {"head"};
+  options.out = folder.path() / "all";
+  try {
+    evaluate(Configuration::load(kConfigs / "icub_right/evaluation.yaml"), kConfigs, options);
+    ADD_FAILURE() << "no error";
+  } catch (const ConfigurationError& error) {
+    EXPECT_STREQ(error.what(), "--rows: 'all' has no rows; expected with everyday, honesty, real");
+  }
+  EXPECT_FALSE(std::filesystem::exists(options.out));
+}
+
 TEST(Evaluate, AModeIsRefusedAsEveryExperimentRunsItsOwn) {
   EXPECT_THAT(refusal("likelihood", {"estimator.mode=paper"}), HasSubstr("estimator.mode: 'paper'"));
 }

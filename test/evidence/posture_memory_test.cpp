@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "bodyschema/evidence/shape_error.hpp"
 namespace bodyschema {
 namespace {
 
@@ -82,6 +83,7 @@ TEST_F(MemoryOfTwo, ABeliefThatPicturesContradictOutrightGivesWay) {
     EXPECT_GT(memory.widening()[0], 2.0);
     EXPECT_DOUBLE_EQ(memory.widening()[0], memory.widening()[1]) << "one description: wrong in one, not trusted in all";
     EXPECT_NEAR(known.own(1, 1), std::pow(2.0 * memory.widening()[1], 2), 1e-6) << "of which pictures say nothing";
+    EXPECT_NEAR(shape_covariance(memory, 0.1)(1, 1), known.own(1, 1), 1e-6) << "nor do shapes that err";
   }
   // What may be as believed is believed.
   for (const double truth : {0.0, 1.0, -1.4}) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "random_seed.hpp"
@@ -126,6 +127,24 @@ TEST(ShapeError, PartsThatAreNoLongerShownFadeAsWell) {
   ShapeError without(kRecent);
   for (int i = 0; i < 231; ++i) without.add(outline({0.1, -0.1, 0.1}), 0, 1.0);
   EXPECT_NEAR(shape.variance_px2(0.0, 0.0), without.variance_px2(0.0, 0.0), 1e-6) << "as if it had not been seen";
+}
+
+/// Of what fades, a little more than one posture is left at some time: how its parts differ would be divided by next to
+/// nothing.
+TEST(ShapeError, WhatIsLeftOfAPartThatIsNoLongerShownIsNotTakenForChance) {
+  std::mt19937_64 random(test::seed());
+  std::normal_distribution<double> noise;
+  constexpr int kRepeats = 200, kAfter = 30;
+  std::vector<double> mean_px2(kAfter, 0.0);
+  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+    ShapeError shape(kRecent);
+    for (int i = 0; i < 3; ++i) shape.add(outline({noise(random), 0.0, 0.0, 0.0}), 0, 1.0);
+    for (double& mean : mean_px2) {
+      shape.add({}, 0, 1.0);
+      mean += shape.variance_px2(0.0, 0.0) / kRepeats;
+    }
+  }
+  EXPECT_LT(*std::max_element(mean_px2.begin(), mean_px2.end()), 8.0 / 3.0) << "of three postures' mean, eight points";
 }
 
 /// What parts show of a shape comes and goes with the postures: few that show little of it do not make it small. With

@@ -1126,7 +1126,15 @@ class Player:
 
     def hand_poses(self):
         hand = self.scene.pose(self.scene.own["hand_link"])
-        return {name: np.linalg.inv(self.scene.pose(k["link"])) @ hand for name, k in self.scene.cameras.items()}
+        return {name: self.turned(k) @ np.linalg.inv(self.scene.pose(k["link"])) @ hand
+                for name, k in self.scene.cameras.items()}
+
+    def turned(self, camera):
+        """A picture that is shifted by a few pixels is that of an eye that has turned by as much."""
+        turn = np.eye(4)
+        x, y = self.sway / [camera["fx"], camera["fy"]]
+        turn[:3, :3] = cv2.Rodrigues(np.array([-y, x, 0.0]))[0]
+        return turn
 
     def play(self, out):
         out.mkdir(parents=True, exist_ok=True)

@@ -94,7 +94,8 @@ class PostureMemory {
     std::uint64_t block = 0;
     Eigen::VectorXd x;
   };
-  [[nodiscard]] std::optional<Stale> most_stale() const;
+  /// @param but  blocks that are not asked about
+  [[nodiscard]] std::optional<Stale> most_stale(std::span<const std::uint64_t> but = {}) const;
   /// A block's pictures linearised anew, about x.
   void relinearise(std::uint64_t block, const Quadratic& pictures, const Eigen::VectorXd& x);
 
