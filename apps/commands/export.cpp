@@ -35,6 +35,7 @@ void add_export(CLI::App& app) {
     const RobotSetup setup = RobotSetup::from(configuration.section("robot"));
     const StereoRig rig = StereoRig::from(configuration.section("cameras"));
     configuration.reject_unknown_sections();
+    configuration.section("robot").leave_to_others("tolerances");
     for (const char* read : {"robot", "cameras"}) configuration.section(read).reject_unknown_keys();
     std::fputs(export_correction(a->summary, setup, rig, a->out, a->anyway).c_str(), stdout);
   });

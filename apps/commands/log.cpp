@@ -23,6 +23,7 @@ std::set<std::string> sliding_joints(const Configuration& configuration) {
   configuration.reject_unknown_sections();
   const Configuration robot = configuration.section("robot");
   const auto model = RobotSetup::from(robot).load();
+  robot.leave_to_others("tolerances");
   robot.reject_unknown_keys();
   std::set<std::string> names;
   for (const auto& joint : model->joints()) {

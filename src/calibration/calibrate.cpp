@@ -47,6 +47,13 @@ bool to_be_searched(const CameraModel& camera) {
   return camera.mount.knowledge == PlaceKnowledge::kUnknown;
 }
 
+/// Throws ConfigurationError where a file that is read would be written over.
+void refuse_to_replace(const std::filesystem::path& read, const std::filesystem::path& written) {
+  std::error_code not_there;
+  if (!std::filesystem::equivalent(read, written, not_there)) return;
+  throw ConfigurationError(written.string() + " is what is calibrated, and would be replaced; expected another folder");
+}
+
 class Calibrator {
  public:
   /// @param method  instead of the configured one
@@ -54,6 +61,8 @@ class Calibrator {
              std::optional<SegmentationMethod> method = std::nullopt)
       : configuration_(configuration), options_(options), pipeline_(configuration, method), rig_(pipeline_.rig()) {
     configuration.reject_unknown_keys();
+    refuse_to_replace(options.configuration, options.out / "estimator.yaml");
+    refuse_to_replace(pipeline_.setup().model.urdf, options.out / "corrected.urdf");
     make_folder(options.out);
     if (method) result_.remarks.push_back(kReadWithoutBackground);
   }
@@ -631,8 +640,35 @@ class Calibrator {
     result_.cameras = calibrated_cameras(*log_, batch);
     result_.outline_px.before = median_outline_distance_px(fit, ErrorModel(log_->roles()));
     result_.outline_px.after = median_outline_distance_px(fit, state.model());
+    name_lost_postures(fit, batch);
     result_.hand_sd_m = hand_sd_m(fit, batch);
     result_.views = views(fit, batch);
+  }
+
+  /// Postures to which the answer does not belong at all, and which it has not heard.
+  void name_lost_postures(LogFit& fit, const BatchFit& batch) {
+    constexpr std::size_t kMostNamed = 5;
+    const double lost_px = limits::kLost_px * picture_unit(rig_.cameras.front().intrinsics);
+    const auto pictures = log_->pictures();
+    std::size_t lost = 0;
+    std::string names;
+    for (std::size_t posture = 0; posture < batch.postures(); ++posture) {
+      std::vector<std::size_t> own;
+      for (std::size_t p = 0; p < pictures.size(); ++p) {
+        if (batch.posture_of()[p] == posture) own.push_back(p);
+      }
+      if (own.empty()) continue;
+      const double off_px = median_outline_distance_px(fit, batch.state().model(), own);
+      if (off_px < lost_px || ++lost > kMostNamed) continue;
+      names += fmt::format("{}{} ({:.1f} s into the log)", names.empty() ? "" : ", ", posture + 1,
+                           seconds(pictures[own.front()].joints.utime - pictures.front().joints.utime));
+    }
+    if (lost == 0) return;
+    result_.remarks.push_back(fmt::format(
+        "posture{} {}{}, of {}: outlines lie nowhere near the robot's; are the joint angles those of another "
+        "picture, or is a mask wrong?",
+        lost > 1 ? "s" : "", names, lost > kMostNamed ? fmt::format(" and {} more", lost - kMostNamed) : "",
+        batch.postures()));
   }
 
   /// A joint that moves no outline, or one whose motion something else imitates.

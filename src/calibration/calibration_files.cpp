@@ -140,8 +140,14 @@ void add_geometry(const Calibration& calibration, const BatchFit& batch, const P
   add_effects(geometry, log.robot(), pipeline.setup(), log.rig(), correction);
 }
 
+/// Above what is not to be applied; empty where it is.
+std::string warning_of(const Calibration& c) {
+  return c.state == CalibrationState::kGood ? "" : "# NOT TO BE APPLIED. " + c.sentence + '\n';
+}
+
 std::string offsets_yaml(const Calibration& c, const Correction& correction) {
-  std::string text = "# encoder = true + offset: subtract from every encoder reading. Degrees.\nversion: 1\n";
+  std::string text =
+      warning_of(c) + "# encoder = true + offset: subtract from every encoder reading. Degrees.\nversion: 1\n";
   std::string offsets = "offset_deg:\n", sds = "stddev_deg:\n";
   for (const auto& joint : c.joints) {
     if (!joint.applied) {
@@ -162,6 +168,7 @@ std::string offsets_yaml(const Calibration& c, const Correction& correction) {
 
 std::string cameras_yaml(const Calibration& c) {
   std::string text =
+      warning_of(c) +
       "# Cameras as found: to be included behind robot.yaml, or put in place of its section.\ncameras:\n";
   constexpr double kLeast_m = 1e-5, kLeast_rad = 2e-5;  // that a configuration takes
   for (const auto& camera : c.cameras) {

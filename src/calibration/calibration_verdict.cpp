@@ -39,7 +39,8 @@ std::optional<Objection> objection_of_outlines(const BatchFit& batch, const Doub
     return Objection{
         CalibrationState::kNotConverged,
         fmt::format("Not converged: {:.0f} % of the predicted outline lies near an edge of the robot in the "
-                    "pictures, expected at least {:.0f} %; check masks, robot and cameras' intrinsics.",
+                    "pictures, expected at least {:.0f} %; check masks, joint angles (order, sign, unit), robot and "
+                    "cameras' intrinsics.",
                     100.0 * found.share * found.seen, 100.0 * limits::kLeastFound)};
   }
   // That nothing fits is said of many robots; this says why.
@@ -85,7 +86,8 @@ std::optional<Objection> objection_of_outlines(const BatchFit& batch, const Doub
 }
 
 /// Whether postures agree, on something that may be.
-std::optional<Objection> objection_of_postures(const BatchFit& batch, std::ptrdiff_t told, const Calibration& result) {
+std::optional<Objection> objection_of_postures(const BatchFit& batch, std::ptrdiff_t told, double unit_px,
+                                               const Calibration& result) {
   if (result.postures < limits::kFewestPostures) {
     return Objection{
         CalibrationState::kNotConverged,
@@ -99,6 +101,24 @@ std::optional<Objection> objection_of_postures(const BatchFit& batch, std::ptrdi
         fmt::format("Model misfit: postures disagree by {:.1f} times what is claimed; run bodyschema diagnose "
                     "on a moving log, and look at the overlays for masks that are wrong.",
                     std::sqrt(result.dispersion))};
+  }
+  const auto& outlines = result.outline_px;
+  const double more_px = outlines.heldout ? *outlines.heldout - outlines.after : 0.0;
+  if (more_px > std::max((limits::kContradict - 1.0) * outlines.after, limits::kSame_px * unit_px)) {
+    return Objection{CalibrationState::kModelMisfit,
+                     fmt::format("Model misfit: outlines of postures left out of the fit lie {:.1f} px off, those of "
+                                 "the fit {:.1f}: postures contradict each other; was a camera moved, or are joint "
+                                 "angles those of another picture?",
+                                 *outlines.heldout, outlines.after)};
+  }
+  for (std::size_t k = 0; k < result.joints.size(); ++k) {
+    const auto& joint = result.joints[k];
+    const double believed_rad = batch.state().prior_sd()[static_cast<Eigen::Index>(k)];
+    if (joint.told || !joint.applied || std::abs(joint.offset_rad) <= limits::kFarUntold_sd * believed_rad) continue;
+    return Objection{CalibrationState::kModelMisfit,
+                     fmt::format("Model misfit: the pictures ask for {:.0f} deg in {} and hardly tell it; is its sign, "
+                                 "or where it is zero, another than the URDF's?",
+                                 degrees(joint.offset_rad), joint.name)};
   }
   if (told == 0) {
     return Objection{CalibrationState::kNotConverged,
@@ -171,7 +191,7 @@ void judge(const BatchFit& batch, const Doubts& doubts, double unit_px, Calibrat
   const auto told =
       std::count_if(result.joints.begin(), result.joints.end(), [](const auto& joint) { return joint.told; });
   auto objection = objection_of_outlines(batch, doubts, unit_px, result);
-  if (!objection) objection = objection_of_postures(batch, told, result);
+  if (!objection) objection = objection_of_postures(batch, told, unit_px, result);
   if (objection) {
     result.state = objection->state;
     result.sentence = std::move(objection->sentence);

@@ -26,10 +26,16 @@ constexpr double kAnywhere_px = 1e3;  ///< ... and these may be anywhere
 constexpr double kHardlyKnown_rad = radians(3.0);  ///< so are those of a camera that may be turned by more
 constexpr double kTold_rad = radians(0.5);         ///< a joint's standard deviation, at most
 
+constexpr double kLost_px = 8.0;  ///< px of a 320x240 picture, median of a posture: its outlines are not the robot's
+
 // Statistical.
 /// A place of the camera is taken for the only one where the next best fits this much worse: silhouettes of a wrong
 /// place are off by a third, of the right one by what masks get wrong.
 constexpr double kOnly = 1.25;
+/// Postures that were left out lie so many times as far off as those of the fit: they contradict each other. A fit of
+/// few postures follows them by a quarter or so.
+constexpr double kContradict = 1.5;
+constexpr double kFarUntold_sd = 3.0;  ///< what is believed of an offset; further off is no joint that is hardly told
 constexpr double kToldShare = 1.0 / 3.0;  ///< of what was believed before
 constexpr double kBeyondBelief_sd = 4.0;
 constexpr double kDisagreement = 4.0;  ///< mean NIS per direction

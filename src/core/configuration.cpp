@@ -653,6 +653,14 @@ void Configuration::reject_unknown_keys() const {
   }
 }
 
+void Configuration::leave_to_others(const std::string& key) const {
+  const auto pass = [](auto&& self, Entry& entry) -> void {
+    entry.known = true;
+    for (auto& child : entry.children) self(self, child.entry);
+  };
+  if (Entry* entry = document_->find(below(section_, key))) pass(pass, *entry);
+}
+
 void Configuration::reject_unknown_sections() const {
   const std::vector<std::string> valid(kSections.begin(), kSections.end());
   for (const auto& [name, child] : document_->root.children) {

@@ -32,6 +32,7 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
   const auto rig = StereoRig::from(configuration.section("cameras"));
   const auto bus = BusOptions::from(configuration.section("bus"));
   configuration.reject_unknown_sections();
+  configuration.section("robot").leave_to_others("tolerances");
   for (const char* read : {"robot", "cameras", "bus"}) configuration.section(read).reject_unknown_keys();
   const auto model = load_robot(setup, rig);
   const auto roles = JointRoles::of(model, setup, rig);

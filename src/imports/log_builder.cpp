@@ -57,6 +57,7 @@ ImportTarget ImportTarget::from(const Configuration& configuration, const std::f
   target.bus = BusOptions::from(bus);
   target.mapping = JointMapping::from(import);
   configuration.reject_unknown_sections();
+  robot.leave_to_others("tolerances");
   for (const Configuration& read : {robot, cameras, bus, import}) read.reject_unknown_keys();
   if (!mapping.empty()) {
     const Configuration file = Configuration::load(mapping);

@@ -47,7 +47,7 @@ std::vector<fs::path> entries_of(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     if (entries.size() == kMostPictures) throw FileError(folder.string() + ": holds more than a million files");
-    entries.push_back(at->path());
+    if (!at->path().filename().string().starts_with('.')) entries.push_back(at->path());
   }
   if (error) throw FileError(folder.string() + ": cannot be read: " + error.message());
   std::sort(entries.begin(), entries.end());
@@ -162,14 +162,31 @@ class StillsImport {
     if (joint_names_.empty()) throw FileError(table_.file.string() + ": no column of a joint");
   }
 
+  /// The number of the first picture, where rows that have none are one for each picture, in order; otherwise 0.
+  [[nodiscard]] std::int64_t first_number() const {
+    std::set<std::int64_t> numbers;
+    for (const auto& folder : image_folders_) {
+      if (folder.empty()) continue;
+      for (const auto& [number, file] : folder_.images.at(folder)) numbers.insert(number);
+    }
+    const bool one_each = numbers.size() == table_.rows.size() && !numbers.empty() &&
+                          *numbers.rbegin() - *numbers.begin() + 1 == static_cast<std::int64_t>(numbers.size());
+    return one_each ? *numbers.begin() : 0;
+  }
+
   void read_postures() {
     LeftOut bad = table_.bad;
+    const std::int64_t first = first_number();
+    if (number_column_ == CsvTable::kNone) {
+      builder_.note(fmt::format("joints.csv has no column 'posture': its rows belong to pictures {}, {}, ... in order",
+                                first, first + 1));
+    }
     std::set<std::int64_t> seen;
     for (const CsvTable::Row& row : table_.rows) {
       try {
         Posture posture{&row, 0, std::nullopt};
         if (number_column_ == CsvTable::kNone) {
-          posture.number = static_cast<std::int64_t>(&row - table_.rows.data());
+          posture.number = first + static_cast<std::int64_t>(&row - table_.rows.data());
         } else if (const double number = row.values[number_column_]; !std::isnan(number)) {
           constexpr double kMostNumber = 1e15;
           if (number != std::floor(number) || number < 0.0 || number > kMostNumber) {

@@ -445,10 +445,12 @@ class Starter {
     } else if (!strangers_.empty()) {
       notes_.push_back(fmt::format("columns of joints.csv that are no joints: {}", fmt::join(strangers_, ", ")));
     }
-    constexpr double kMostRadians = 7.0;
+    constexpr double kMostRadians = 4.0 * kPi;  // a joint that turns for ever was turned by no more
     double largest = 0.0;
     for (std::size_t i = 0; i < columns_->names.size(); ++i) {
-      if (!urdf_.slides(columns_->names[i])) largest = std::max(largest, columns_->largest[i]);
+      const auto& name = columns_->names[i];
+      const bool no_joint = missing.empty() && among(strangers_, name);
+      if (!no_joint && !urdf_.slides(name)) largest = std::max(largest, columns_->largest[i]);
     }
     in_degrees_ = largest > kMostRadians;
     if (in_degrees_) {

@@ -25,6 +25,15 @@ std::string attribute(const XMLElement* element, const char* name) {
   return text != nullptr ? text : "";
 }
 
+/// Whether xacro has still to make something of it; its namespace alone stands in many a file that it has made.
+bool asks_for_xacro(const XMLElement& element) {
+  if (std::string_view(element.Name()).starts_with("xacro:")) return true;
+  for (auto* child = element.FirstChildElement(); child != nullptr; child = child->NextSiblingElement()) {
+    if (asks_for_xacro(*child)) return true;
+  }
+  return false;
+}
+
 void check(const fs::path& urdf) {
   try {
     (void)RobotModel::load({urdf, {}, {}});
@@ -78,10 +87,11 @@ void add(std::vector<fs::path>& folders, const fs::path& folder) {
 }  // namespace
 
 UrdfOutline::UrdfOutline(const fs::path& urdf) : urdf_(urdf) {
-  check(urdf);
   tinyxml2::XMLDocument document;
   const auto error = document.LoadFile(urdf.c_str());
   const XMLElement* robot = document.FirstChildElement("robot");
+  if (robot != nullptr && asks_for_xacro(*robot)) throw FileError(urdf.string() + ": " + kNotAUrdf);
+  check(urdf);
   if (error != tinyxml2::XML_SUCCESS || robot == nullptr) throw FileError(urdf.string() + ": " + kNotAUrdf);
   for (auto* link = robot->FirstChildElement("link"); link != nullptr; link = link->NextSiblingElement("link")) {
     names_.push_back(attribute(link, "name"));

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <regex>
@@ -23,6 +24,7 @@ namespace bodyschema {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -46,7 +48,9 @@ class Calibrated : public ::testing::Test {
   /// Ten photographs of a physical arm as a log, and a configuration from its URDF.
   /// @param parts  of the set's folder
   /// @param postures  by row of its joints.csv; none: all
-  CalibrationOptions photographs(const std::vector<const char*>& parts, const std::set<int>& postures = {}) {
+  /// @param edit  of the set's folder, before it is read
+  CalibrationOptions photographs(const std::vector<const char*>& parts, const std::set<int>& postures = {},
+                                 const std::function<void(const fs::path&)>& edit = {}) {
     const auto set = data_folder() / "real" / "lbr_zed10", stills = folder_ / "stills";
     fs::remove_all(stills);
     for (const char* part : parts) {
@@ -60,6 +64,7 @@ class Calibrated : public ::testing::Test {
       if (row < 0 || postures.empty() || postures.count(row) > 0) some << line << '\n';
     }
     some.close();
+    if (edit) edit(stills);
     StarterOptions starter;
     starter.urdf = data_folder() / "real/robots/lbr_med7/lbr_med7.urdf";
     starter.stills = stills;
@@ -521,6 +526,92 @@ TEST_F(Calibrated, ALensThatNobodyKnowsIsFoundOrTheResultIsNotGood) {
                 options);
   EXPECT_EQ(sure.state, CalibrationState::kModelMisfit) << sure.sentence;
   EXPECT_THAT(sure.sentence, HasSubstr("no robot is so wrong as the pictures ask for"));
+}
+
+/// Rows of a joints.csv, its head among them, split at commas.
+using Rows = std::vector<std::vector<std::string>>;
+void edit_rows(const fs::path& stills, const std::function<void(Rows&)>& edit) {
+  Rows rows;
+  {
+    std::ifstream file(stills / "joints.csv");
+    for (std::string line; std::getline(file, line);) {
+      rows.emplace_back();
+      std::istringstream cells(line);
+      for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell);
+    }
+  }
+  edit(rows);
+  std::ofstream file(stills / "joints.csv");
+  for (const auto& row : rows) {
+    for (std::size_t c = 0; c < row.size(); ++c) file << (c > 0 ? "," : "") << row[c];
+    file << '\n';
+  }
+}
+
+const std::vector<const char*> kBothWithMasks = {"images/left", "images/right", "masks/left", "masks/right",
+                                                 "camera_info"};
+
+/// An axis that turns the other way was made up for by 57 deg in its joint, "hardly told", in a good result.
+TEST_F(Calibrated, AJointThatTurnsTheOtherWayIsNotGood) {
+  SKIP_WITHOUT("real");
+  const auto options = photographs(kBothWithMasks, {}, [](const fs::path& stills) {
+    edit_rows(stills, [](Rows& rows) {
+      const auto joint = std::find(rows[0].begin(), rows[0].end(), "lbr_A6") - rows[0].begin();
+      for (std::size_t r = 1; r < rows.size(); ++r) {
+        auto& cell = rows[r][static_cast<std::size_t>(joint)];
+        cell = cell.starts_with('-') ? cell.substr(1) : "-" + cell;
+      }
+    });
+  });
+  const auto found = calibrate(Configuration::load(options.configuration), options);
+  EXPECT_EQ(found.state, CalibrationState::kModelMisfit);
+  EXPECT_THAT(found.sentence, HasSubstr("in lbr_A6 and hardly tell it; is its sign"));
+  std::ifstream offsets(options.out / "offsets.yaml");
+  std::string first;
+  std::getline(offsets, first);
+  EXPECT_EQ(first, "# NOT TO BE APPLIED. " + found.sentence);
+}
+
+/// From the sixth posture on the camera stands elsewhere: its pictures are those of the other one.
+TEST_F(Calibrated, ACameraThatWasMovedIsNotGood) {
+  SKIP_WITHOUT("real");
+  const auto options = photographs({"camera_info"}, {}, [](const fs::path& stills) {
+    for (const std::string kind : {"images", "masks"}) {
+      fs::create_directories(stills / kind / "left");
+      for (int i = 0; i < 10; ++i) {
+        const std::string name = "0" + std::to_string(i) + ".png";
+        fs::create_symlink(data_folder() / "real/lbr_zed10" / kind / (i < 5 ? "left" : "right") / name,
+                           stills / kind / "left" / name);
+      }
+    }
+  });
+  const auto found = calibrate(Configuration::load(options.configuration), options);
+  EXPECT_NE(found.state, CalibrationState::kGood) << found.sentence;
+}
+
+TEST_F(Calibrated, PosturesWhoseAnglesAreThoseOfOthersAreNamed) {
+  SKIP_WITHOUT("real");
+  const auto options = photographs(kBothWithMasks, {}, [](const fs::path& stills) {
+    edit_rows(stills, [](Rows& rows) {  // all but the number of the posture
+      std::swap(rows[2], rows[3]);
+      std::swap(rows[2][0], rows[3][0]);
+    });
+  });
+  const auto found = calibrate(Configuration::load(options.configuration), options);
+  EXPECT_THAT(found.remarks, Contains(HasSubstr("postures 2 (10.0 s into the log), 3 (20.0 s into the log), of 10")));
+}
+
+/// `calibrate LOG --config arm/estimator.yaml --out arm` replaced the configuration by one that includes itself.
+TEST_F(Calibrated, WhatIsCalibratedIsNotReplaced) {
+  SKIP_WITHOUT("real");
+  auto options = photographs({"images/left", "masks/left"}, {0, 1, 2, 3});
+  options.out = options.configuration.parent_path();
+  try {
+    calibrate(Configuration::load(options.configuration), options);
+    ADD_FAILURE() << "no error";
+  } catch (const ConfigurationError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("estimator.yaml is what is calibrated, and would be replaced"));
+  }
 }
 
 }  // namespace

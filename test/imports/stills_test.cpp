@@ -332,6 +332,38 @@ TEST_F(Stills, WhatWasThereStaysWhereAnImportFails) {
 }
 
 /// Recordings of physical arms, by others.
+/// Files that a system leaves beside pictures, with their names.
+TEST_F(Stills, HiddenFilesAreNoPictures) {
+  stills_.write("images/left/._00.png", "no picture");
+  stills_.write("images/left/.DS_Store", "nor this");
+  EXPECT_THAT(import(target()).left_out, IsEmpty());
+  EXPECT_EQ(observations(target()).size(), 2u);
+}
+
+TEST_F(Stills, RowsWithoutNumbersBelongToPicturesInOrder) {
+  stills_.write("joints.csv", "joint1,joint2,joint3,joint4,joint5,joint6,joint7\n0.1,0,0,0,0,0,0\n0.2,0,0,0,0,0,0\n");
+  for (const std::string camera : {"left", "right"}) {
+    fs::rename(stills_.path() / "images" / camera / "01.png", stills_.path() / "images" / camera / "02.png");
+    fs::rename(stills_.path() / "images" / camera / "00.png", stills_.path() / "images" / camera / "01.png");
+  }
+  const auto to = target();
+  const auto summary = import(to);
+  EXPECT_THAT(summary.left_out, IsEmpty());
+  EXPECT_THAT(summary.notes, Contains(HasSubstr("its rows belong to pictures 1, 2, ... in order")));
+  const auto all = observations(to);
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_NEAR(all[0].cameras[0]->joints.q[to.robot->joint_index("joint1")], 0.1, 1e-6);
+}
+
+/// What `calibrate` writes believes something about the robot; an import has no need of it.
+TEST_F(Stills, WhatIsBelievedOfTheRobotIsForOthers) {
+  auto yaml = robot();
+  EXPECT_NO_THROW(
+      ImportTarget::from(Configuration::parse(yaml + "  tolerances: {joint_place: {sd_mm: 1}}\n" + cameras())));
+  EXPECT_THROW(ImportTarget::from(Configuration::parse(yaml + "  tolerance: {joint_place: {sd_mm: 1}}\n" + cameras())),
+               ConfigurationError);
+}
+
 TEST(RealStills, OfTwoCamerasWithMasks) {
   for (const auto& [set, postures] : {std::pair{"lbr_zed5", 5u}, std::pair{"lbr_zed10", 10u}}) {
     SCOPED_TRACE(set);

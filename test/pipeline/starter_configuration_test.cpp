@@ -497,6 +497,31 @@ TEST_F(StarterConfiguration, AHandIsNotGuessedBehindAJointThatWasNotRecorded) {
   EXPECT_THAT(without.text, testing::Not(HasSubstr("taken for a part of the hand")));
 }
 
+/// A motor's temperature is no angle of 31 degrees, and a wrist that turns for ever was turned once round.
+TEST_F(StarterConfiguration, TheUnitIsThatOfJointsAlone) {
+  const SmallStills stills;
+  stills.write("joints.csv",
+               "posture,joint1,joint2,joint3,joint4,joint5,joint6,joint7,motor_temp_c\n"
+               "0,0.1,0.2,0.3,0.4,0.5,0.6,7.7,31.5\n1,-0.1,0,0,0,0,0,7.5,31.6\n");
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.stills = stills.path();
+  o.out = folder_ / "mine";
+  const StarterReport report = write_starter_configuration(o);
+  EXPECT_THAT(report.text, HasSubstr("columns of joints.csv that are no joints: motor_temp_c"));
+  EXPECT_THAT(report.text, Not(HasSubstr("is taken for deg")));
+}
+
+TEST_F(StarterConfiguration, XacroIsConvertedFirst) {
+  StarterOptions o;
+  o.urdf = folder_ / "arm.urdf";
+  std::ofstream(o.urdf) << "<robot name='arm' xmlns:xacro='http://www.ros.org/wiki/xacro'><link name='base'/>"
+                           "<xacro:include filename='gripper.xacro'/></robot>";
+  o.out = folder_ / "mine";
+  EXPECT_THAT([&] { (void)write_starter_configuration(o); },
+              testing::ThrowsMessage<FileError>(HasSubstr("xacro arm.urdf.xacro > ")));
+}
+
 TEST_F(StarterConfiguration, StillsWhoseColumnsAreNoJointsAreToBePutRight) {
   const SmallStills stills;
   stills.write("joints.csv", "posture,j1,joint2,joint3,joint4,joint5,joint6,joint7\n0,90,2,3,4,5,6,7\n");

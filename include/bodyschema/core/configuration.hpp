@@ -77,6 +77,8 @@ class Configuration {
   /// Throws for the first key of this mapping, and of those below it, that no getter asked for, e.g.
   /// "config/a.yaml:12: unknown key 'filter.particle'; did you mean 'filter.particles'?".
   void reject_unknown_keys() const;
+  /// What another program reads and checks: reject_unknown_keys lets it pass.
+  void leave_to_others(const std::string& key) const;
   /// For programs that read some sections only: throws for the first key at the top of the document that is
   /// no section of any program, e.g. "--set buss.channel_prefix=LAB: unknown key 'buss'; did you mean 'bus'?".
   void reject_unknown_sections() const;
