@@ -99,7 +99,6 @@ std::vector<CalibratedCamera> calibrated_cameras(const PictureLog& log, const Ba
     CalibratedCamera found;
     found.name = camera.name;
     found.link = carrier_of(rig, c);
-    found.searched = camera.mount.knowledge == PlaceKnowledge::kUnknown;
     const auto place = [&](const Eigen::VectorXd& x) { return camera_place(log, state, x, c); };
     const Eigen::VectorXd x = state.x();
     found.X_link_optical = place(x);

@@ -87,12 +87,10 @@ std::map<std::string, double> draw_offsets(const fs::path& set, std::uint64_t se
 RealTrial run_real_trial(const RealTrialOptions& options, const fs::path& folder) {
   RealTrial trial;
   trial.hidden = options.hidden;
-  trial.folder = folder;
   copy_hiding(options.set, folder / "stills", options.hidden, options.masks);
   StarterOptions starter;
   starter.urdf = options.urdf;
   starter.stills = folder / "stills";
-  starter.camera_pose = options.camera_pose;
   starter.out = folder / "robot";
   write_starter_configuration(starter);
   const auto configuration = Configuration::load(folder / "robot" / "estimator.yaml", options.overrides);
@@ -100,7 +98,6 @@ RealTrial run_real_trial(const RealTrialOptions& options, const fs::path& folder
   CalibrationOptions calibration;
   calibration.log = folder / "log";
   calibration.out = folder / "calibration";
-  calibration.threads = options.threads;
   calibration.quiet = true;
   trial.calibration =
       calibrate(Configuration::load(folder / "robot" / "estimator.yaml", options.overrides), calibration);

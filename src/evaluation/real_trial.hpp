@@ -35,16 +35,13 @@ std::map<std::string, double> draw_offsets(const std::filesystem::path& set, std
 struct RealTrial {
   Hidden hidden;
   Calibration calibration;
-  std::filesystem::path folder;  ///< of what it wrote: robot/, log, calibration/
 };
 
 struct RealTrialOptions {
   std::filesystem::path set, urdf;
   Hidden hidden{};
   bool masks = true;                     ///< those of the set
-  std::string camera_pose{};             ///< StarterOptions::camera_pose
   std::vector<std::string> overrides{};  ///< of the starter configuration, "KEY=VALUE"
-  int threads = 0;
 };
 
 /// The three commands of docs/calibrate_from_photographs.md on a copy of a set that holds neither camera poses nor

@@ -18,8 +18,6 @@ FrameRecord record_of(const Estimate& estimate, Estimator& estimator, const Obse
   record.offset_deg = estimate.offset_rad * (180.0 / kPi);
   record.covariance_deg2 = estimate.covariance_rad2 * (180.0 / kPi) * (180.0 / kPi);
   record.effects = estimate.effects;
-  record.likelihood = estimate.best_likelihood;
-  record.total_ms = estimate.times.total_ms;
   record.hand_sd_mm = 1e3 * estimate.hand_sd_m;
   for (const auto& truth : frame.truth) record.visible_share = std::max(record.visible_share, truth.visible_share);
   for (std::size_t c = 0; c < estimate.X_CP.size() && c < 2; ++c) {

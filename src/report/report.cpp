@@ -120,9 +120,6 @@ void Report::paragraph(const std::string& text) {
 void Report::verdict(const std::string& text) {
   body_ += "<p class=\"verdict\">" + escaped(text) + "</p>\n";
 }
-void Report::preformatted(const std::string& text) {
-  body_ += "<pre>" + escaped(text) + "</pre>\n";
-}
 
 void Report::figures_first(const std::string& text, const std::string& note) {
   first_ = "<pre>" + escaped(text) + "</pre>\n<p>" + escaped(note) + "</p>\n";

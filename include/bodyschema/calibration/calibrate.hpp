@@ -67,7 +67,6 @@ struct CalibratedCamera {
   };
   std::optional<Beside> beside;
   bool estimated = false;  ///< false: as configured
-  bool searched = false;   ///< nothing was known of it
 };
 
 /// Where the calibrated robot has its hand in one picture: for a witness of one's own, a board that the hand carries.

@@ -23,7 +23,7 @@ struct DiagnosisOptions {
   double spacing_px = 3.0;          ///< of outline samples, px of a 320x240 picture
   OutlineNoise::Prior noise;        ///< of outlines, before any was seen
   std::size_t most_pictures = 400;  ///< that a fit looks at; tests look at all
-  std::uint64_t seed = 1;           ///< of the sign flips
+  std::uint64_t seed = 1;           ///< of what chance makes of the blocks
   bool fit_only = false;            ///< what offsets and nuisances leave (report.before), and no causes are asked for
   /// Where the fit starts besides the beliefs' centre: values of the state's parameters, SI.
   std::vector<Eigen::VectorXd> starts{};
@@ -35,9 +35,9 @@ Belief wide_belief(const CauseName& cause, const JointRoles& roles);
 
 /// Says what the model of a robot gets wrong, from the outlines in a log's pictures. One loop: fit what is believed
 /// uncertain anyway (offsets, nuisances); ask of every cause of the catalogue, and of free curves over what a joint
-/// does, whether the blocks of the log agree that it is there (sign flips of blocks, the largest of all candidates at
-/// `level`: Westfall and Young 1993); take the one that predicts blocks best which its fit has not seen; fit again with
-/// it; until nothing is left. What it rests on is measured on the log itself.
+/// does, whether the blocks of the log agree that it is there (blocks times random normals, the largest of all
+/// candidates at `level`: Westfall and Young 1993); take the one that predicts blocks best which its fit has not seen;
+/// fit again with it; until nothing is left. What it rests on is measured on the log itself.
 /// @param beliefs  the state's: offsets and nuisances with their standard deviations
 /// @param tolerances  of the robot: considered in every interval
 /// Throws DataError saying what to record when the log cannot be used at all.

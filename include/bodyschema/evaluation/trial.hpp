@@ -35,8 +35,6 @@ struct FrameRecord {
   Eigen::VectorXd offset_deg;
   Eigen::MatrixXd covariance_deg2;
   std::vector<EstimatedParameter> effects;  ///< what else is estimated
-  double likelihood = 0.0;
-  double total_ms = 0.0;
 };
 
 struct ContestantRecord {

@@ -48,7 +48,6 @@ class Report {
   void verdict(const std::string& text);
   /// @param rows  as wide as `head`; cells that look like numbers are set right
   void table(const std::vector<std::string>& head, const std::vector<std::vector<std::string>>& rows);
-  void preformatted(const std::string& text);
   /// Figures that stand before everything else, whenever they are known, and a note on them.
   void figures_first(const std::string& text, const std::string& note);
   void list(const std::vector<std::string>& items);
