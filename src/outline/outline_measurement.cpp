@@ -209,16 +209,17 @@ void OutlineMeasurement::find_moved(std::span<const ContourPoint> outline, const
   const double focal_px = k.fx * (1.0 + corrections.camera.focal_scale);
   moved_points_.clear();
   float most_px = 0.0f;
+  bool covered = false;
   for (const auto& point : outline) {
     const auto& shape = corrections.shapes[projection_.segment_of(point.part)];
     const auto by_px =
         static_cast<float>(shape.thickness_m * focal_px / point.p_C.z() + shape.dilation_px / k.reduction);
     most_px = std::max(most_px, std::abs(by_px));
+    covered = covered || shape.thickness_m > 0.0;
     moved_points_.push_back({point.pixel, point.pixel + by_px * point.normal, by_px});
   }
-  // Points lie too far apart for so little to bring one past another.
-  constexpr double kPassing = 0.25;
-  if (most_px < kPassing * spacing_px) moved_points_.clear();
+  // Points lie too far apart for less to bring one past another but by chance.
+  if (!covered && most_px < static_cast<float>(spacing_px)) moved_points_.clear();
 }
 
 bool OutlineMeasurement::is_passed(std::size_t index) const {
