@@ -86,8 +86,8 @@ std::optional<Objection> objection_of_outlines(const BatchFit& batch, const Doub
 }
 
 /// Whether postures agree, on something that may be.
-std::optional<Objection> objection_of_postures(const BatchFit& batch, std::ptrdiff_t told, double unit_px,
-                                               const Calibration& result) {
+std::optional<Objection> objection_of_postures(const BatchFit& batch, const Doubts& doubts, std::ptrdiff_t told,
+                                               double unit_px, const Calibration& result) {
   if (result.postures < limits::kFewestPostures) {
     return Objection{
         CalibrationState::kNotConverged,
@@ -111,14 +111,21 @@ std::optional<Objection> objection_of_postures(const BatchFit& batch, std::ptrdi
                                  "angles those of another picture?",
                                  *outlines.heldout, outlines.after)};
   }
+  const Eigen::VectorXd innovation = batch.memory().belief_innovation();
   for (std::size_t k = 0; k < result.joints.size(); ++k) {
     const auto& joint = result.joints[k];
-    const double believed_rad = batch.state().prior_sd()[static_cast<Eigen::Index>(k)];
-    if (joint.told || !joint.applied || std::abs(joint.offset_rad) <= limits::kFarUntold_sd * believed_rad) continue;
+    if (joint.told || !joint.applied || std::abs(innovation[static_cast<Eigen::Index>(k)]) <= limits::kFarUntold_sd)
+      continue;
     return Objection{CalibrationState::kModelMisfit,
                      fmt::format("Model misfit: the pictures ask for {:.0f} deg in {} and hardly tell it; is its sign, "
                                  "or where it is zero, another than the URDF's?",
                                  degrees(joint.offset_rad), joint.name)};
+  }
+  if (doubts.found.hand_is_lost) {
+    return Objection{CalibrationState::kNotConverged,
+                     "Not converged: next to nothing of the hand's outline is found, so that no picture shows where it "
+                     "is; is it hidden, not on this robot, or turned by a joint whose sign or zero is another than the "
+                     "URDF's?"};
   }
   if (told == 0) {
     return Objection{CalibrationState::kNotConverged,
@@ -135,50 +142,64 @@ FoundOutlines found_outlines(LogFit& fit, const BatchFit& batch, std::span<const
   const auto& links = log.setup().model.rendered_links;
   const auto shown = log.parts_shown();
   FoundOutlines result;
-  double all = 0.0, seen = 0.0, matched = 0.0;
+  struct Outline {
+    double sampled = 0.0, matched = 0.0;
+    [[nodiscard]] bool is_lost() const { return matched < limits::kHardlyFound * sampled; }
+    void add(const Outline& other) {
+      sampled += other.sampled;
+      matched += other.matched;
+    }
+  } all, seen, hand;
   OutlineEvidence evidence;
-  for (std::size_t part = 0; part < links.size(); ++part) {
-    if (!shown[part] || (!loose.empty() && loose[part])) continue;
-    double own = 0.0, own_matched = 0.0;
-    for (const auto p : pictures) {
-      const auto& picture = log.pictures()[p];
-      auto search = batch.searches()[picture.camera];
-      search.part_weight.assign(links.size(), 0.0);
-      search.part_weight[part] = 1.0;
-      fit.measurement().linearise(log.edges(p), picture.joints.q, batch.at().corrections[p], picture.camera, {}, search,
-                                  evidence);
-      own += evidence.sampled;
-      own_matched += evidence.matched;
+  for (const auto& segment : log.roles().segments) {
+    for (const auto part : segment.parts) {
+      if (!shown[part] || (!loose.empty() && loose[part])) continue;
+      Outline own;
+      for (const auto p : pictures) {
+        const auto& picture = log.pictures()[p];
+        auto search = batch.searches()[picture.camera];
+        search.part_weight.assign(links.size(), 0.0);
+        search.part_weight[part] = 1.0;
+        fit.measurement().linearise(log.edges(p), picture.joints.q, batch.at().corrections[p], picture.camera, {},
+                                    search, evidence);
+        own.add({evidence.sampled, evidence.matched});
+      }
+      all.add(own);
+      if (segment.name == log.setup().hand_link) hand.add(own);
+      if (own.is_lost()) {
+        result.lost.push_back(links[part]);
+      } else {
+        seen.add(own);
+      }
     }
-    all += own;
-    if (own_matched < limits::kHardlyFound * own) {
-      result.lost.push_back(links[part]);
-      continue;
-    }
-    seen += own;
-    matched += own_matched;
   }
-  result.share = matched / std::max(1.0, seen);
-  result.seen = seen / std::max(1.0, all);
+  result.hand_is_lost = hand.is_lost();
+  result.share = seen.matched / std::max(1.0, seen.sampled);
+  result.seen = seen.sampled / std::max(1.0, all.sampled);
   return result;
 }
 
 std::string beyond_belief(const BatchFit& batch) {
   const auto& state = batch.state();
-  const Eigen::VectorXd away = (state.x() - state.prior_mean()).cwiseQuotient(state.prior_sd());
+  const auto& layout = batch.memory().layout();
+  const auto& known = batch.memory().estimate();
+  const Eigen::VectorXd innovation = batch.memory().belief_innovation();
   Eigen::Index worst = -1;
   for (Eigen::Index k = state.joints(); k < state.size(); ++k) {
-    if (std::abs(away[k]) <= limits::kBeyondBelief_sd || (worst >= 0 && std::abs(away[k]) <= std::abs(away[worst])))
-      continue;
-    worst = k;
+    const bool moved = std::abs(known.x[k] - layout.prior_mean[k]) > layout.prior_sd[k];
+    if (!moved || std::abs(innovation[k]) <= limits::kBeyondBelief_sd) continue;
+    if (worst < 0 || std::abs(innovation[k]) > std::abs(innovation[worst])) worst = k;
   }
   if (worst < 0) return {};
   const auto& p = state.parameters()[static_cast<std::size_t>(worst)];
+  // The belief holds back what pictures hardly tell; without it they ask for this.
+  const double variance = std::pow(layout.prior_sd[worst], 2);
+  const double asked = (known.x[worst] - layout.prior_mean[worst]) * variance / (variance - known.own(worst, worst));
   return fmt::format(
       "Model misfit: the pictures ask for {} {:.3g} {}, {:.0f} times what is believed possible; it is further off "
       "than that (estimator.state and the cameras' pose_sd_mm and pose_sd_deg say what is believed), or something "
       "else is wrong with robot or cameras.",
-      p.name, state.x()[worst] / p.si_per_unit, p.unit, std::abs(away[worst]));
+      p.name, (layout.prior_mean[worst] + asked) / p.si_per_unit, p.unit, std::abs(asked) / layout.prior_sd[worst]);
 }
 
 void judge(const BatchFit& batch, const Doubts& doubts, double unit_px, Calibration& result) {
@@ -191,7 +212,7 @@ void judge(const BatchFit& batch, const Doubts& doubts, double unit_px, Calibrat
   const auto told =
       std::count_if(result.joints.begin(), result.joints.end(), [](const auto& joint) { return joint.told; });
   auto objection = objection_of_outlines(batch, doubts, unit_px, result);
-  if (!objection) objection = objection_of_postures(batch, told, unit_px, result);
+  if (!objection) objection = objection_of_postures(batch, doubts, told, unit_px, result);
   if (objection) {
     result.state = objection->state;
     result.sentence = std::move(objection->sentence);

@@ -16,6 +16,7 @@ struct FoundOutlines {
   double share = 0.0;             ///< of the outlines of parts that are seen at all
   double seen = 0.0;              ///< share of the whole outline that these parts make
   std::vector<std::string> lost;  ///< links of which next to nothing is found
+  bool hand_is_lost = false;      ///< the same of the hand as a whole, with all that is fixed to it
 };
 
 /// @param pictures  that are looked at
@@ -34,7 +35,8 @@ struct Doubts {
   double rival = std::numeric_limits<double>::infinity();  ///< misfit of the second best answer over the best one's
 };
 
-/// A parameter that the pictures ask to be further off than is believed possible, as a sentence; empty: none.
+/// A parameter that the pictures ask to be further off than is believed possible, as a sentence; empty: none. How
+/// hardly they tell it does not matter: PostureMemory::belief_innovation.
 std::string beyond_belief(const BatchFit& batch);
 
 /// Sets state and sentence of a calibration that is described otherwise, and adds what is to be remarked.

@@ -189,6 +189,17 @@ MemoryEstimate PostureMemory::in_posture() const {
   return result;
 }
 
+Eigen::VectorXd PostureMemory::belief_innovation() const {
+  const auto& e = estimate();
+  // x - mean = K (what pictures show): it scatters by P - own, and by what is considered.
+  const Eigen::VectorXd prior = layout_.prior_sd.cwiseProduct(widening_).cwiseAbs2();
+  const Eigen::VectorXd scatter = prior + e.covariance.diagonal() - 2.0 * e.own.diagonal();
+  // Of what nothing is told both differences are rounding.
+  constexpr double kNothing = 1e-9;
+  return (scatter.array() > kNothing * prior.array())
+      .select((e.x - layout_.prior_mean).array() / scatter.array().max(1e-300).sqrt(), 0.0);
+}
+
 double PostureMemory::told() const {
   return static_cast<double>(layout_.estimated()) -
          estimate().own.diagonal().cwiseQuotient(layout_.prior_sd.cwiseAbs2()).cwiseMin(1.0).sum();

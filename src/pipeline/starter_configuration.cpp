@@ -600,7 +600,7 @@ class Starter {
           fmt::format("    focal_length: {{sd_percent: {}}}       # a guess; take this out with your cameras' own\n",
                       kGuessedFocal_sd_percent);
     }
-    if (focal_guessed() || (stills_ && !moving_)) {
+    if (focal_guessed() || stills_) {
       double width = 0.0;
       for (const auto& camera : cameras_) width = std::max(width, static_cast<double>(camera.k.width));
       const double sd_px = (focal_guessed() ? kGuessedCentre_share : kCentre_share) * width;

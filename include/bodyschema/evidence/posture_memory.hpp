@@ -113,6 +113,11 @@ class PostureMemory {
   [[nodiscard]] const MemoryEstimate& estimate() const;
   /// Of each parameter, by how many times its belief was too narrow: MemoryLayout::effect.
   [[nodiscard]] const Eigen::VectorXd& widening() const;
+  /// How far pictures pull each parameter from where it was believed to be, in standard deviations of what that
+  /// scatters by where beliefs, noise and what is considered are as said. Of a parameter that pictures hardly tell the
+  /// belief gives way by little, whatever they ask for: it is this that tells whether they contradict it (the
+  /// innovation of a prior: Bar-Shalom, Li and Kirubarajan, 2001, section 5.4).
+  [[nodiscard]] Eigen::VectorXd belief_innovation() const;
   /// How many of the estimated parameters pictures tell: each counts by how much of its prior's say they have taken
   /// over.
   [[nodiscard]] double told() const;
