@@ -41,7 +41,7 @@ Eigen::VectorXd given_as_believed(const State& state, const MemoryEstimate& esti
   const Eigen::VectorXd away = (state.prior_mean() - estimate.x)(own);
   const Eigen::MatrixXd C = estimate.covariance(own, own);
   Eigen::VectorXd x = estimate.x + estimate.covariance(Eigen::all, own) * C.ldlt().solve(away);
-  x(own) = state.prior_mean()(own);
+  for (const auto k : own) x[k] = state.prior_mean()[k];
   return x;
 }
 

@@ -21,8 +21,9 @@ void EncoderTrack::add(std::span<const JointSample> samples) {
     shown_ = kKept;
   }
   for (const auto& sample : samples) {
-    if (samples_.size() > shown_ && samples_.back().utime == sample.utime) {
+    if (!samples_.empty() && samples_.back().utime == sample.utime) {
       samples_.back() = sample;
+      shown_ = std::min(shown_, samples_.size() - 1);  // what it says now is to be shown as well
     } else {
       samples_.push_back(sample);
     }

@@ -161,6 +161,8 @@ struct Estimator::Impl {
     estimate.innovation_usual = tracker.usual();
     estimate.postures = known.memory.postures();
     estimate.posture_sd_rad = known.memory.posture_sd_rad();
+    estimate.head_posture_sd_rad = known.memory.head_posture_sd_rad();
+    estimate.stamp_sd_s = fitter.stamp_sd_s();
     estimate.outline_sd_px = fitter.noise().front().sd_px();
     estimate.outline_alike = fitter.noise().front().correlated_points();
     estimate.changed = outcome.changed;

@@ -57,6 +57,7 @@ EstimatorOptions EstimatorOptions::from(const Configuration& configuration) {
   auto& m = o.memory;
   m.encoder_sd_rad = radians(best.number_or("encoder_sd_deg", degrees(m.encoder_sd_rad), 1e-6, 10.0));
   m.posture_sd_rad = radians(best.number_or("posture_sd_deg", degrees(m.posture_sd_rad), 1e-6, 10.0));
+  o.stamp_sd_s = 1e-3 * best.number_or("stamp_sd_ms", 1e3 * o.stamp_sd_s, 1e-3, 1e3);
   m.memory_s = best.number_or("memory_s", m.memory_s, 0.1, 1e9);
   m.block_s = best.number_or("posture_s", m.block_s, 1e-3, 1e3);
   m.same_posture_rad = radians(best.number_or("same_posture_deg", degrees(m.same_posture_rad), 0.0, 90.0));

@@ -5,6 +5,17 @@
 
 namespace bodyschema {
 
+namespace {
+
+/// Pictures that show the arm later or earlier than their stamps say.
+ErrorModel of_time(const JointRoles& roles) {
+  ErrorModel model(roles);
+  model.add("latency", {});
+  return model;
+}
+
+}  // namespace
+
 bool Frame::exposed() const {
   return std::any_of(seen.begin(), seen.end(), [](const auto* camera) { return camera != nullptr; });
 }
@@ -15,6 +26,7 @@ FrameModel::FrameModel(std::shared_ptr<const RobotModel> robot, const RobotSetup
       measurement_(robot, setup, rig, roles, drawn != nullptr ? *drawn : silhouette_model(*robot, setup)),
       track_(robot, setup), probes_(state_.model(), state_.refs(), measurement_.coordinates()),
       beside_(beside, fitted_parameters(beside), measurement_.coordinates()),
+      time_(of_time(roles), fitted_parameters(of_time(roles)), measurement_.coordinates()),
       settled_(rig.cameras.size(), roles.no_corrections()), scratch_(roles.no_corrections()), nothing_(scratch_),
       position_(static_cast<std::size_t>(measurement_.coordinates().size()), -1), questions_(rig.cameras.size()) {
   for (auto& question : questions_) question.corrections = nothing_;
@@ -55,6 +67,7 @@ void FrameModel::forget() {
   state_.model().forget();
   probes_.forget();
   beside_.forget();
+  time_.forget();
 }
 
 /// What effects look at, with those that have a memory as they are now.
@@ -101,6 +114,7 @@ Frame FrameModel::take(const Observation& observation, const Eigen::VectorXd& x)
       state_.model().observe(sample);
       probes_.observe(sample);
       beside_.observe(sample);
+      time_.observe(sample);
     });
     expose(joints, c, x, frame.exposures[c]);
   }
@@ -189,6 +203,8 @@ void FrameModel::find_directions(const Exposure& exposure, const Eigen::VectorXd
   if (with_beside) {
     beside_.directions(exposure.at, more_directions_);
     directions_.insert(directions_.end(), more_directions_.begin(), more_directions_.end());
+    time_.directions(exposure.at, more_directions_);
+    directions_.push_back(more_directions_.front());
   }
   std::fill(position_.begin(), position_.end(), -1);
   out.active.clear();
@@ -199,10 +215,15 @@ void FrameModel::find_directions(const Exposure& exposure, const Eigen::VectorXd
       out.active.push_back(step.coordinate);
     }
   }
-  out.J.setZero(static_cast<Eigen::Index>(out.active.size()), state_.size() + beside_count());
+  const auto active = static_cast<Eigen::Index>(out.active.size()), n = state_.size() + beside_count();
+  out.J.setZero(active, n);
+  out.by_time.setZero(with_beside ? active : 0);
   for (std::size_t k = 0; k < directions_.size(); ++k) {
     const auto parameter = static_cast<Eigen::Index>(k);
-    for (const auto& step : directions_[k]) out.J(position_[step.coordinate], parameter) = step.amount;
+    for (const auto& step : directions_[k]) {
+      const auto at = position_[step.coordinate];
+      (parameter < n ? out.J(at, parameter) : out.by_time[at]) = step.amount;
+    }
   }
 }
 
@@ -231,6 +252,7 @@ void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::sp
   out.cost.assign(frame.seen.size(), 0.0);
   out.sampled = out.matched = out.square = out.weight = out.odd = out.covered = 0.0;
   out.samples.assign(with_beside ? frame.seen.size() : 0, {});
+  out.time.assign(with_beside ? frame.seen.size() : 0, {});
   for (std::size_t c = 0; c < frame.seen.size(); ++c) {
     Question& question = questions_[c];
     question.asked = frame.seen[c] != nullptr && !frame.seen[c]->mask.empty();
@@ -244,7 +266,7 @@ void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::sp
     evidence.A.setZero(n, n);
     evidence.b.setZero(n);
     evidence.square = evidence.weight = 0.0;
-    const auto& [active, J, corrections, answer, asked] = questions_[c];
+    const auto& [active, J, by_time, corrections, answer, asked] = questions_[c];
     if (!asked) continue;
     const OutlineMeasurement& measurement = measurement_of(c);
     if (with_beside) out.samples[c].assign(measurement.samples().begin(), measurement.samples().end());
@@ -257,6 +279,10 @@ void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::sp
     if (answer.weight <= 0.0) continue;
     evidence.A = J.transpose() * answer.A * J / unit2;
     evidence.b = J.transpose() * answer.b / unit2;
+    if (with_beside) {
+      const Eigen::VectorXd seen = answer.A * by_time / unit2;
+      out.time[c] = {J.transpose() * seen, by_time.dot(seen), by_time.dot(answer.b) / unit2};
+    }
     evidence.square = answer.square / unit2;
     evidence.weight = answer.weight;
     out.square += evidence.square;

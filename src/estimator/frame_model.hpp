@@ -13,12 +13,14 @@
 #include "bodyschema/evidence/state.hpp"
 #include "bodyschema/outline/effect_probes.hpp"
 #include "bodyschema/outline/outline_measurement.hpp"
+#include "stamp_noise.hpp"
 
 namespace bodyschema {
 
 /// What the pictures of one frame say about a state near some value of it.
 struct FrameEvidence {
   std::vector<StateEvidence> cameras;   ///< about the value; px^2 of a 320x240 picture, not divided by a variance
+  std::vector<TimeEvidence> time;       ///< ... and of when each was taken; where wanted
   double sampled = 0.0, matched = 0.0;  ///< outline points of all cameras
   double square = 0.0, weight = 0.0;    ///< of residuals, as OutlineEvidence
   std::vector<double> cost;             ///< per camera: robust cost of the whole outline
@@ -75,7 +77,8 @@ class FrameModel {
   void settle(const Frame& frame, const Eigen::VectorXd& x);
   void place(const Eigen::VectorXd& x, std::size_t camera, std::span<Eigen::Isometry3f> X_CB);
 
-  /// Evidence of every camera with a mask about the state near x and, where wanted, about what lies beside it.
+  /// Evidence of every camera with a mask about the state near x and, where wanted, about what lies beside it and when
+  /// the picture was taken.
   /// @param search  one per camera
   /// @param look  called with a camera's matched points
   void linearise(const Frame& frame, const Eigen::VectorXd& x, std::span<const OutlineSearch> search, bool with_beside,
@@ -94,6 +97,7 @@ class FrameModel {
   struct Question {
     std::vector<std::uint32_t> active;  ///< coordinates that parameters move
     Eigen::MatrixXd J;                  ///< what the parameters do to these
+    Eigen::VectorXd by_time;            ///< ... and a second; empty: not asked
     Corrections corrections;
     OutlineEvidence answer;
     bool asked = false;
@@ -117,7 +121,7 @@ class FrameModel {
   std::unique_ptr<BackgroundWorker> worker_;           ///< asks the second camera; null: there is one
   std::vector<bool> still_parts_;
   EncoderTrack track_;
-  EffectProbes probes_, beside_;
+  EffectProbes probes_, beside_, time_;
   const Frame* settled_frame_ = nullptr;
   std::vector<Corrections> settled_;  ///< per camera, of the state without joint offsets
   Corrections scratch_;

@@ -58,6 +58,11 @@ inline constexpr double kPerParameter = 9.0;
 /// Statistical. Encoder readings after which their noise is told anew, from twice as many.
 inline constexpr std::size_t kReadings = 200;
 
+/// Statistical. Frames of a moving arm from which the noise of stamps is told: a busy network is not so for ever; and
+/// how many what is believed of it counts as.
+inline constexpr std::size_t kRecentStamps = 200;
+inline constexpr double kStampsBelieved = 8.0;
+
 /// Statistical. Postures after which what one showed of the parts' shapes has faded to 1/e: the estimate that left its
 /// residuals is no longer held.
 inline constexpr double kRecentPostures = 12.0;

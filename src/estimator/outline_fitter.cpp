@@ -29,7 +29,7 @@ bool pictures(const Frame& frame) {
 OutlineFitter::OutlineFitter(FrameModel& model, HypothesisScorer& scorer, const EstimatorOptions& options,
                              std::size_t cameras, int search_renders)
     : model_(model), scorer_(scorer), options_(options), noise_(cameras, OutlineNoise(options.noise)),
-      search_renders_(std::max(search_renders, 2 * kMostRendersOfStart)) {}
+      search_renders_(std::max(search_renders, 2 * kMostRendersOfStart)), stamps_(options.stamp_sd_s) {}
 
 std::vector<OutlineSearch> OutlineFitter::searches(double search_px, bool last, bool without_odd) const {
   std::vector<OutlineSearch> list;
@@ -49,6 +49,7 @@ void OutlineFitter::look(const Frame& frame, double search_px, double sd_px, boo
                      if (last) fit.points[c].assign(points.begin(), points.end());
                    });
   fit.quadratic = quadratic_of(fit.evidence, fit.x, last, sd_px);
+  if (last) stamps_.take_out(time_of(fit.evidence, fit.x), fit.quadratic);
 }
 
 Quadratic OutlineFitter::quadratic_of(const FrameEvidence& evidence, const Eigen::VectorXd& x, bool with_beside,
@@ -67,6 +68,20 @@ Quadratic OutlineFitter::quadratic_of(const FrameEvidence& evidence, const Eigen
   return quadratic;
 }
 
+TimeEvidence OutlineFitter::time_of(const FrameEvidence& evidence, const Eigen::VectorXd& x) const {
+  const auto n = x.size();
+  TimeEvidence time{Eigen::VectorXd::Zero(n + model_.beside_count())};
+  for (std::size_t c = 0; c < noise_.size(); ++c) {
+    if (evidence.cameras[c].weight <= 0.0) continue;
+    const double precision = 1.0 / noise_[c].variance_px2();
+    time.with_state += precision * evidence.time[c].with_state;
+    time.A += precision * evidence.time[c].A;
+    time.b += precision * evidence.time[c].b;
+  }
+  time.b += time.with_state.head(n).dot(x);
+  return time;
+}
+
 void OutlineFitter::look_twice(const Frame& frame, double search_px, OutlineFit& fit) {
   ++renders_;
   model_.linearise(frame, fit.x, searches(search_px, true, true), true, fit.seen.evidence,
@@ -74,7 +89,10 @@ void OutlineFitter::look_twice(const Frame& frame, double search_px, OutlineFit&
                      if (fit.points.size() != noise_.size()) fit.points.assign(noise_.size(), {});
                      fit.points[c].assign(points.begin(), points.end());
                    });
-  fit.seen.quadratic = quadratic_of(fit.seen.evidence, fit.x, true, 0.0);
+  fit.at_its_stamp = quadratic_of(fit.seen.evidence, fit.x, true, 0.0);
+  fit.time = time_of(fit.seen.evidence, fit.x);
+  fit.seen.quadratic = fit.at_its_stamp;
+  stamps_.take_out(fit.time, fit.seen.quadratic);
   if (fit.seen.evidence.odd > 0.0) {
     auto points = std::move(fit.points);  // these know which are odd
     look(frame, search_px, 0.0, true, fit);
@@ -216,6 +234,10 @@ void OutlineFitter::learn_noise(const OutlineFit& fit) {
       noise_[c].add(shown(fit, c), model_.picture_unit_px(c), limits::kNoisePictures);
     }
   }
+}
+
+void OutlineFitter::learn_stamps(const OutlineFit& fit, const PostureMemory& memory) {
+  stamps_.learn(fit.at_its_stamp, fit.time, memory.in_posture());
 }
 
 void OutlineFitter::learn_shape(const OutlineFit& fit, double fitted) {

@@ -26,7 +26,9 @@ struct OutlineFit {
     FrameEvidence evidence;
     Quadratic quadratic;
   } seen;
-  double misfit = 0.0;  ///< chi-square: of the outline, and of x against what held it
+  Quadratic at_its_stamp;  ///< as `seen.quadratic`, were the pictures' stamps right ...
+  TimeEvidence time;       ///< ... and what these say of that
+  double misfit = 0.0;     ///< chi-square: of the outline, and of x against what held it
 };
 
 /// A search from several starts that is carried on from picture to picture. What has been found is a state, which the
@@ -86,6 +88,9 @@ class OutlineFitter {
   void count_still_parts_once(std::size_t postures);
   /// Measures the outlines' noise on what a good fit leaves.
   void learn_noise(const OutlineFit& fit);
+  /// Measures how far stamps err on a fit that agrees with a memory.
+  void learn_stamps(const OutlineFit& fit, const PostureMemory& memory);
+  [[nodiscard]] double stamp_sd_s() const { return stamps_.sd_s(); }
   /// Measures what outlines get wrong alike in all postures on what the fit of a new one leaves.
   /// @param fitted  parameters that all postures together tell
   void learn_shape(const OutlineFit& fit, double fitted);
@@ -97,6 +102,7 @@ class OutlineFitter {
   void forget() {
     noise_.assign(noise_.size(), OutlineNoise(options_.noise));
     shape_.forget();
+    stamps_.forget();
   }
   /// What outlines get wrong in all postures was learned about an arm that is somewhere else.
   void forget_shape() { shape_.forget(); }
@@ -115,6 +121,7 @@ class OutlineFitter {
   [[nodiscard]] std::vector<OutlinePoint> shown(const OutlineFit& fit, std::size_t camera) const;
   [[nodiscard]] Quadratic quadratic_of(const FrameEvidence& evidence, const Eigen::VectorXd& x, bool with_beside,
                                        double sd_px) const;
+  [[nodiscard]] TimeEvidence time_of(const FrameEvidence& evidence, const Eigen::VectorXd& x) const;
   [[nodiscard]] std::vector<OutlineSearch> searches(double search_px, bool last, bool without_odd = false) const;
 
   FrameModel& model_;
@@ -126,6 +133,7 @@ class OutlineFitter {
   int searched_renders_ = 0;         ///< in this one
   int renders_ = 0;                  ///< of all that was looked at
   ShapeError shape_{limits::kRecentPostures};
+  StampNoise stamps_;
 };
 
 }  // namespace bodyschema

@@ -36,6 +36,7 @@ MemoryLayout memory_layout(const State& state, const Considered& considered) {
   for (const auto& parameter : state.parameters()) {
     const auto& effect = state.model()[parameter.ref.effect];
     layout.is_joint.push_back(effect.name() == "joint_offset" || effect.name() == "head_offset");
+    layout.is_head.push_back(effect.name() == "head_offset");
   }
   layout.considered_root = considered.root;
   return layout;

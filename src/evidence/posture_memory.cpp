@@ -33,13 +33,22 @@ Eigen::MatrixXd inverse(const Eigen::MatrixXd& A) {
 }  // namespace
 
 PostureMemory::PostureMemory(MemoryLayout layout, const MemoryOptions& options)
-    : layout_(std::move(layout)), options_(options), posture_variance_(std::pow(options.posture_sd_rad, 2)),
-      widening_(Eigen::VectorXd::Ones(layout_.estimated())) {}
+    : layout_(std::move(layout)), options_(options), widening_(Eigen::VectorXd::Ones(layout_.estimated())) {
+  arm_error_.variance = head_error_.variance = std::pow(options.posture_sd_rad, 2);
+}
+
+bool PostureMemory::is_head(Eigen::Index joint) const {
+  return !layout_.is_head.empty() && layout_.is_head[static_cast<std::size_t>(joint)];
+}
+
+double PostureMemory::posture_variance(bool head) const {
+  return std::max((head ? head_error_ : arm_error_).variance, std::pow(options_.encoder_sd_rad, 2));
+}
 
 /// What a posture gets wrong in one joint's angle.
 double PostureMemory::own_variance(Eigen::Index joint, std::span<const Eigen::Index> loose) const {
   if (among(loose, joint)) return std::pow(kAnywhere_rad, 2);
-  return std::max(posture_variance_, std::pow(options_.encoder_sd_rad, 2));
+  return posture_variance(is_head(joint));
 }
 
 /// The pictures see x + e with e the posture's own error, N(0, R): marginalised, A becomes (I + A R)^-1 A.
@@ -381,7 +390,6 @@ void PostureMemory::learn_posture_error(const Block& block) {
   nis_dof_ = kept * nis_dof_ + agreement.dof;
 
   // The error of this posture given the others: N(0, variance) before, seen through pictures and what is not known.
-  const double variance = std::max(posture_variance_, std::pow(options_.encoder_sd_rad, 2));
   std::vector<Eigen::Index> joints;
   for (Eigen::Index i = 0; i < n; ++i) {
     if (layout_.is_joint[static_cast<std::size_t>(i)]) joints.push_back(i);
@@ -396,15 +404,22 @@ void PostureMemory::learn_posture_error(const Block& block) {
   const auto count = static_cast<Eigen::Index>(joints.size());
   Eigen::MatrixXd precision = M(joints, joints);
   precision = 0.5 * (precision + precision.transpose()).eval();
-  precision.diagonal().array() += 1.0 / variance;
+  for (Eigen::Index i = 0; i < count; ++i)
+    precision(i, i) += 1.0 / posture_variance(is_head(joints[static_cast<std::size_t>(i)]));
   const Eigen::MatrixXd V = inverse(precision);
   const Eigen::VectorXd error = V * s(joints);
-  double told = 0.0;
-  for (Eigen::Index i = 0; i < count; ++i) told += std::clamp(1.0 - V(i, i) / variance, 0.0, 1.0);
-  error_square_ += error.squaredNorm();
-  error_directions_ += told;
   const double prior = std::pow(options_.posture_sd_rad, 2);
-  posture_variance_ = (options_.posture_prior * prior + error_square_) / (options_.posture_prior + error_directions_);
+  for (const bool head : {false, true}) {
+    auto& learned = head ? head_error_ : arm_error_;
+    const double variance = posture_variance(head);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      if (is_head(joints[static_cast<std::size_t>(i)]) != head) continue;
+      learned.square += error[i] * error[i];
+      learned.directions += std::clamp(1.0 - V(i, i) / variance, 0.0, 1.0);
+    }
+    learned.variance =
+        (options_.posture_prior * prior + learned.square) / (options_.posture_prior + learned.directions);
+  }
   changed();
 }
 
@@ -462,10 +477,6 @@ void PostureMemory::release(std::span<const Eigen::Index> parameters, double fro
 
 double PostureMemory::dispersion() const {
   return nis_dof_ > 0.0 ? nis_ / nis_dof_ : 1.0;
-}
-
-double PostureMemory::posture_sd_rad() const {
-  return std::sqrt(std::max(posture_variance_, std::pow(options_.encoder_sd_rad, 2)));
 }
 
 }  // namespace bodyschema

@@ -75,6 +75,8 @@ nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
   json["innovation"] = {{"nis", e.innovation}, {"dof", e.innovation_dof}, {"usual", e.innovation_usual}};
   json["postures"] = e.postures;
   json["posture_sd_deg"] = degrees(e.posture_sd_rad);
+  json["head_posture_sd_deg"] = degrees(e.head_posture_sd_rad);
+  json["stamp_sd_ms"] = 1e3 * e.stamp_sd_s;
   json["outline"] = {{"stddev_px", e.outline_sd_px}, {"points_alike", e.outline_alike}};
   if (e.hidden.robot > 0.0 || e.hidden.holds) {
     json["hidden"] = {{"hand", e.hidden.hand}, {"robot", e.hidden.robot}, {"holds", e.hidden.holds}};

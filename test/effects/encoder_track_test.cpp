@@ -86,6 +86,20 @@ TEST_F(EncoderTrackTest, ASampleWithTheStampOfTheLastReplacesIt) {
   EXPECT_EQ(shown, std::vector{arm.q[elbow]});
 }
 
+// Between two samples of one stamp velocities were infinite, or not a number.
+TEST_F(EncoderTrackTest, ASampleThatComesAgainIsShownAgainAndIsNoMotion) {
+  EncoderTrack track(robot, setup);
+  int shown = 0;
+  for (int again = 0; again < 2; ++again) {
+    track.add(std::vector{sample(0)});
+    track.advance(0, [&](const JointSample&) { ++shown; });
+  }
+  EXPECT_EQ(shown, 2);
+  Instant at;
+  track.instant(sample(0), 0, none, at);
+  EXPECT_EQ(at.qdot, none);
+}
+
 TEST_F(EncoderTrackTest, WhatIsForgottenIsNotShown) {
   EncoderTrack track(robot, setup);
   track.add(samples(0, 1'000'000));

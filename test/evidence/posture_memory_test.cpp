@@ -371,6 +371,20 @@ TEST_F(MemoryOfTwoJoints, WhatPosturesDisagreeAboutIsLearned) {
   }
 }
 
+// A neck that swayed by 1.5 px unseen made every joint of the arm a little less sure, and itself not enough.
+TEST_F(MemoryOfTwoJoints, AHeadThatSwaysSaysNothingOfTheArm) {
+  std::mt19937_64 random(test::seed());
+  std::normal_distribution<double> normal;
+  layout_.is_head = {false, true};
+  constexpr double kArm = 0.001, kHead = 0.006;
+  auto memory = this->memory();
+  for (int i = 0; i < 80; ++i) next(memory, both(first_, kArm * normal(random), second_, kHead * normal(random), 1e-4));
+  EXPECT_NEAR(memory.posture_sd_rad(), kArm, 0.4 * kArm);
+  EXPECT_NEAR(memory.head_posture_sd_rad(), kHead, 0.4 * kHead);
+  const auto frame = memory.in_posture();
+  EXPECT_GT(frame.covariance(1, 1), 9.0 * frame.covariance(0, 0));
+}
+
 /// While an encoder says nothing its joint is wherever a picture shows it: the other joint is told by what does not
 /// depend on that, and neither is led astray.
 TEST_F(MemoryOfTwoJoints, ALooseJointIsFoundAnewInEveryPosture) {

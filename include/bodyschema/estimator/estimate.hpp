@@ -116,25 +116,27 @@ struct Estimate {
   double hand_sd_m = 0.0;        ///< hand base in the camera frame: root of the summed variances of x, y, z
   double hand_sd_limit_m = 0.0;  ///< `converged` needs it smaller; 0: not in this mode
   FrameVerdict verdict = FrameVerdict::kNothingKnown;
-  double innovation = 0.0;          ///< normalised innovation squared of this frame against the memory
-  double innovation_dof = 0.0;      ///< and its expectation, were all as believed
-  double innovation_usual = 1.0;    ///< mean of innovation / dof of late
-  std::size_t postures = 0;         ///< distinct ones that the offsets rest on
-  double posture_sd_rad = 0.0;      ///< what a posture gets wrong, as an angle of each joint; learned
-  double outline_sd_px = 0.0;       ///< of one residual of the outlines, measured; px of a 320x240 picture
-  double outline_alike = 0.0;       ///< how many neighbouring outline points err as one; measured
-  std::string changed;              ///< what was taken to have changed in this frame: "r_elbow slipped by 4.9 deg"
-  std::string misfit;               ///< in kModelMisfit: what is wrong by more than believed possible, and what to do
-  std::string stalled_joint;        ///< its encoder stands although the pictures show it move;
-                                    ///< empty: none. The state is never kConverged then
-  double stalled_motion_rad = 0.0;  ///< how far it has been seen to move
-  bool cameras_swapped = false;     ///< the left picture shows what the right eye sees and the other way
-                                    ///< round; nothing is learned from them, state kDiverged. Mode best
-  std::vector<Pose> X_CP;           ///< hand base in each camera of the rig, corrected; in one that is absent for the
-                                    ///< encoders of another
-  std::vector<Pose> X_CP_nominal;   ///< the same with encoders and model as they are
-  HiddenShare hidden;               ///< mode best
-  LiveFindings findings;            ///< by LiveDiagnosis, where one watches
+  double innovation = 0.0;           ///< normalised innovation squared of this frame against the memory
+  double innovation_dof = 0.0;       ///< and its expectation, were all as believed
+  double innovation_usual = 1.0;     ///< mean of innovation / dof of late
+  std::size_t postures = 0;          ///< distinct ones that the offsets rest on
+  double posture_sd_rad = 0.0;       ///< what a posture gets wrong, as an angle of each joint; learned
+  double head_posture_sd_rad = 0.0;  ///< the same of each joint that carries the cameras
+  double stamp_sd_s = 0.0;           ///< how far pictures' stamps err from one to the next; learned
+  double outline_sd_px = 0.0;        ///< of one residual of the outlines, measured; px of a 320x240 picture
+  double outline_alike = 0.0;        ///< how many neighbouring outline points err as one; measured
+  std::string changed;               ///< what was taken to have changed in this frame: "r_elbow slipped by 4.9 deg"
+  std::string misfit;                ///< in kModelMisfit: what is wrong by more than believed possible, and what to do
+  std::string stalled_joint;         ///< its encoder stands although the pictures show it move;
+                                     ///< empty: none. The state is never kConverged then
+  double stalled_motion_rad = 0.0;   ///< how far it has been seen to move
+  bool cameras_swapped = false;      ///< the left picture shows what the right eye sees and the other way
+                                     ///< round; nothing is learned from them, state kDiverged. Mode best
+  std::vector<Pose> X_CP;            ///< hand base in each camera of the rig, corrected; in one that is absent for the
+                                     ///< encoders of another
+  std::vector<Pose> X_CP_nominal;    ///< the same with encoders and model as they are
+  HiddenShare hidden;                ///< mode best
+  LiveFindings findings;             ///< by LiveDiagnosis, where one watches
   StageTimes times;
 
   /// Whether the pictures tell a joint's offset: its standard deviation is below 0.5 deg and below a third of what was

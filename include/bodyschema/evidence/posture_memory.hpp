@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -34,6 +35,9 @@ struct MemoryLayout {
   /// kind is a description by somebody who may be wrong: its `prior_sd` hold up to a factor, 1 or more, that all of its
   /// parameters have in common and that pictures tell (PostureMemory::widening).
   std::vector<Eigen::Index> effect{};
+  /// Which of the joints carry the cameras: how they err, a head that sways, says nothing of how the arm's do. Empty:
+  /// none.
+  std::vector<bool> is_head{};
   [[nodiscard]] Eigen::Index estimated() const { return prior_sd.size(); }
   [[nodiscard]] Eigen::Index size() const { return prior_sd.size() + considered_root.rows(); }
 };
@@ -70,10 +74,11 @@ struct Innovation {
 /// that comes again takes the place of what it said before. Every block is linearised about one state, and again when
 /// the estimate has moved on: quadratics from different places claim to know directions that no picture tells (Huang et
 /// al., 2010, on the consistency of filters for simultaneous localisation and mapping). What blocks disagree about
-/// beyond their pictures' noise is learned as an error of every posture, in the joints' angles (a variance component,
-/// by MacKay's update of its evidence, 1992). What is believed of effects holds as a Student t distribution of four
-/// degrees of freedom does (Lange, Little and Taylor, 1989): pictures that contradict it outright are believed, and
-/// what is left open is then as wide as they ask for. At most `most_blocks` are kept. Not thread-safe.
+/// beyond their pictures' noise is learned as an error of every posture, in the joints' angles (variance components,
+/// one of the arm and one of the head, by MacKay's update of their evidence, 1992). What is believed of effects holds
+/// as a Student t distribution of four degrees of freedom does (Lange, Little and Taylor, 1989): pictures that
+/// contradict it outright are believed, and what is left open is then as wide as they ask for. At most `most_blocks`
+/// are kept. Not thread-safe.
 class PostureMemory {
  public:
   PostureMemory(MemoryLayout layout, const MemoryOptions& options);
@@ -157,8 +162,9 @@ class PostureMemory {
   [[nodiscard]] std::size_t postures() const { return blocks_.size() + old_postures_; }
   /// Mean NIS per direction of the last postures against the rest; 1: as believed.
   [[nodiscard]] double dispersion() const;
-  /// What a posture gets wrong, per joint, rad.
-  [[nodiscard]] double posture_sd_rad() const;
+  /// What a posture gets wrong, per joint of the arm, rad; and per joint that carries the cameras.
+  [[nodiscard]] double posture_sd_rad() const { return std::sqrt(posture_variance(false)); }
+  [[nodiscard]] double head_posture_sd_rad() const { return std::sqrt(posture_variance(true)); }
   [[nodiscard]] const MemoryLayout& layout() const { return layout_; }
 
  private:
@@ -178,6 +184,8 @@ class PostureMemory {
   };
   [[nodiscard]] Surprise surprise(const Quadratic& frame) const;
   [[nodiscard]] Quadratic with_posture_error(const Quadratic& block, std::span<const Eigen::Index> loose) const;
+  [[nodiscard]] bool is_head(Eigen::Index joint) const;
+  [[nodiscard]] double posture_variance(bool head) const;
   [[nodiscard]] double own_variance(Eigen::Index joint, std::span<const Eigen::Index> loose) const;
   [[nodiscard]] Quadratic sum() const;
   [[nodiscard]] MemoryEstimate solve(const Quadratic& sum) const;
@@ -198,9 +206,12 @@ class PostureMemory {
   std::size_t old_postures_ = 0;
   std::uint64_t begun_ = 0;
   double now_s_ = 0.0, old_s_ = 0.0;
-  double error_square_ = 0.0, error_directions_ = 0.0;  ///< of postures: sums of MacKay's update
+  /// What postures get wrong, in joints that are not the head's and in those that are.
+  struct PostureError {
+    double square = 0.0, directions = 0.0;  ///< sums of MacKay's update
+    double variance = 0.0;
+  } arm_error_, head_error_;
   double nis_ = 0.0, nis_dof_ = 0.0;
-  double posture_variance_;
   mutable std::optional<MemoryEstimate> estimate_;
   mutable Eigen::VectorXd widening_;           ///< as of estimate_
   mutable Eigen::MatrixXd posture_precision_;  ///< of a posture's state; empty: not worked out yet

@@ -1,0 +1,61 @@
+#include "stamp_noise.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "limits.hpp"
+
+namespace bodyschema {
+
+void StampNoise::learn(const Quadratic& frame, const TimeEvidence& time, const MemoryEstimate& in_posture) {
+  if (time.A <= 0.0) return;
+  const auto n = in_posture.x.size();
+  const auto A = frame.A.topLeftCorner(n, n);
+  const Eigen::VectorXd a = time.with_state.head(n);
+  // With all that is not known of the state integrated out, in this posture.
+  const Eigen::MatrixXd precision = in_posture.covariance.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::VectorXd h = (A + precision).ldlt().solve(a);
+  const double information = time.A - a.dot(h);
+  const double score = time.b - a.dot(in_posture.x) - h.dot(frame.b.head(n) - A * in_posture.x);
+  if (!(information > 0.0)) return;
+  last_.push_back({score / information, 1.0 / information});
+  if (last_.size() > limits::kRecentStamps) last_.pop_front();
+  constexpr double kRange = 1e3, kStep = 1.1;  // of the standard deviation, about what is believed of it
+  double most = log_posterior(believed_s2_);
+  variance_s2_ = believed_s2_;
+  for (double factor = 1.0 / kRange; factor < kRange; factor *= kStep) {
+    const double variance_s2 = factor * factor * believed_s2_, own = log_posterior(variance_s2);
+    if (own <= most) continue;
+    most = own;
+    variance_s2_ = variance_s2;
+  }
+}
+
+/// Normal stamps about the right time, seen with each frame's own variance; before any, an inverse chi-square
+/// distribution about what is believed.
+double StampNoise::log_posterior(double variance_s2) const {
+  double sum = -0.5 * limits::kStampsBelieved * (std::log(variance_s2) + believed_s2_ / variance_s2);
+  for (const auto& seen : last_) {
+    const double total = variance_s2 + seen.variance_s2;
+    sum -= 0.5 * (std::log(total) + seen.off_s * seen.off_s / total);
+  }
+  return sum;
+}
+
+void StampNoise::take_out(const TimeEvidence& time, Quadratic& frame) const {
+  if (time.A <= 0.0) return;
+  const double precision = time.A + 1.0 / variance_s2_;
+  frame.A -= time.with_state * (time.with_state.transpose() / precision);
+  frame.b -= time.with_state * (time.b / precision);
+}
+
+double StampNoise::sd_s() const {
+  return std::sqrt(variance_s2_);
+}
+
+void StampNoise::forget() {
+  *this = StampNoise(std::sqrt(believed_s2_));
+}
+
+}  // namespace bodyschema

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+
+#include "bodyschema/evidence/posture_memory.hpp"
+
+namespace bodyschema {
+
+/// What pictures say of how long before or after their stamp they were taken, s: one more parameter beside those of a
+/// Quadratic, in the same form.
+struct TimeEvidence {
+  Eigen::VectorXd with_state;  ///< the column of A beside that parameter: over all parameters of the quadratic
+  double A = 0.0, b = 0.0;
+};
+
+/// How far the stamps of pictures err from picture to picture against those of the encoders: no frame of an arm that
+/// moves knows its joints nearer than by their motion in that time. Told from the last frames that agree with what is
+/// known: the most likely variance, with a prior that counts as some frames. That all are late alike is an effect
+/// (`latency`).
+class StampNoise {
+ public:
+  /// @param believed_sd_s  before any frame
+  explicit StampNoise(double believed_sd_s) : believed_s2_(believed_sd_s * believed_sd_s), variance_s2_(believed_s2_) {}
+
+  /// Learns from a frame.
+  /// @param frame  over the estimated parameters, and more that are not looked at
+  void learn(const Quadratic& frame, const TimeEvidence& time, const MemoryEstimate& in_posture);
+  /// What is left of a frame's say, whenever it was taken.
+  void take_out(const TimeEvidence& time, Quadratic& frame) const;
+  [[nodiscard]] double sd_s() const;
+  void forget();
+
+ private:
+  /// How far off a frame's stamp was, as the frame alone tells it.
+  struct Seen {
+    double off_s, variance_s2;
+  };
+  [[nodiscard]] double log_posterior(double variance_s2) const;
+
+  double believed_s2_, variance_s2_;
+  std::deque<Seen> last_;
+};
+
+}  // namespace bodyschema
