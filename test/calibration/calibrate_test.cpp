@@ -570,6 +570,12 @@ TEST_F(Calibrated, AJointThatTurnsTheOtherWayIsNotGood) {
   std::string first;
   std::getline(offsets, first);
   EXPECT_EQ(first, "# NOT TO BE APPLIED. " + found.sentence);
+  for (const char* file : {"corrected.urdf", "ros/joint_calibration.yaml", "ros/camera_info/left.yaml",
+                           "ros/static_transforms.sh", "ros/ros2_control_transmissions.xml"}) {
+    std::ifstream stream(options.out / file);
+    const std::string text((std::istreambuf_iterator<char>(stream)), {});
+    EXPECT_THAT(text, HasSubstr("NOT TO BE APPLIED. " + found.sentence)) << file;
+  }
 }
 
 /// From the sixth posture on the camera stands elsewhere: its pictures are those of the other one.
