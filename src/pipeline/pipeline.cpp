@@ -107,7 +107,7 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
       spdlog::warn(
           "camera '{}' has no distortion in the configuration: how its lens bends pictures (k1) is estimated beside "
           "the offsets, which takes longer and tells them less well; set cameras.{}.distortion, to zeros where "
-          "pictures come straightened",
+          "pictures come straightened (bodyschema new-robot --rectified)",
           camera.name, camera.name);
     }
     std::optional<Undistorter> undistorter;
