@@ -65,7 +65,8 @@ bool ImportTarget::slides(const std::string& joint) const {
 ImportTarget ImportTarget::from(const Configuration& configuration, const std::filesystem::path& mapping) {
   ImportTarget target;
   const Configuration robot = configuration.section("robot"), cameras = configuration.section("cameras"),
-                      bus = configuration.section("bus"), import = configuration.section("import");
+                      bus = configuration.section("bus");
+  Configuration import = configuration.section("import");
   target.setup = RobotSetup::from(robot);
   target.rig = StereoRig::from(cameras);
   target.bus = BusOptions::from(bus);
@@ -76,33 +77,15 @@ ImportTarget ImportTarget::from(const Configuration& configuration, const std::f
   if (!mapping.empty()) {
     const Configuration file = Configuration::load(mapping);
     if (!file.has("import")) file.fail("import", "a section 'import'; docs/import_recordings.md explains it");
-    target.mapping = JointMapping::from(file.section("import"));
+    import = file.section("import");
+    target.mapping = JointMapping::from(import);
     file.reject_unknown_keys();
   }
   RobotSetup no_meshes = target.setup;  // their names still say which joints matter
   no_meshes.model.rendered_links.clear();
   target.robot = load_robot(no_meshes, target.rig);
 
-  std::vector<std::string> joint_names;
-  for (const JointInfo& joint : target.robot->joints()) joint_names.push_back(joint.name);
-  for (const auto& [column, rule] : target.mapping.joints) {
-    if (rule.joint.empty() || target.robot->find_joint(rule.joint)) continue;
-    throw ConfigurationError((mapping.empty() ? import.section("joints").place(column)
-                                              : mapping.string() + ": key 'import.joints." + column + "'") +
-                             " is '" + rule.joint + "', no joint of robot '" + target.robot->name() +
-                             "'; did you mean '" + nearest_name(rule.joint, joint_names) + "'?");
-  }
-  for (const auto* list : {&target.mapping.cameras, &target.mapping.masks}) {
-    for (const auto& [camera, source] : *list) {
-      const auto& rig = target.rig.cameras;
-      if (std::any_of(rig.begin(), rig.end(), [&name = camera](const auto& c) { return c.name == name; })) continue;
-      std::vector<std::string> names;
-      for (const auto& c : rig) names.push_back(c.name);
-      throw ConfigurationError(fmt::format("import.{}: '{}' is no camera of the configuration, which has {}",
-                                           list == &target.mapping.cameras ? "cameras" : "masks", camera,
-                                           fmt::join(names, " and ")));
-    }
-  }
+  target.mapping.check_names(import, *target.robot, target.rig);
   return target;
 }
 

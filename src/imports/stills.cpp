@@ -137,11 +137,32 @@ class StillsImport {
   }
 
  private:
+  /// A folder that the mapping names and that is not there is a slip of the pen.
+  void check_folders(const char* kind, const std::map<std::string, std::string>& given,
+                     const std::vector<std::string>& there) const {
+    for (const auto& [camera, folder] : given) {
+      if (there.empty() || std::find(there.begin(), there.end(), folder) != there.end()) continue;
+      throw FileError(fmt::format("{}/{}: no folder '{}', which import.{}.{} names; expected {}",
+                                  folder_.folder.string(), kind, folder,
+                                  std::string(kind) == "images" ? "cameras" : kind, camera, fmt::join(there, " or ")));
+    }
+  }
+
+  void check_columns() const {
+    for (const auto& [column, rule] : target_.mapping.joints) {
+      if (rule.joint.empty() || table_.find({column.c_str()}) != CsvTable::kNone) continue;
+      throw FileError(fmt::format("{}: no column '{}', which import.joints says is joint '{}'; did you mean '{}'?",
+                                  table_.file.string(), column, rule.joint, nearest_name(column, table_.names)));
+    }
+  }
+
   void find_cameras() {
     image_folders_ = folders_of(target_, target_.mapping.cameras, folder_.images);
     mask_folders_ = folders_of(target_, target_.mapping.masks, folder_.masks);
     std::vector<std::string> there;
     for (const auto& [name, pictures] : folder_.images) there.push_back(name);
+    check_folders("images", target_.mapping.cameras, there);
+    if (options_.masks) check_folders("masks", target_.mapping.masks, folder_.mask_folders());
     for (std::size_t c = 0; c < image_folders_.size(); ++c) {
       const std::string& camera = target_.rig.cameras[c].name;
       if (image_folders_[c].empty() && std::all_of(image_folders_.begin(), image_folders_.end(),
@@ -173,6 +194,7 @@ class StillsImport {
   }
 
   void read_columns() {
+    check_columns();
     number_column_ = table_.find({"posture", "frame"});
     time_column_ = table_.find({"time_s"});
     moving_ = time_column_ != CsvTable::kNone;

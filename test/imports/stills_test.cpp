@@ -20,6 +20,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Key;
+using ::testing::ThrowsMessage;
 
 const std::string kLens = "width: 8, height: 6, fx: 8, fy: 8, cx: 3.5, cy: 2.5";
 
@@ -332,9 +333,30 @@ TEST_F(Stills, AMappingToNoJointIsAnErrorOfTheConfiguration) {
   } catch (const ConfigurationError& e) {
     EXPECT_THAT(e.what(), HasSubstr("import.joints.A1' is 'joint_one', no joint of robot 'arm7'; did you mean"));
   }
-  EXPECT_THROW((void)target("import: {cameras: {middle: x}}\n"), ConfigurationError);
+  EXPECT_THAT([&] { (void)target("import: {cameras: {middle: x}}\n"); },
+              ThrowsMessage<ConfigurationError>(
+                  HasSubstr("key 'import.cameras.middle': 'middle' is no camera of the configuration; expected left or "
+                            "right")));
+  const fs::path mapping = stills_.write("mapping.yaml", "import: {masks: {lfet: x}}\n");
+  EXPECT_THAT([&] { (void)ImportTarget::from(Configuration::parse(robot() + cameras()), mapping); },
+              ThrowsMessage<ConfigurationError>(HasSubstr("mapping.yaml:1: key 'import.masks.lfet'")));
   EXPECT_THROW((void)target("import: {joints: {A: joint1, B: joint1}}\n"), ConfigurationError);
   EXPECT_THROW((void)target("import: {joints: {A: {joint: joint1, scale: 0}}}\n"), ConfigurationError);
+}
+
+/// A sign that a mapping gives a column of another name would be lost without a word.
+TEST_F(Stills, AMappingOfWhatTheFolderLacksIsAnError) {
+  EXPECT_THAT(error_of(target("import: {joints: {jont1: {joint: joint1, scale: -1}}}\n")),
+              HasSubstr("joints.csv: no column 'jont1', which import.joints says is joint 'joint1'; did you mean "
+                        "'joint1'?"));
+  EXPECT_THAT(error_of(target("import: {cameras: {left: lfet}}\n")),
+              HasSubstr("/images: no folder 'lfet', which import.cameras.left names; expected left or right"));
+  const auto masks = target("import: {masks: {left: network}}\n");
+  stills_.mask("left/00.png", 255);
+  EXPECT_THAT(error_of(masks), HasSubstr("/masks: no folder 'network', which import.masks.left names; expected left"));
+  fs::remove_all(stills_.path() / "masks");
+  EXPECT_EQ(import(masks).cameras[0].pictures, 2u) << "no masks at all are none of a wrong name";
+  EXPECT_EQ(import(target("import: {joints: {conveyor: \"-\"}}\n")).joints.size(), 7u);
 }
 
 TEST_F(Stills, ReadingsThatLookLikeTheOtherUnitAreSaid) {
