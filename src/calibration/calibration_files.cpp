@@ -250,6 +250,11 @@ std::vector<std::string> notes_of(const Calibration& c) {
   return notes;
 }
 
+/// Every joint of a finger has an offset in the state; where nothing is found of one, a line of it says nothing.
+bool worth_a_line(const CalibratedParameter& p) {
+  return !p.name.starts_with("finger_offset") || std::abs(p.value) >= p.sd;
+}
+
 void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, const std::vector<Observation>& kept,
                 const CalibrationOptions& options) {
   Report page("Calibration of " + options.log.filename().string());
@@ -277,6 +282,7 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
     page.heading("What else was estimated");
     rows.clear();
     for (const auto& p : c.parameters) {
+      if (!worth_a_line(p)) continue;
       rows.push_back({p.name, fmt::format("{:.3g}", p.value), fmt::format("{:.2g}", p.sd),
                       fmt::format("{:.2g}", p.prior_sd), p.unit});
     }
@@ -382,7 +388,7 @@ std::string to_table(const Calibration& c) {
   }
   text += "\n";
   for (const auto& p : c.parameters) {
-    if (p.name.starts_with("camera_")) continue;
+    if (p.name.starts_with("camera_") || !worth_a_line(p)) continue;
     text +=
         fmt::format("\n{:<36} {:>9.3f} {:<3} sd {:.3f} (believed {:.3f})", p.name, p.value, p.unit, p.sd, p.prior_sd);
   }
