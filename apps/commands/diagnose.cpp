@@ -44,6 +44,7 @@ void add_diagnose(CLI::App& app) {
     LogDiagnosisOptions options;
     options.log = a->logs.front();
     options.out = a->out;
+    options.configuration = a->common.config;
     options.picture_rate_hz = a->rate_hz;
     options.threads = a->threads;
     DiagnosisReport::prepare(options.out);

@@ -23,7 +23,8 @@ void add_export(CLI::App& app) {
       "Example:\n  bodyschema export out/reach/summary.json --config config/icub_right/estimator.yaml --out out/apply");
   command->add_option("summary", a->summary, "summary.json of a replay")->required();
   command->add_option("-o,--out", a->out, "Folder for the files")->required();
-  command->add_flag("--anyway", a->anyway, "Also when the replay did not end converged or had another URDF");
+  command->add_flag("--anyway", a->anyway,
+                    "Also when the replay did not end converged or had another URDF or other cameras");
   a->common.add_to(*command);
   a->common.add_extended_model_to(*command);
   command->callback([a] {

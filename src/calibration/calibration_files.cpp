@@ -107,9 +107,15 @@ std::string why_so(const CalibratedJoint& joint) {
                      degrees(joint.seen_rad), degrees(joint.seen_sd_rad));
 }
 
+/// For the top of what is not to be applied; empty where it is.
+std::string warning_of(const Calibration& c) {
+  return c.state == CalibrationState::kGood ? "" : "NOT TO BE APPLIED. " + c.sentence;
+}
+
 /// What is to be applied, as the exporter takes it.
 Correction correction_of(const Calibration& c) {
   Correction correction;
+  if (const auto warning = warning_of(c); !warning.empty()) correction.warnings.push_back(warning);
   for (const auto& joint : c.joints) {
     if (!joint.applied) {
       correction.warnings.push_back(joint.name + " is left as it is: " + joint.untold_why);
@@ -140,14 +146,14 @@ void add_geometry(const Calibration& calibration, const BatchFit& batch, const P
   add_effects(geometry, log.robot(), pipeline.setup(), log.rig(), correction);
 }
 
-/// Above what is not to be applied; empty where it is.
-std::string warning_of(const Calibration& c) {
-  return c.state == CalibrationState::kGood ? "" : "# NOT TO BE APPLIED. " + c.sentence + '\n';
+std::string warning_comment(const Calibration& c) {
+  const std::string warning = warning_of(c);
+  return warning.empty() ? warning : "# " + warning + '\n';
 }
 
 std::string offsets_yaml(const Calibration& c, const Correction& correction) {
   std::string text =
-      warning_of(c) + "# encoder = true + offset: subtract from every encoder reading. Degrees.\nversion: 1\n";
+      warning_comment(c) + "# encoder = true + offset: subtract from every encoder reading. Degrees.\nversion: 1\n";
   std::string offsets = "offset_deg:\n", sds = "stddev_deg:\n";
   for (const auto& joint : c.joints) {
     if (!joint.applied) {
@@ -168,7 +174,7 @@ std::string offsets_yaml(const Calibration& c, const Correction& correction) {
 
 std::string cameras_yaml(const Calibration& c) {
   std::string text =
-      warning_of(c) +
+      warning_comment(c) +
       "# Cameras as found: to be included behind robot.yaml, or put in place of its section.\ncameras:\n";
   constexpr double kLeast_m = 1e-5, kLeast_rad = 2e-5;  // that a configuration takes
   for (const auto& camera : c.cameras) {
@@ -244,6 +250,11 @@ std::vector<std::string> notes_of(const Calibration& c) {
   return notes;
 }
 
+/// Every joint of a finger has an offset in the state; where nothing is found of one, a line of it says nothing.
+bool worth_a_line(const CalibratedParameter& p) {
+  return !p.name.starts_with("finger_offset") || std::abs(p.value) >= p.sd;
+}
+
 void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, const std::vector<Observation>& kept,
                 const CalibrationOptions& options) {
   Report page("Calibration of " + options.log.filename().string());
@@ -271,6 +282,7 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
     page.heading("What else was estimated");
     rows.clear();
     for (const auto& p : c.parameters) {
+      if (!worth_a_line(p)) continue;
       rows.push_back({p.name, fmt::format("{:.3g}", p.value), fmt::format("{:.2g}", p.sd),
                       fmt::format("{:.2g}", p.prior_sd), p.unit});
     }
@@ -376,7 +388,7 @@ std::string to_table(const Calibration& c) {
   }
   text += "\n";
   for (const auto& p : c.parameters) {
-    if (p.name.starts_with("camera_")) continue;
+    if (p.name.starts_with("camera_") || !worth_a_line(p)) continue;
     text +=
         fmt::format("\n{:<36} {:>9.3f} {:<3} sd {:.3f} (believed {:.3f})", p.name, p.value, p.unit, p.sd, p.prior_sd);
   }

@@ -55,7 +55,9 @@ std::optional<Objection> objection_of_outlines(const BatchFit& batch, const Doub
         CalibrationState::kNotConverged,
         fmt::format(
             "Not converged: on postures left out of the fit outlines lie {:.1f} px off on average, no nearer than "
-            "with robot and cameras as they are configured; nothing of it is to be applied.",
+            "with robot and cameras as they are configured; nothing of it is to be applied. Check masks, and that "
+            "joint "
+            "angles (joints.csv of photographs) are right and those of their pictures.",
             doubts.heldout_mean_px)};
   }
   const double after_px = result.outline_px.after / unit_px;

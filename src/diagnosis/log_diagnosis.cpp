@@ -15,6 +15,7 @@
 #include "log_length.hpp"
 #include "log_motion.hpp"
 #include "log_pictures.hpp"
+#include "next_steps.hpp"
 #include "telling_motion.hpp"
 
 namespace bodyschema {
@@ -63,7 +64,7 @@ class LogDiagnosis {
     if (other_masks) report.warnings.insert(report.warnings.begin(), kReadWithoutBackground);
     if (!options_.out.empty()) {
       const auto motion = diagnosis::telling_motion(fit, report);
-      report.next_steps = next_steps(report, motion.has_value());
+      report.next_steps = diagnosis::next_steps(report.verdict, options_, motion.has_value());
       report.write(options_.out);
       if (motion) motion->write(options_.out / "motion.csv");
       diagnosis_page(report, options_.log.filename().string(), diagnosis::draw_pictures(fit, watched_.kept, report))
@@ -136,36 +137,6 @@ class LogDiagnosis {
       widest = std::max(widest, high - low);
     }
     return widest;
-  }
-
-  /// What to do with the answer.
-  [[nodiscard]] std::vector<std::string> next_steps(const DiagnosisReport& report, bool has_motion) const {
-    const auto out = options_.out.string(), log = options_.log.string();
-    std::vector<std::string> steps;
-    if (report.verdict == "none") {
-      steps.push_back("Nothing to extend. Apply the offsets: bodyschema replay " + log + " --config CONFIG --out " +
-                      out + "/replay, then bodyschema export.");
-    }
-    if (report.verdict == "unexplained") {
-      steps.push_back(
-          "Apply nothing. Look at the pictures and at what is left, mend what they show (masks, a held thing, meshes), "
-          "or record another log and diagnose both: bodyschema diagnose " +
-          log + " SECOND.log --config CONFIG --out " + out + "_both");
-    }
-    if (report.verdict == "named" || report.verdict == "class") {
-      steps.push_back("See on a second log whether it holds: bodyschema diagnose " + log +
-                      " SECOND.log --config CONFIG --out " + out + "_both");
-      steps.push_back("Apply it: bodyschema replay " + log + " --config CONFIG --extended-model " + out +
-                      "/extended_model.yaml --out " + out + "/replay, then bodyschema export " + out +
-                      "/replay/summary.json --config CONFIG --extended-model " + out + "/extended_model.yaml --out " +
-                      out + "/apply");
-    }
-    if (has_motion) {
-      steps.push_back("To tell the causes of the class apart, record the motion in " + out +
-                      "/motion.csv (look at it first: bodyschema-sim --config SIMULATOR --motion " + out +
-                      "/motion.csv --log seen.log --contact-sheet seen.png) and diagnose both logs");
-    }
-    return steps;
   }
 
   /// What no regression says: which motion is missing altogether.

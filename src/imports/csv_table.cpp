@@ -45,7 +45,21 @@ bool read_number(const std::string& text, double& value) {
   return error == std::errc{} && stop == end && std::isfinite(value);
 }
 
+/// Spreadsheets write separators for columns that hold nothing.
+void drop_empty_end(std::vector<std::string>& fields, std::size_t wanted) {
+  while (fields.size() > wanted && fields.back().empty()) fields.pop_back();
+}
+
+bool are_empty(const std::vector<std::string>& fields) {
+  return std::all_of(fields.begin(), fields.end(), [](const std::string& field) { return field.empty(); });
+}
+
 }  // namespace
+
+FileError CsvTable::not_a_number(const Row& row, std::size_t column) const {
+  return FileError(where(row) + ": '" + row.words.at(column) + "' in column '" + names[column] +
+                   "' is not a finite number");
+}
 
 std::size_t CsvTable::find(std::initializer_list<const char*> wanted) const {
   for (const char* name : wanted) {
@@ -73,6 +87,7 @@ CsvTable CsvTable::read(const std::filesystem::path& file) {
     if (line.find(',') == std::string::npos && line.find(other) != std::string::npos) separator = other;
   }
   table.names = fields_of(line, separator);
+  drop_empty_end(table.names, 1);
   const std::string first = file.string() + ":" + std::to_string(std::max<std::uint64_t>(number, 1));
   if (line.size() > kMaxLineBytes || table.names.size() > kMaxColumns) {
     throw FileError(first + ": too many columns; expected a line of names, at most " + std::to_string(kMaxColumns));
@@ -92,7 +107,9 @@ CsvTable CsvTable::read(const std::filesystem::path& file) {
     Row row;
     row.line = number;
     const std::string where = file.string() + ":" + std::to_string(number);
-    const auto fields = line.size() > kMaxLineBytes ? std::vector<std::string>() : fields_of(line, separator);
+    auto fields = line.size() > kMaxLineBytes ? std::vector<std::string>() : fields_of(line, separator);
+    if (!fields.empty() && are_empty(fields)) continue;
+    drop_empty_end(fields, table.names.size());
     if (fields.size() != table.names.size()) {
       table.bad.add(FileError(where + ": " + std::to_string(fields.size()) + " values, expected " +
                               std::to_string(table.names.size())));
@@ -101,13 +118,11 @@ CsvTable CsvTable::read(const std::filesystem::path& file) {
     for (std::size_t c = 0; c < fields.size(); ++c) {
       double value = std::numeric_limits<double>::quiet_NaN();
       if (!fields[c].empty() && !read_number(fields[c], value)) {
-        table.bad.add(
-            FileError(where + ": '" + fields[c] + "' in column '" + table.names[c] + "' is not a finite number"));
-        break;
+        value = std::numeric_limits<double>::quiet_NaN();  // it may have begun as one
+        row.words[c] = fields[c];
       }
       row.values.push_back(value);
     }
-    if (row.values.size() != fields.size()) continue;
     values += fields.size();
     if (values > kMaxValues) throw FileError(where + ": too many rows for one recording; cut it into parts");
     table.rows.push_back(std::move(row));

@@ -1,6 +1,13 @@
 #include "bodyschema/imports/joint_mapping.hpp"
 
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/fmt/ranges.h>
+
+#include <algorithm>
 #include <cmath>
+
+#include "bodyschema/core/error.hpp"
+#include "bodyschema/core/nearest_name.hpp"
 
 namespace bodyschema {
 namespace {
@@ -29,6 +36,15 @@ std::map<std::string, std::string> names(const Configuration& section) {
   return all;
 }
 
+void check_cameras(const Configuration& section, const std::map<std::string, std::string>& sources,
+                   const std::vector<std::string>& cameras) {
+  for (const auto& [camera, source] : sources) {
+    if (std::find(cameras.begin(), cameras.end(), camera) != cameras.end()) continue;
+    throw ConfigurationError(fmt::format("{}: '{}' is no camera of the configuration; expected {}",
+                                         section.place(camera), camera, fmt::join(cameras, " or ")));
+  }
+}
+
 }  // namespace
 
 JointMapping JointMapping::from(const Configuration& import) {
@@ -47,6 +63,19 @@ JointMapping JointMapping::from(const Configuration& import) {
   mapping.cameras = names(import.section("cameras"));
   mapping.masks = names(import.section("masks"));
   return mapping;
+}
+
+void JointMapping::check_names(const Configuration& import, const RobotModel& robot, const StereoRig& rig) const {
+  std::vector<std::string> names, camera_names;
+  for (const JointInfo& joint : robot.joints()) names.push_back(joint.name);
+  for (const auto& [column, rule] : joints) {
+    if (rule.joint.empty() || robot.find_joint(rule.joint)) continue;
+    throw ConfigurationError(import.section("joints").place(column) + " is '" + rule.joint + "', no joint of robot '" +
+                             robot.name() + "'; did you mean '" + nearest_name(rule.joint, names) + "'?");
+  }
+  for (const CameraModel& camera : rig.cameras) camera_names.push_back(camera.name);
+  check_cameras(import.section("cameras"), cameras, camera_names);
+  check_cameras(import.section("masks"), masks, camera_names);
 }
 
 }  // namespace bodyschema

@@ -34,6 +34,20 @@ std::vector<std::string> guessed_names(const std::vector<std::string>& missing, 
   return rules;
 }
 
+/// A robot comes in over one side of the picture or two; what surrounds it fills the border. All robot is no inverse.
+bool looks_inverted(const Image& mask) {
+  if (std::find(mask.data.begin(), mask.data.end(), kMaskBackground) == mask.data.end()) return false;
+  std::size_t border = 0, robot = 0;
+  for (int v = 0; v < mask.height; ++v) {
+    const int step = v == 0 || v + 1 == mask.height ? 1 : std::max(1, mask.width - 1);
+    for (int u = 0; u < mask.width; u += step) {
+      ++border;
+      robot += *mask.pixel(u, v) == kMaskRobot ? 1 : 0;
+    }
+  }
+  return 2 * robot > border;
+}
+
 }  // namespace
 
 void LeftOut::check(std::uint64_t all, const char* what) const {
@@ -51,7 +65,8 @@ bool ImportTarget::slides(const std::string& joint) const {
 ImportTarget ImportTarget::from(const Configuration& configuration, const std::filesystem::path& mapping) {
   ImportTarget target;
   const Configuration robot = configuration.section("robot"), cameras = configuration.section("cameras"),
-                      bus = configuration.section("bus"), import = configuration.section("import");
+                      bus = configuration.section("bus");
+  Configuration import = configuration.section("import");
   target.setup = RobotSetup::from(robot);
   target.rig = StereoRig::from(cameras);
   target.bus = BusOptions::from(bus);
@@ -62,33 +77,15 @@ ImportTarget ImportTarget::from(const Configuration& configuration, const std::f
   if (!mapping.empty()) {
     const Configuration file = Configuration::load(mapping);
     if (!file.has("import")) file.fail("import", "a section 'import'; docs/import_recordings.md explains it");
-    target.mapping = JointMapping::from(file.section("import"));
+    import = file.section("import");
+    target.mapping = JointMapping::from(import);
     file.reject_unknown_keys();
   }
   RobotSetup no_meshes = target.setup;  // their names still say which joints matter
   no_meshes.model.rendered_links.clear();
   target.robot = load_robot(no_meshes, target.rig);
 
-  std::vector<std::string> joint_names;
-  for (const JointInfo& joint : target.robot->joints()) joint_names.push_back(joint.name);
-  for (const auto& [column, rule] : target.mapping.joints) {
-    if (rule.joint.empty() || target.robot->find_joint(rule.joint)) continue;
-    throw ConfigurationError((mapping.empty() ? import.section("joints").place(column)
-                                              : mapping.string() + ": key 'import.joints." + column + "'") +
-                             " is '" + rule.joint + "', no joint of robot '" + target.robot->name() +
-                             "'; did you mean '" + nearest_name(rule.joint, joint_names) + "'?");
-  }
-  for (const auto* list : {&target.mapping.cameras, &target.mapping.masks}) {
-    for (const auto& [camera, source] : *list) {
-      const auto& rig = target.rig.cameras;
-      if (std::any_of(rig.begin(), rig.end(), [&name = camera](const auto& c) { return c.name == name; })) continue;
-      std::vector<std::string> names;
-      for (const auto& c : rig) names.push_back(c.name);
-      throw ConfigurationError(fmt::format("import.{}: '{}' is no camera of the configuration, which has {}",
-                                           list == &target.mapping.cameras ? "cameras" : "masks", camera,
-                                           fmt::join(names, " and ")));
-    }
-  }
+  target.mapping.check_names(import, *target.robot, target.rig);
   return target;
 }
 
@@ -113,7 +110,7 @@ LogBuilder::LogBuilder(const ImportTarget& target, const std::filesystem::path& 
     : target_(target), channels_(target.bus.channels()), log_(log), unfinished_(log),
       writer_(std::make_unique<LogWriter>(unfinished_.part())),
       readings_(static_cast<std::size_t>(target.robot->joint_count()), 0), largest_(readings_.size(), 0.0),
-      channels_of_(target.rig.cameras.size(), 0) {
+      channels_of_(target.rig.cameras.size(), 0), inverted_(target.rig.cameras.size(), 0) {
   for (const CameraModel& camera : target.rig.cameras) summary_.cameras.push_back({camera.name, 0, 0});
 }
 
@@ -266,6 +263,7 @@ void LogBuilder::add_mask(Microseconds arrival, std::size_t camera, Microseconds
   }
   if (const DecodeResult good = to_mask(mask); !good.ok()) return leave_out(what, where + ": " + good.detail);
   write(channels_.masks, arrival, utime, camera, to_message(mask, utime));
+  if (looks_inverted(mask)) ++inverted_[camera];
   ++summary_.cameras[camera].masks;
 }
 
@@ -344,6 +342,14 @@ ImportSummary LogBuilder::finish() {
   }
   check_joints();
   doubt_unit();
+  for (std::size_t c = 0; c < inverted_.size(); ++c) {
+    const auto& camera = summary_.cameras[c];
+    if (2 * inverted_[c] <= camera.masks) continue;
+    note(
+        fmt::format("in {} of {} masks of camera '{}' the robot fills most of the picture's border: are they "
+                    "inverted? Expected 0 background, 255 robot",
+                    inverted_[c], camera.masks, camera.name));
+  }
   for (const auto& camera : summary_.cameras) {
     if (camera.pictures == 0) note("no picture of camera '" + camera.name + "'");
     if (camera.masks == 0 && masks > 0) note("no mask of camera '" + camera.name + "'");

@@ -16,6 +16,10 @@ inline constexpr int kMaxSide_px = 4096;
 /// pixels is taken, and a file cut short is an error.
 Image read_picture_file(const std::filesystem::path& file);
 
+/// The same for a mask. One that is drawn in a PNG's alpha channel, over one colour, is read from there; where colours
+/// and alpha say different things, FileError.
+Image read_mask_file(const std::filesystem::path& file);
+
 /// The same for the bytes of a PNG or JPEG file. @param where  begins the error
 Image read_picture(std::span<const std::uint8_t> bytes, const std::filesystem::path& where);
 /// Whether a file of these bytes would be a JPEG.

@@ -32,13 +32,17 @@ std::optional<std::int64_t> number_of(const fs::path& file) {
   return number;
 }
 
+std::string lower_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+  return text;
+}
+
 bool is_joint_column(const std::string& name) {
   return name != "posture" && name != "frame" && name != "time_s";
 }
 
 bool is_picture(const fs::path& file) {
-  std::string ending = file.extension().string();
-  for (char& c : ending) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+  const std::string ending = lower_case(file.extension().string());
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".ppm" || ending == ".pgm";
 }
 
@@ -64,15 +68,33 @@ void list_pictures(const fs::path& folder, std::map<std::int64_t, fs::path>& pic
 }
 
 /// Where the pictures of each camera of the rig are: those of a folder of its name, or of the one that is configured.
+std::string folder_of(const std::string& camera, const std::map<std::string, std::string>& given) {
+  const auto other = given.find(camera);
+  return other != given.end() ? other->second : camera;
+}
+
 std::vector<std::string> folders_of(const ImportTarget& target, const std::map<std::string, std::string>& given,
                                     const std::map<std::string, std::map<std::int64_t, fs::path>>& there) {
   std::vector<std::string> folders;
   for (const CameraModel& camera : target.rig.cameras) {
-    const auto other = given.find(camera.name);
-    const std::string& name = other != given.end() ? other->second : camera.name;
+    const std::string name = folder_of(camera.name, given);
     folders.push_back(there.contains(name) ? name : "");
   }
   return folders;
+}
+
+/// joints.csv, in which a spreadsheet may have begun the names of columns with a capital.
+CsvTable read_joints(const fs::path& folder) {
+  CsvTable table = CsvTable::read(folder / "joints.csv");
+  for (std::string& name : table.names) {
+    const std::string lower = lower_case(name);
+    if (is_joint_column(lower) || lower == name) continue;
+    if (table.find({lower.c_str()}) != CsvTable::kNone) {
+      throw FileError(fmt::format("{}: columns '{}' and '{}'; expected one of them", table.file.string(), lower, name));
+    }
+    name = lower;
+  }
+  return table;
 }
 
 /// One row of joints.csv and its place in time.
@@ -86,8 +108,8 @@ class StillsImport {
  public:
   StillsImport(const fs::path& folder, const ImportTarget& target, const StillsImportOptions& options,
                const fs::path& log)
-      : target_(target), options_(options), folder_(StillsFolder::list(folder)),
-        table_(CsvTable::read(folder / "joints.csv")), builder_(target, log) {}
+      : target_(target), options_(options), folder_(StillsFolder::list(folder)), table_(read_joints(folder)),
+        builder_(target, log) {}
 
   ImportSummary run(const std::function<void(std::uint64_t, std::uint64_t)>& progress) {
     find_cameras();
@@ -115,11 +137,32 @@ class StillsImport {
   }
 
  private:
+  /// A folder that the mapping names and that is not there is a slip of the pen.
+  void check_folders(const char* kind, const std::map<std::string, std::string>& given,
+                     const std::vector<std::string>& there) const {
+    for (const auto& [camera, folder] : given) {
+      if (there.empty() || std::find(there.begin(), there.end(), folder) != there.end()) continue;
+      throw FileError(fmt::format("{}/{}: no folder '{}', which import.{}.{} names; expected {}",
+                                  folder_.folder.string(), kind, folder,
+                                  std::string(kind) == "images" ? "cameras" : kind, camera, fmt::join(there, " or ")));
+    }
+  }
+
+  void check_columns() const {
+    for (const auto& [column, rule] : target_.mapping.joints) {
+      if (rule.joint.empty() || table_.find({column.c_str()}) != CsvTable::kNone) continue;
+      throw FileError(fmt::format("{}: no column '{}', which import.joints says is joint '{}'; did you mean '{}'?",
+                                  table_.file.string(), column, rule.joint, nearest_name(column, table_.names)));
+    }
+  }
+
   void find_cameras() {
     image_folders_ = folders_of(target_, target_.mapping.cameras, folder_.images);
     mask_folders_ = folders_of(target_, target_.mapping.masks, folder_.masks);
     std::vector<std::string> there;
     for (const auto& [name, pictures] : folder_.images) there.push_back(name);
+    check_folders("images", target_.mapping.cameras, there);
+    if (options_.masks) check_folders("masks", target_.mapping.masks, folder_.mask_folders());
     for (std::size_t c = 0; c < image_folders_.size(); ++c) {
       const std::string& camera = target_.rig.cameras[c].name;
       if (image_folders_[c].empty() && std::all_of(image_folders_.begin(), image_folders_.end(),
@@ -151,15 +194,51 @@ class StillsImport {
   }
 
   void read_columns() {
+    check_columns();
     number_column_ = table_.find({"posture", "frame"});
     time_column_ = table_.find({"time_s"});
     moving_ = time_column_ != CsvTable::kNone;
     for (std::size_t c = 0; c < table_.names.size(); ++c) {
-      if (!is_joint_column(table_.names[c])) continue;
+      const std::string& name = table_.names[c];
+      if (!is_joint_column(name)) continue;
+      const bool joint = is_joint(name);
+      if (!joint && hold_words(c)) continue;
       joint_columns_.push_back(c);
-      joint_names_.push_back(table_.names[c]);
+      joint_names_.push_back(name);
+      is_joint_.push_back(joint);
     }
     if (joint_names_.empty()) throw FileError(table_.file.string() + ": no column of a joint");
+  }
+
+  /// Whether the robot or the mapping knows this column.
+  [[nodiscard]] bool is_joint(const std::string& column) const {
+    const auto rule = target_.mapping.joints.find(column);
+    if (rule != target_.mapping.joints.end()) return !rule->second.joint.empty();
+    return target_.robot->find_joint(column).has_value();
+  }
+
+  /// Whether a column holds words, as somebody's notes; says so.
+  bool hold_words(std::size_t column) {
+    const auto row = std::find_if(table_.rows.begin(), table_.rows.end(),
+                                  [&](const CsvTable::Row& r) { return r.words.contains(column); });
+    if (row == table_.rows.end()) return false;
+    builder_.note(fmt::format("joints.csv: column '{}' is no joint and holds text ('{}'); it is not read",
+                              table_.names[column], row->words.at(column)));
+    return true;
+  }
+
+  /// Throws where a field that counts is empty or holds words.
+  void check_fields(const CsvTable::Row& row) const {
+    for (const std::size_t c : {number_column_, time_column_}) {
+      if (row.words.contains(c)) throw table_.not_a_number(row, c);
+    }
+    for (std::size_t k = 0; k < joint_columns_.size(); ++k) {
+      const std::size_t c = joint_columns_[k];
+      if (!is_joint_[k] || !std::isnan(row.values[c])) continue;
+      if (row.words.contains(c)) throw table_.not_a_number(row, c);
+      if (moving_) continue;
+      throw FileError(fmt::format("{}: no value in column '{}'", table_.where(row), table_.names[c]));
+    }
   }
 
   /// The number of the first picture, where rows that have none are one for each picture, in order; otherwise 0.
@@ -184,6 +263,7 @@ class StillsImport {
     std::set<std::int64_t> seen;
     for (const CsvTable::Row& row : table_.rows) {
       try {
+        check_fields(row);
         Posture posture{&row, 0, std::nullopt};
         if (number_column_ == CsvTable::kNone) {
           posture.number = first + static_cast<std::int64_t>(&row - table_.rows.data());
@@ -208,10 +288,6 @@ class StillsImport {
           }
         } else {
           posture.utime = options_.recorded_at + static_cast<Microseconds>(postures_.size() + 1) * kStillPeriod;
-        }
-        for (const std::size_t c : joint_columns_) {
-          if (!std::isnan(row.values[c]) || moving_) continue;
-          throw FileError(fmt::format("{}: no value in column '{}'", table_.where(row), table_.names[c]));
         }
         postures_.push_back(posture);
       } catch (const FileError& error) {
@@ -264,9 +340,9 @@ class StillsImport {
     if (!options_.masks) return;
     for (std::size_t c = 0; c < mask_folders_.size(); ++c) {
       const fs::path* file = file_of(folder_.masks, mask_folders_[c], posture);
-      if (file == nullptr) continue;
+      if (file == nullptr || file_of(folder_.images, image_folders_[c], posture) == nullptr) continue;
       try {
-        builder_.add_mask(posture.utime, c, posture.utime, read_picture_file(*file), file->string());
+        builder_.add_mask(posture.utime, c, posture.utime, read_mask_file(*file), file->string());
       } catch (const FileError& error) {
         builder_.leave_out("masks of camera " + target_.rig.cameras[c].name, error.what());
       }
@@ -300,8 +376,29 @@ class StillsImport {
     const bool has_masks = std::any_of(mask_folders_.begin(), mask_folders_.end(),
                                        [](const std::string& folder) { return !folder.empty(); });
     if (has_masks && !options_.masks) builder_.note("masks are there and are left out, as asked (--no-masks)");
+    if (options_.masks) leave_out_lost_masks();
     for (const std::string& name : folder_.not_read)
       builder_.note(name + "/ is not read: nothing here makes use of it");
+  }
+
+  /// Masks that belong to no picture of a camera that is imported, or to no camera.
+  void leave_out_lost_masks() {
+    std::set<std::string> known;
+    for (std::size_t c = 0; c < image_folders_.size(); ++c) {
+      const std::string& camera = target_.rig.cameras[c].name;
+      const std::string masks = folder_of(camera, target_.mapping.masks);
+      known.insert(masks);
+      if (image_folders_[c].empty()) continue;
+      for (const std::string& why : folder_.masks_without_picture(masks, image_folders_[c])) {
+        builder_.leave_out("masks of camera " + camera, why);
+      }
+    }
+    for (const std::string& folder : folder_.mask_folders()) {
+      if (known.contains(folder) || folder_.images.contains(folder)) continue;  // of a camera that is not imported
+      for (const std::string& why : folder_.masks_without_picture(folder, folder)) {
+        builder_.leave_out("masks of camera " + folder, why);
+      }
+    }
   }
 
   const ImportTarget& target_;
@@ -313,6 +410,7 @@ class StillsImport {
   std::size_t number_column_ = CsvTable::kNone, time_column_ = CsvTable::kNone;
   std::vector<std::size_t> joint_columns_;
   std::vector<std::string> joint_names_;
+  std::vector<bool> is_joint_;  ///< by joint column: of the robot or the mapping, not something else with numbers
   bool moving_ = false;
   std::vector<Posture> postures_;
 };
@@ -332,7 +430,15 @@ StillsFolder StillsFolder::list(const fs::path& folder) {
     for (const fs::path& camera : entries_of(folder / kind)) {
       if (!fs::is_directory(camera)) continue;
       std::map<std::int64_t, fs::path> pictures;
-      list_pictures(camera, pictures, found.unnumbered);
+      std::vector<std::string> unnumbered;
+      list_pictures(camera, pictures, unnumbered);
+      if (!unnumbered.empty()) {
+        if (&cameras == &found.masks) {
+          found.unnumbered_masks[camera.filename().string()] = std::move(unnumbered);
+        } else {
+          found.unnumbered.insert(found.unnumbered.end(), unnumbered.begin(), unnumbered.end());
+        }
+      }
       if (!pictures.empty()) cameras[camera.filename().string()] = std::move(pictures);
     }
   }
@@ -352,15 +458,52 @@ StillsFolder StillsFolder::list(const fs::path& folder) {
   return found;
 }
 
+std::vector<std::string> StillsFolder::mask_folders() const {
+  std::set<std::string> names;
+  for (const auto& [name, files] : masks) names.insert(name);
+  for (const auto& [name, files] : unnumbered_masks) names.insert(name);
+  return {names.begin(), names.end()};
+}
+
+std::vector<std::string> StillsFolder::masks_without_picture(const std::string& masks_of,
+                                                             const std::string& images_of) const {
+  std::vector<std::string> lost;
+  const auto pictures = images.find(images_of);
+  const auto expected = [&] {
+    if (pictures != images.end()) {
+      return fmt::format("expected the name of its picture, as {}",
+                         pictures->second.begin()->second.filename().string());
+    }
+    std::vector<std::string> cameras;
+    for (const auto& [name, files] : images) cameras.push_back(name);
+    return fmt::format("no folder images/{}; expected the name of a camera's: {}", images_of, fmt::join(cameras, ", "));
+  }();
+  if (const auto files = unnumbered_masks.find(masks_of); files != unnumbered_masks.end()) {
+    for (const std::string& file : files->second) {
+      lost.push_back(fmt::format("{}: its name ends in no number, or in that of another mask; {}", file, expected));
+    }
+  }
+  if (const auto files = masks.find(masks_of); files != masks.end()) {
+    for (const auto& [number, file] : files->second) {
+      if (pictures != images.end() && pictures->second.contains(number)) continue;
+      lost.push_back(fmt::format("{}: mask of no picture; {}", file.string(), expected));
+    }
+  }
+  return lost;
+}
+
 StillsColumns StillsColumns::read(const fs::path& folder) {
-  const CsvTable table = CsvTable::read(folder / "joints.csv");
+  const CsvTable table = read_joints(folder);
   StillsColumns columns;
+  columns.rows = table.rows.size();
   columns.moving = table.find({"time_s"}) != CsvTable::kNone;
   for (std::size_t c = 0; c < table.names.size(); ++c) {
     if (!is_joint_column(table.names[c])) continue;
     columns.names.push_back(table.names[c]);
     double& largest = columns.largest.emplace_back(0.0);
+    LeftOut& words = columns.words.emplace_back();
     for (const auto& row : table.rows) {
+      if (row.words.contains(c)) words.add(table.not_a_number(row, c));
       if (!std::isnan(row.values[c])) largest = std::max(largest, std::abs(row.values[c]));
     }
   }

@@ -18,6 +18,7 @@
 #include "bodyschema/imports/camera_pose_file.hpp"
 #include "bodyschema/pipeline/ros_files.hpp"
 #include "bodyschema/robot/urdf_origin.hpp"
+#include "cameras_json.hpp"
 #include "estimate_json.hpp"
 #include "model_hash.hpp"
 
@@ -142,6 +143,20 @@ void check_same_robot(const std::filesystem::path& summary, const nlohmann::orde
     throw ConfigurationError(summary.string() + ": " + difference + "; expected the URDF of the replay (--anyway)");
   }
   warnings.push_back(difference);
+}
+
+/// cameras.yaml and ros/ hold the configuration's cameras with what the replay found of them.
+/// @param warnings  out: what is wrong, where that is accepted
+void check_same_cameras(const std::filesystem::path& summary, const nlohmann::ordered_json& json, const StereoRig& rig,
+                        bool anyway, std::vector<std::string>& warnings) {
+  if (!json.contains("cameras")) return;  // older replays do not say
+  const std::string difference = difference_of_cameras(json["cameras"], cameras_json(rig));
+  if (difference.empty()) return;
+  if (!anyway) {
+    throw ConfigurationError(summary.string() + ": made with " + difference +
+                             "; expected the configuration of the replay (--config, or --anyway)");
+  }
+  warnings.push_back("made with " + difference);
 }
 
 std::string joints_yaml(const std::vector<std::pair<std::string, double>>& angles_rad) {
@@ -342,6 +357,7 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
   const auto json = nlohmann::ordered_json::parse(stream);
   check_same_extended_model(summary, json, setup, model);
   check_same_robot(summary, json, setup, model_hash_of(setup, *robot, model), anyway, correction.warnings);
+  check_same_cameras(summary, json, rig, anyway, correction.warnings);
   const auto all = known_effects(model, roles, correction.effects, summary.string());
   const auto applied = add_effects(all, robot, setup, rig, correction);
   make_folder(out);
@@ -357,12 +373,13 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
     yaml += note;
     delta += note;
   }
-  std::string warnings;
+  std::string warnings, marks;
   for (const auto& warning : correction.warnings) {
     warnings += "warning: " + warning + '\n';
-    yaml += "# " + warning + '\n';
-    delta += "# " + warning + '\n';
+    marks += "# " + warning + '\n';
   }
+  yaml += marks;
+  delta += marks;
   yaml += "version: 1\noffset_deg:\n" + joints_yaml(correction.offsets_rad);
   yaml += "stddev_deg:\n" + joints_yaml(correction.sd_rad);
   delta += joints_delta(correction.offsets_rad);
@@ -396,7 +413,7 @@ std::string export_correction(const std::filesystem::path& summary, const RobotS
   const bool cameras =
       std::any_of(applied.begin(), applied.end(), [](const auto& a) { return a.applied == "cameras.yaml"; });
   if (cameras) {
-    replace_file(out / "cameras.yaml", cameras_yaml(found));
+    replace_file(out / "cameras.yaml", marks + cameras_yaml(found));
     files += fmt::format("cameras               {}\n", (out / "cameras.yaml").string());
   }
   const std::string report = applied_text(applied, model.has_value());

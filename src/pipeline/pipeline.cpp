@@ -97,7 +97,10 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
       configuration_hash_(configuration.hash()), model_hash_(model_hash_of(setup_, *robot_, error_model_)) {
   // Not ours, but checked like the rest: a robot's file may say how recordings of it are imported.
   if (configuration.has("yarp_import")) YarpImportOptions::from(configuration.section("yarp_import"));
-  if (configuration.has("import")) JointMapping::from(configuration.section("import"));
+  if (configuration.has("import")) {
+    const Configuration import = configuration.section("import");
+    JointMapping::from(import).check_names(import, *robot_, sent_);
+  }
   for (const auto& camera : rig_.cameras) {
     if (vision_.method == SegmentationMethod::kBackgroundPicture &&
         !vision_.background_pictures.contains(camera.name)) {
@@ -107,7 +110,7 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
       spdlog::warn(
           "camera '{}' has no distortion in the configuration: how its lens bends pictures (k1) is estimated beside "
           "the offsets, which takes longer and tells them less well; set cameras.{}.distortion, to zeros where "
-          "pictures come straightened",
+          "pictures come straightened (bodyschema new-robot --rectified)",
           camera.name, camera.name);
     }
     std::optional<Undistorter> undistorter;

@@ -19,6 +19,7 @@
 #include "bodyschema/pipeline/truth.hpp"
 #include "bodyschema/pipeline/watched_log.hpp"
 #include "bodyschema/vision/mask_picture.hpp"
+#include "cameras_json.hpp"
 #include "estimate_json.hpp"
 
 namespace bodyschema {
@@ -274,6 +275,7 @@ class Replay {
     summary["configuration_hash"] = pipeline_.configuration_hash();
     summary["model_hash"] = pipeline_.model_hash();
     if (pipeline_.error_model()) summary["extended_model"] = error_model_json(*pipeline_.error_model());
+    summary["cameras"] = cameras_json(pipeline_.configured_rig());
     summary["estimate"] = estimate_json(last_, pipeline_.rig());
     summary["weakest_direction"] = last_.weakest.text;
 

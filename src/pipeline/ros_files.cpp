@@ -118,18 +118,20 @@ std::string calibration_yaml(const std::filesystem::path& urdf, const std::files
   return any ? text : text + "  {}\n";
 }
 
-std::string camera_info_yaml(const RosCamera& camera) {
+std::string camera_info_yaml(const RosCamera& camera, const Correction& correction) {
   const auto& k = camera.intrinsics;
   const auto& d = camera.distortion;
-  return fmt::format(
-      "image_width: {}\nimage_height: {}\ncamera_name: {}\n"
-      "camera_matrix:\n  rows: 3\n  cols: 3\n  data: [{:.9g}, 0, {:.9g}, 0, {:.9g}, {:.9g}, 0, 0, 1]\n"
-      "distortion_model: plumb_bob\n"
-      "distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [{:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}]\n"
-      "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
-      "projection_matrix:\n  rows: 3\n  cols: 4\n  data: [{:.9g}, 0, {:.9g}, 0, 0, {:.9g}, {:.9g}, 0, 0, 0, 1, 0]\n",
-      k.width, k.height, quoted(camera.name), k.fx, k.cx, k.fy, k.cy, d[0], d[1], d[2], d[3], d[4], k.fx, k.cx, k.fy,
-      k.cy);
+  return warnings_of(correction, "# ") +
+         fmt::format(
+             "image_width: {}\nimage_height: {}\ncamera_name: {}\n"
+             "camera_matrix:\n  rows: 3\n  cols: 3\n  data: [{:.9g}, 0, {:.9g}, 0, {:.9g}, {:.9g}, 0, 0, 1]\n"
+             "distortion_model: plumb_bob\n"
+             "distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [{:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}]\n"
+             "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+             "projection_matrix:\n  rows: 3\n  cols: 4\n  data: [{:.9g}, 0, {:.9g}, 0, 0, {:.9g}, {:.9g}, 0, 0, 0, 1, "
+             "0]\n",
+             k.width, k.height, quoted(camera.name), k.fx, k.cx, k.fy, k.cy, d[0], d[1], d[2], d[3], d[4], k.fx, k.cx,
+             k.fy, k.cy);
 }
 
 std::string static_transforms(const std::vector<RosCamera>& cameras, const Correction& correction) {
@@ -220,7 +222,8 @@ std::string write_ros_files(const std::filesystem::path& folder, const std::file
   };
   write("xacro                ", folder / "joint_calibration.yaml", calibration_yaml(urdf, corrected_urdf, correction));
   for (const RosCamera& camera : cameras) {
-    write("ROS camera_info      ", folder / "camera_info" / (camera.name + ".yaml"), camera_info_yaml(camera));
+    write("ROS camera_info      ", folder / "camera_info" / (camera.name + ".yaml"),
+          camera_info_yaml(camera, correction));
   }
   write("ROS transforms       ", folder / "static_transforms.sh", static_transforms(cameras, correction));
   write("ros2_control offsets ", folder / "ros2_control_transmissions.xml", transmissions_xml(correction));

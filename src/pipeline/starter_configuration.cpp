@@ -128,6 +128,7 @@ class Starter {
     if (!o_.stills.empty()) {
       stills_ = StillsFolder::list(o_.stills);
       columns_ = StillsColumns::read(o_.stills);
+      leave_notes_out();
     }
     find_hand();
     find_cameras();
@@ -146,6 +147,7 @@ class Starter {
     // What never moves is learned as background, the robot's base like the rest.
     if (!learned_) add_base(links);
     look_at_columns();
+    look_at_masks();
   }
 
   StarterReport write() {
@@ -199,10 +201,27 @@ class Starter {
         guess.others.empty() ? "" : fmt::format("; it could be {} as well (--hand)", fmt::join(guess.others, " or "))));
   }
 
+  [[nodiscard]] std::vector<std::string> folders_of_pictures() const {
+    std::vector<std::string> names;
+    for (const auto& [name, pictures] : stills_->images) names.push_back(name);
+    return names;
+  }
+
+  void say_whose_pictures_are_used() {
+    std::vector<std::string> used, others;
+    for (const auto& camera : cameras_) used.push_back(camera.name);
+    for (const auto& name : folders_of_pictures()) {
+      if (!among(used, name)) others.push_back(name);
+    }
+    if (others.empty()) return;
+    notes_.push_back(
+        fmt::format("cameras: {}; not used: images/{}", fmt::join(used, ", "), fmt::join(others, ", images/")));
+  }
+
   void find_cameras() {
     std::vector<std::string> names;
     if (stills_) {
-      for (const auto& [name, pictures] : stills_->images) names.push_back(name);
+      names = folders_of_pictures();
       if (names.size() > 2) {
         // Those that are named are meant.
         std::erase_if(names, [&](const std::string& name) {
@@ -211,9 +230,9 @@ class Starter {
         });
         if (names.empty()) {
           throw ConfigurationError(fmt::format(
-              "{}/images: {} cameras, one or two can be used; name them with the links they are (--camera NAME=LINK), "
-              "or move the others away",
-              o_.stills.string(), stills_->images.size()));
+              "{}/images: {} cameras ({}), one or two can be used; move the others' folders out of images/, or name "
+              "those that are links of the robot (--camera NAME=LINK)",
+              o_.stills.string(), stills_->images.size(), fmt::join(folders_of_pictures(), ", ")));
         }
       }
     }
@@ -247,6 +266,7 @@ class Starter {
       throw ConfigurationError(
           fmt::format("--camera-info: {} files for {} cameras", o_.camera_infos.size(), cameras_.size()));
     }
+    if (stills_) say_whose_pictures_are_used();
     std::vector<std::optional<CameraInfo>> infos;
     for (std::size_t c = 0; c < cameras_.size(); ++c) infos.push_back(find_intrinsics(c));
     find_poses();
@@ -337,6 +357,11 @@ class Starter {
           fmt::format("camera {}: its pictures are taken for those that the lens makes, not for rectified "
                       "ones (--rectified)",
                       camera.name));
+    } else if (!o_.rectified && !bends(camera)) {
+      notes_.push_back(
+          fmt::format("camera {}: {} has no distortion: how its lens bends pictures is to be found; --rectified says "
+                      "that they come straightened",
+                      camera.name, camera.source));
     }
     if (picture && *picture != PictureSize{camera.k.width, camera.k.height}) {
       wrong_.push_back(
@@ -420,6 +445,25 @@ class Starter {
     }
   }
 
+  /// A column that is no joint and holds text is somebody's notes; a joint's must hold numbers.
+  void leave_notes_out() {
+    const auto joints = urdf_.movable_joints();
+    for (std::size_t i = columns_->names.size(); i-- > 0;) {
+      const LeftOut& words = columns_->words[i];
+      if (words.count == 0) continue;
+      if (among(joints, columns_->names[i])) {
+        words.check(columns_->rows, "rows");
+        continue;
+      }
+      notes_.push_back(
+          fmt::format("column '{}' of joints.csv is no joint and holds text; it is not read", columns_->names[i]));
+      const auto at = static_cast<std::ptrdiff_t>(i);
+      columns_->names.erase(columns_->names.begin() + at);
+      columns_->largest.erase(columns_->largest.begin() + at);
+      columns_->words.erase(columns_->words.begin() + at);
+    }
+  }
+
   /// Joints that joints.csv has need no fixed value; columns that are no joints are what must be said.
   void look_at_columns() {
     if (!columns_) return;
@@ -457,6 +501,21 @@ class Starter {
       notes_.push_back(
           fmt::format("joints.csv goes up to {:.4g} and is taken for deg (estimator.yaml: import.unit)", largest));
     }
+  }
+
+  /// Masks that belong to no picture would be missed where masks are asked for, and never where they are not.
+  void look_at_masks() {
+    if (!stills_ || !o_.masks.value_or(true)) return;
+    std::vector<std::string> lost;
+    for (const std::string& folder : stills_->mask_folders()) {
+      const auto some = stills_->masks_without_picture(folder, folder);
+      lost.insert(lost.end(), some.begin(), some.end());
+    }
+    if (lost.empty()) return;
+    const std::string said =
+        fmt::format("{}{}", lost.front(),
+                    lost.size() > 1 ? fmt::format(" (the first of {} masks without a picture)", lost.size()) : "");
+    (stills_->masks.empty() ? wrong_ : notes_).push_back(said);
   }
 
   [[nodiscard]] std::string from_here(const fs::path& path) const {
@@ -500,11 +559,13 @@ class Starter {
     return text;
   }
 
+  [[nodiscard]] static bool bends(const StarterCamera& camera) {
+    return std::any_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d != 0.0; });
+  }
+
   /// A calibration that found nothing is rarely one: k1 is estimated then, unless pictures are said to come straight.
   [[nodiscard]] std::string lens_of(const StarterCamera& camera) const {
-    const bool bends =
-        std::any_of(camera.distortion.begin(), camera.distortion.end(), [](double d) { return d != 0.0; });
-    if (bends) return fmt::format("[{:.8g}]", fmt::join(camera.distortion, ", "));
+    if (bends(camera)) return fmt::format("[{:.8g}]", fmt::join(camera.distortion, ", "));
     return o_.rectified ? "[0, 0, 0, 0, 0]"
                         : "unknown             # k1 is estimated; zeros: pictures come straightened";
   }
@@ -554,8 +615,7 @@ class Starter {
         "include: [config/estimator.yaml, config/bus.yaml, config/vision.yaml, "
         "robot.yaml]\n"
         "vision:\n"
-        "  method: {}                # or {}: "
-        "docs/calibrate_my_robot.md\n"
+        "  method: {}                # or {}: docs/masks.md\n"
         "  looks_file: looks.json      # the robot's colours, which a service keeps for its next start (auto)\n"
         "bus:\n"
         "  channel_prefix: {}\n",

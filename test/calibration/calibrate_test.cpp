@@ -581,6 +581,12 @@ TEST_F(Calibrated, AJointThatTurnsTheOtherWayIsNotGood) {
   std::string first;
   std::getline(offsets, first);
   EXPECT_EQ(first, "# NOT TO BE APPLIED. " + found.sentence);
+  for (const char* file : {"corrected.urdf", "ros/joint_calibration.yaml", "ros/camera_info/left.yaml",
+                           "ros/static_transforms.sh", "ros/ros2_control_transmissions.xml"}) {
+    std::ifstream stream(options.out / file);
+    const std::string text((std::istreambuf_iterator<char>(stream)), {});
+    EXPECT_THAT(text, HasSubstr("NOT TO BE APPLIED. " + found.sentence)) << file;
+  }
 }
 
 // Five postures hardly tell a focal length: believed to 0.2 %, one that is 7.5 % too long was held there, the hand 94

@@ -20,6 +20,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Key;
+using ::testing::ThrowsMessage;
 
 const std::string kLens = "width: 8, height: 6, fx: 8, fy: 8, cx: 3.5, cy: 2.5";
 
@@ -162,6 +163,79 @@ TEST_F(Stills, MasksOfWhichNoneFitsAreOneError) {
   EXPECT_THAT(summary.notes, ElementsAre("no mask of camera 'left'"));
 }
 
+TEST_F(Stills, MasksThatBelongToNoPictureAreSaidWithTheNameThatWasExpected) {
+  for (const std::string camera : {"left", "right"}) {
+    stills_.mask(camera + "/00_mask.png", 255);
+    stills_.mask(camera + "/01_mask.png", 255);
+  }
+  EXPECT_THAT(error_of(target()),
+              AllOf(HasSubstr("no mask can be used; "), HasSubstr("masks/left/00_mask.png: its name ends in no number"),
+                    HasSubstr("expected the name of its picture, as 00.png")));
+  stills_.mask("right/00.png", 255);
+  stills_.mask("right/17.png", 255);
+  const auto summary = import(target());
+  EXPECT_EQ(summary.cameras[1].masks, 1u);
+  EXPECT_EQ(summary.left_out.at("masks of camera left").count, 2u);
+  EXPECT_EQ(summary.left_out.at("masks of camera right").count, 3u);
+  StillsImportOptions without;
+  without.masks = false;
+  EXPECT_THAT(import(target(), without).left_out, IsEmpty());
+}
+
+TEST_F(Stills, AFolderOfMasksOfNoCameraIsSaid) {
+  stills_.mask("Left/00.png", 255);
+  stills_.mask("right/00.png", 255);
+  const auto summary = import(target());
+  EXPECT_THAT(
+      summary.left_out.at("masks of camera Left").first,
+      HasSubstr("masks/Left/00.png: mask of no picture; no folder images/Left; expected the name of a camera's: "
+                "left, right"));
+  EXPECT_THAT(import(target("import: {masks: {left: Left}}\n")).left_out, IsEmpty());
+}
+
+TEST_F(Stills, AMaskInTheAlphaChannelIsReadAndOneThatContradictsItsColoursRefused) {
+  cv::Mat drawn(6, 8, CV_8UC4, cv::Scalar(255, 255, 255, 0));
+  drawn.col(3).setTo(cv::Scalar(255, 255, 255, 255));
+  stills_.picture("masks/left/00.png", drawn);
+  cv::Mat opaque(6, 8, CV_8UC4, cv::Scalar(0, 0, 0, 255));
+  opaque.col(3).setTo(cv::Scalar(255, 255, 255, 255));
+  stills_.picture("masks/left/01.png", opaque);
+  cv::Mat both(6, 8, CV_8UC4, cv::Scalar(0, 0, 0, 0));
+  both.col(3).setTo(cv::Scalar(255, 255, 255, 255));
+  stills_.picture("masks/right/00.png", both);
+  cv::Mat other = both.clone();
+  other.col(5).setTo(cv::Scalar(0, 0, 0, 255));
+  stills_.picture("masks/right/01.png", other);
+  const auto to = target();
+  const auto summary = import(to);
+  EXPECT_THAT(
+      summary.left_out.at("masks of camera right").first,
+      HasSubstr("masks/right/01.png: mask whose alpha channel is another than its colours show; expected a gray"));
+  stills_.picture("masks/right/01.png", both);
+  (void)import(to);
+  const auto seen = observations(to, true);
+  ASSERT_EQ(seen.size(), 2u);
+  for (const Image* mask :
+       {&seen[0].cameras[0]->given_mask, &seen[1].cameras[0]->given_mask, &seen[0].cameras[1]->given_mask}) {
+    ASSERT_EQ(mask->data.size(), 48u);
+    EXPECT_EQ(mask->data[3], kMaskRobot);
+    EXPECT_EQ(mask->data[4], kMaskBackground);
+  }
+}
+
+TEST_F(Stills, MasksThatLookInvertedAreSaid) {
+  cv::Mat inverted(6, 8, CV_8UC1, cv::Scalar(255));
+  inverted.col(3).setTo(cv::Scalar(0));
+  for (const std::string posture : {"00", "01"}) {
+    stills_.picture("masks/left/" + posture + ".png", inverted);
+    stills_.picture("masks/right/" + posture + ".png", 255 - inverted);
+  }
+  EXPECT_THAT(
+      import(target()).notes,
+      ElementsAre(HasSubstr("in 2 of 2 masks of camera 'left' the robot fills most of the picture's border: are "
+                            "they inverted? Expected 0 background, 255 robot")));
+}
+
 /// As of a pipeline that keeps transparency.
 TEST_F(Stills, PicturesWithAnAlphaChannelAreReadWithoutIt) {
   for (const std::string camera : {"left", "right"}) {
@@ -213,6 +287,24 @@ TEST_F(Stills, ColumnsInDegreesOfOtherNamesAndOneCamera) {
   EXPECT_NEAR(seen[1].cameras[0]->joints.q[to.robot->joint_index("joint2")], radians(2.0), 1e-6);
 }
 
+/// As a spreadsheet writes it.
+TEST_F(Stills, EmptyColumnsNotesAndCapitalsOfATableAreNoMistakes) {
+  stills_.write("joints.csv",
+                "\" Posture \",joint1,joint2,joint3,joint4,joint5,joint6,joint7,note,temp_C,,\n"
+                "1,0.1,0,0,0,0,0,0,ok,,,\n"
+                "0,0.2,0,0,0,0,0,0,,31.2,,\n"
+                ",,,,,,,,,,,\n");
+  const auto to = target();
+  const auto summary = import(to);
+  EXPECT_THAT(summary.left_out, IsEmpty());
+  EXPECT_THAT(summary.notes,
+              ElementsAre("joints.csv: column 'note' is no joint and holds text ('ok'); it is not read"));
+  EXPECT_THAT(summary.names_ignored, ElementsAre("temp_C"));
+  const auto seen = observations(to);
+  ASSERT_EQ(seen.size(), 2u);
+  EXPECT_NEAR(seen[0].cameras[0]->joints.q[to.robot->joint_index("joint1")], 0.1, 1e-7);
+}
+
 TEST_F(Stills, AJointThatMattersAndHasNoColumnIsAsked) {
   stills_.write("joints.csv", "posture,joint_1,joint2,joint3,joint4,joint5,joint6,joint7\n0,1,2,3,4,5,6,7\n");
   EXPECT_THAT(error_of(target()),
@@ -241,9 +333,30 @@ TEST_F(Stills, AMappingToNoJointIsAnErrorOfTheConfiguration) {
   } catch (const ConfigurationError& e) {
     EXPECT_THAT(e.what(), HasSubstr("import.joints.A1' is 'joint_one', no joint of robot 'arm7'; did you mean"));
   }
-  EXPECT_THROW((void)target("import: {cameras: {middle: x}}\n"), ConfigurationError);
+  EXPECT_THAT([&] { (void)target("import: {cameras: {middle: x}}\n"); },
+              ThrowsMessage<ConfigurationError>(
+                  HasSubstr("key 'import.cameras.middle': 'middle' is no camera of the configuration; expected left or "
+                            "right")));
+  const fs::path mapping = stills_.write("mapping.yaml", "import: {masks: {lfet: x}}\n");
+  EXPECT_THAT([&] { (void)ImportTarget::from(Configuration::parse(robot() + cameras()), mapping); },
+              ThrowsMessage<ConfigurationError>(HasSubstr("mapping.yaml:1: key 'import.masks.lfet'")));
   EXPECT_THROW((void)target("import: {joints: {A: joint1, B: joint1}}\n"), ConfigurationError);
   EXPECT_THROW((void)target("import: {joints: {A: {joint: joint1, scale: 0}}}\n"), ConfigurationError);
+}
+
+/// A sign that a mapping gives a column of another name would be lost without a word.
+TEST_F(Stills, AMappingOfWhatTheFolderLacksIsAnError) {
+  EXPECT_THAT(error_of(target("import: {joints: {jont1: {joint: joint1, scale: -1}}}\n")),
+              HasSubstr("joints.csv: no column 'jont1', which import.joints says is joint 'joint1'; did you mean "
+                        "'joint1'?"));
+  EXPECT_THAT(error_of(target("import: {cameras: {left: lfet}}\n")),
+              HasSubstr("/images: no folder 'lfet', which import.cameras.left names; expected left or right"));
+  const auto masks = target("import: {masks: {left: network}}\n");
+  stills_.mask("left/00.png", 255);
+  EXPECT_THAT(error_of(masks), HasSubstr("/masks: no folder 'network', which import.masks.left names; expected left"));
+  fs::remove_all(stills_.path() / "masks");
+  EXPECT_EQ(import(masks).cameras[0].pictures, 2u) << "no masks at all are none of a wrong name";
+  EXPECT_EQ(import(target("import: {joints: {conveyor: \"-\"}}\n")).joints.size(), 7u);
 }
 
 TEST_F(Stills, ReadingsThatLookLikeTheOtherUnitAreSaid) {
@@ -289,6 +402,11 @@ TEST_F(Stills, BadInputIsOneClearError) {
   };
   EXPECT_THAT(with(names + "0,nan,0,0,0,0,0,0\n"), HasSubstr("joints.csv:2: 'nan' in column 'joint1' is not a finite"));
   EXPECT_THAT(with(names + "0,,0,0,0,0,0,0\n"), HasSubstr("joints.csv:2: no value in column 'joint1'"));
+  EXPECT_THAT(with(names + "0,1,2 deg,0,0,0,0,0\n"),
+              HasSubstr("joints.csv:2: '2 deg' in column 'joint2' is not a finite number"));
+  EXPECT_THAT(with(names + "first,0,0,0,0,0,0,0\n"), HasSubstr("joints.csv:2: 'first' in column 'posture' is not a"));
+  EXPECT_THAT(with("Posture,posture,joint1\n0,0,0\n"), HasSubstr("columns 'posture' and 'Posture'; expected one"));
+  EXPECT_THAT(with(",joint1\n0,0\n"), HasSubstr("'' is no name"));
   EXPECT_THAT(with(names + "0,0,0\n"), HasSubstr("joints.csv:2: 3 values, expected 8"));
   EXPECT_THAT(with(names + "0.5,0,0,0,0,0,0,0\n"), HasSubstr("0.5 is no number of a posture"));
   EXPECT_THAT(with(names + "0,0,0,0,0,0,0,0\n0,0,0,0,0,0,0,0\n"), HasSubstr("joints.csv:3: posture 0 comes a second"));

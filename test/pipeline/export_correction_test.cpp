@@ -9,6 +9,7 @@
 #include <fstream>
 #include <random>
 
+#include "../../src/pipeline/cameras_json.hpp"
 #include "../../src/pipeline/model_hash.hpp"
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/effects/corrected_kinematics.hpp"
@@ -173,6 +174,34 @@ TEST_F(ExportCorrection, AResultOfAnotherUrdfIsOnlyAppliedAnyway) {
   EXPECT_THAT(content("twice/offsets.yaml"), ::testing::HasSubstr(difference));
   write_summary();  // older ones do not say
   EXPECT_NO_THROW(export_correction(summary, setup_, rig_, folder_ / "out"));
+}
+
+// cameras.yaml and ros/ once held the cameras of whatever configuration was given.
+TEST_F(ExportCorrection, AResultOfOtherCamerasIsOnlyAppliedAnyway) {
+  const fs::path summary = folder_ / "summary.json";
+  write_summary(R"(, "cameras": )" + cameras_json(rig_).dump());
+  export_correction(summary, setup_, rig_, folder_ / "out");
+  const auto refuse = [&](const StereoRig& rig, const std::string& difference) {
+    EXPECT_THAT([&] { export_correction(summary, setup_, rig, folder_ / "other"); },
+                ::testing::ThrowsMessage<ConfigurationError>(
+                    summary.string() + ": made with " + difference +
+                    "; expected the configuration of the replay (--config, or --anyway)"));
+    EXPECT_FALSE(fs::exists(folder_ / "other"));
+  };
+  StereoRig other = rig_;
+  other.cameras[0].intrinsics.fx = 500.25;
+  const std::string was = nlohmann::json(rig_.cameras[0].intrinsics.fx).dump();
+  refuse(other, "cameras.left.fx " + was + ", but the configuration has 500.25");
+  StereoRig renamed = rig_;
+  renamed.cameras[0].name = "head";
+  refuse(renamed, "cameras.left.link \"l_eye_optical\", but the configuration has no such key");
+  StereoRig more = rig_;
+  write_summary(R"(, "cameras": )" + cameras_json({{rig_.cameras[0]}}).dump());
+  refuse(more, "no cameras.right.link, but the configuration has \"r_eye_optical\"");
+  write_summary(R"(, "cameras": )" + cameras_json(rig_).dump());
+  EXPECT_THAT(export_correction(summary, setup_, other, folder_ / "out", true),
+              ::testing::HasSubstr("cameras.left.fx"));
+  EXPECT_THAT(content("out/offsets.yaml"), ::testing::HasSubstr("# made with cameras.left.fx"));
 }
 
 TEST_F(ExportCorrection, WhatADeviceDoesNotTakeIsAnError) {

@@ -219,6 +219,18 @@ std::vector<std::string> high_definition(std::vector<std::string> more = {}) {
   return more;
 }
 
+/// A log that was imported with them is not what the configuration says.
+TEST(Pipeline, RefusesAMappingToJointsAndCamerasThatAreNotThere) {
+  const auto refuse = [](const std::string& override, const char* words) {
+    EXPECT_THAT([&] { Pipeline(configuration("single_colour", {override})); },
+                ::testing::ThrowsMessage<ConfigurationError>(HasSubstr(words)));
+  };
+  refuse("import.joints.A1=r_elbo",
+         "key 'import.joints.A1' is 'r_elbo', no joint of robot 'icub_right'; did you mean 'r_elbow'?");
+  refuse("import.cameras.lfet=zed",
+         "key 'import.cameras.lfet': 'lfet' is no camera of the configuration; expected left");
+}
+
 TEST(Pipeline, ReadsNoMorePixelsThanAreNeeded) {
   const auto c = configuration("auto", high_definition());
   const Pipeline all(c), needed(c, std::nullopt, PictureReading::kAsNeeded);

@@ -142,6 +142,9 @@ TEST_F(ReplayTest, WritesEstimatesSummaryAndPictures) {
   const RobotSetup setup = RobotSetup::from(configuration().section("robot"));
   const StereoRig rig = StereoRig::from(configuration().section("cameras"));
   EXPECT_NO_THROW(export_correction(o.out / "summary.json", setup, rig, o.out / "apply"));
+  StereoRig other = rig;
+  other.cameras[0].intrinsics.cx += 10.0;
+  EXPECT_THROW(export_correction(o.out / "summary.json", setup, other, o.out / "apply"), ConfigurationError);
   EXPECT_TRUE(fs::exists(o.out / "overlay_final.png"));
   EXPECT_FALSE(fs::is_empty(o.out / "masks"));
 }

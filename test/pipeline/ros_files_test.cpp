@@ -58,13 +58,14 @@ TEST_F(RosFiles, JointsCarryTheirOffsetsAndTheOriginsOfTheCorrectedUrdf) {
   correction.offsets_rad = {{"joint2", 0.03}, {"joint3", -0.01}};
   correction.sd_rad = {{"joint2", 0.001}};
   correction.warnings = {"joint3: known to 1.23 deg only -- look"};
-  write(correction, {});
+  write(correction, ros_cameras_of(rig_));
   const auto joints = Configuration::load(folder_.path() / "joint_calibration.yaml").section("joints");
   EXPECT_EQ(joints.keys(), (std::vector<std::string>{"joint2", "joint3"}));
   EXPECT_DOUBLE_EQ(joints.section("joint2").number("offset"), 0.03);
   EXPECT_DOUBLE_EQ(joints.section("joint2").number("offset_sd"), 0.001);
   EXPECT_FALSE(joints.section("joint3").has("offset_sd"));
-  for (const char* file : {"joint_calibration.yaml", "static_transforms.sh", "ros2_control_transmissions.xml"}) {
+  for (const char* file : {"joint_calibration.yaml", "static_transforms.sh", "ros2_control_transmissions.xml",
+                           "camera_info/left.yaml", "camera_info/right.yaml"}) {
     EXPECT_THAT(content(file), HasSubstr("known to 1.23 deg only")) << file;
   }
   EXPECT_THAT(content("ros2_control_transmissions.xml"),

@@ -414,6 +414,9 @@ TEST_F(StarterConfiguration, FromStillsNothingElseIsAsked) {
   const StarterReport report = write_starter_configuration(o);
   EXPECT_TRUE(report.usable) << report.text;
   EXPECT_THAT(report.text, testing::Not(HasSubstr("focal length")));
+  EXPECT_THAT(report.text, HasSubstr("camera left: left.yaml has no distortion: how its lens bends pictures is to be "
+                                     "found; --rectified says that they come straightened"));
+  EXPECT_THAT(report.text, testing::Not(HasSubstr("mask of no picture")));
   const Pipeline pipeline(Configuration::load(o.out / "estimator.yaml"));
   const auto& cameras = pipeline.rig().cameras;
   ASSERT_EQ(cameras.size(), 2u);
@@ -424,6 +427,10 @@ TEST_F(StarterConfiguration, FromStillsNothingElseIsAsked) {
   EXPECT_TRUE(cameras[1].mount.X_PC.translation().isApprox(Eigen::Vector3d(0.12, 0, 0), 1e-6));
   EXPECT_TRUE(pipeline.make_stream().expects_masks()) << "the folder has masks";
   EXPECT_TRUE(pipeline.setup().fixed_joints_rad.empty()) << "all that moves is recorded";
+
+  o.rectified = true;
+  o.out = folder_ / "straight";
+  EXPECT_THAT(write_starter_configuration(o).text, testing::Not(HasSubstr("--rectified")));
 
   o.masks = false;
   o.out = folder_ / "bare";
@@ -540,6 +547,64 @@ TEST_F(StarterConfiguration, StillsWhoseColumnsAreNoJointsAreToBePutRight) {
   const auto configuration = Configuration::load(o.out / "estimator.yaml");
   EXPECT_TRUE(JointMapping::from(configuration.section("import")).in_degrees);
   EXPECT_TRUE(JointMapping::from(configuration.section("import")).joints.contains("j1"));
+}
+
+TEST_F(StarterConfiguration, ColumnsThatHoldNotesAreLeftOutAndSaid) {
+  const SmallStills stills;
+  stills.write(
+      "joints.csv",
+      "Posture,joint1,joint2,joint3,joint4,joint5,joint6,joint7,note,\n0,1,2,3,4,5,6,7,ok,\n1,1,2,3,4,5,6,7,,\n");
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.stills = stills.path();
+  o.out = folder_ / "mine";
+  const StarterReport report = write_starter_configuration(o);
+  EXPECT_TRUE(report.usable) << report.text;
+  EXPECT_THAT(report.text, HasSubstr("column 'note' of joints.csv is no joint and holds text; it is not read"));
+  EXPECT_TRUE(JointMapping::from(Configuration::load(o.out / "estimator.yaml").section("import")).joints.empty());
+  stills.write("joints.csv", "posture,joint1,joint2,joint3,joint4,joint5,joint6,joint7\n0,1,2,3,4,5,6 deg,7\n");
+  o.out = folder_ / "other";
+  EXPECT_THAT([&] { write_starter_configuration(o); },
+              testing::ThrowsMessage<FileError>(HasSubstr("joints.csv:2: '6 deg' in column 'joint6' is not a finite")));
+}
+
+TEST_F(StarterConfiguration, MasksThatBelongToNoPictureAreToBePutRight) {
+  const SmallStills stills;
+  stills.mask("left/00_mask.png", 255);
+  stills.mask("left/01_mask.png", 255);
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.stills = stills.path();
+  o.out = folder_ / "mine";
+  const std::string expected =
+      "masks/left/00_mask.png: its name ends in no number, or in that of another mask; expected "
+      "the name of its picture, as 00.png (the first of 2 masks without a picture)";
+  const StarterReport report = write_starter_configuration(o);
+  EXPECT_FALSE(report.usable);
+  EXPECT_THAT(report.text, HasSubstr(expected));
+  stills.mask("right/00.png", 255);
+  o.out = folder_ / "some";
+  const StarterReport some = write_starter_configuration(o);
+  EXPECT_TRUE(some.usable);
+  EXPECT_THAT(some.text, HasSubstr(expected));
+  o.masks = false;
+  o.out = folder_ / "none";
+  EXPECT_THAT(write_starter_configuration(o).text, testing::Not(HasSubstr("00_mask.png")));
+}
+
+TEST_F(StarterConfiguration, OfThreeCamerasItSaysWhichAreUsed) {
+  const SmallStills stills;
+  stills.picture("images/wrist/00.png", cv::Mat(6, 8, CV_8UC3, cv::Scalar(1, 2, 3)));
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.stills = stills.path();
+  o.out = folder_ / "mine";
+  EXPECT_THAT([&] { write_starter_configuration(o); },
+              testing::ThrowsMessage<ConfigurationError>(
+                  HasSubstr("/images: 3 cameras (left, right, wrist), one or two can be used; move the others' folders "
+                            "out of images/, or name those that are links of the robot (--camera NAME=LINK)")));
+  o.camera_links = {"wrist=camera_left_optical"};
+  EXPECT_THAT(write_starter_configuration(o).text, HasSubstr("cameras: wrist; not used: images/left, images/right"));
 }
 
 TEST_F(StarterConfiguration, PicturesOfAnotherSizeThanTheirCalibrationAreToBePutRight) {

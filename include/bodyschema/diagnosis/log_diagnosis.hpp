@@ -11,7 +11,9 @@ namespace bodyschema {
 
 struct LogDiagnosisOptions {
   std::filesystem::path log;
-  std::filesystem::path out;      ///< folder, created; empty: nothing is written
+  std::filesystem::path out;  ///< folder, created; empty: nothing is written
+  /// The file that the configuration was read from, for the commands that say what to do next; empty: not known.
+  std::filesystem::path configuration;
   double picture_rate_hz = 10.0;  ///< pictures used per second and camera
   int threads = 2;
   bool quiet = false;     ///< no progress bars

@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/core/configuration.hpp"
+#include "bodyschema/robot/robot_model.hpp"
 
 namespace bodyschema {
 
@@ -36,6 +38,9 @@ struct JointMapping {
 
   /// Reads the `import` section. Throws ConfigurationError.
   static JointMapping from(const Configuration& import);
+  /// That joints and cameras on the robot's side are there. @param import  as it was read from, for the place
+  /// Throws ConfigurationError naming file, key, value and what was expected.
+  void check_names(const Configuration& import, const RobotModel& robot, const StereoRig& rig) const;
 };
 
 }  // namespace bodyschema

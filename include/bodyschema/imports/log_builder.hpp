@@ -126,6 +126,7 @@ class LogBuilder {
   std::vector<std::uint64_t> readings_;  ///< by joint
   std::vector<double> largest_;          ///< of each joint, absolute, in the source's own unit
   std::vector<int> channels_of_;         ///< of each camera's pictures, once known
+  std::vector<std::uint64_t> inverted_;  ///< of each camera's masks: how many look as if they were
   std::set<std::string> ignored_;
   Microseconds first_ = -1, last_ = -1;
   ImportSummary summary_;

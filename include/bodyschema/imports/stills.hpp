@@ -28,16 +28,25 @@ struct StillsFolder {
   std::map<std::string, std::filesystem::path> camera_infos;
   std::vector<std::string> not_read;    ///< other folders that hold something
   std::vector<std::string> unnumbered;  ///< pictures without a number, or with that of another
+  std::map<std::string, std::vector<std::string>> unnumbered_masks;  ///< the same of masks, by folder
 
   /// Lists the folder. Throws FileError when it is none or has no picture under images/.
   static StillsFolder list(const std::filesystem::path& folder);
+  /// Those under masks/ that hold pictures, numbered or not.
+  [[nodiscard]] std::vector<std::string> mask_folders() const;
+  /// Of the folder `masks` under masks/ those that belong to no picture of the folder `images` under images/, each with
+  /// the name that was expected.
+  [[nodiscard]] std::vector<std::string> masks_without_picture(const std::string& masks,
+                                                               const std::string& images) const;
 };
 
 /// The columns of a folder's joints.csv that are neither `posture`, `frame` nor `time_s`.
 struct StillsColumns {
   std::vector<std::string> names;
   std::vector<double> largest;  ///< absolute value in each, in the file's unit
-  bool moving = false;          ///< rows have times: a recording of a moving arm, not of postures held still
+  std::vector<LeftOut> words;   ///< of each: fields that hold no number
+  std::uint64_t rows = 0;
+  bool moving = false;  ///< rows have times: a recording of a moving arm, not of postures held still
   /// Throws FileError for a file that is not there or cannot be read (LeftOut::check).
   static StillsColumns read(const std::filesystem::path& folder);
 };

@@ -92,6 +92,8 @@ class Pipeline {
   [[nodiscard]] const RobotSetup& setup() const { return setup_; }
   /// The cameras of the pictures as they are read, with the extended model's intrinsics, where there is one.
   [[nodiscard]] const StereoRig& rig() const { return rig_; }
+  /// The cameras as configured.
+  [[nodiscard]] const StereoRig& configured_rig() const { return sent_; }
   /// The extended model (robot.extended_model), if any.
   [[nodiscard]] const std::optional<ErrorModel>& error_model() const { return error_model_; }
   /// What of it is not in the rig, and not found anew as joints' offsets are.
