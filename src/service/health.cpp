@@ -17,6 +17,7 @@ constexpr double kCameraDead_ms = 1000.0;  // one camera silent while the other 
 constexpr double kFrozen_ms = 1000.0;      // the same picture for longer while a joint moved (kFrozenMotion_rad)
 constexpr double kDark = 4.0;              // mean brightness below: no light
 constexpr double kLateEncoders_ms = 60.0;
+constexpr double kErringStamps_ms = 5.0;  // in which an arm of 0.2 m/s moves by 1 mm
 
 std::string age(double ms) {
   return ms < 10'000.0    ? fmt::format("{:.1f} s", 1e-3 * ms)
@@ -291,6 +292,12 @@ Health assess(const HealthFacts& facts) {
   // What is left out of the evidence is said beside what the rest gives.
   if (const std::string hidden = facts.estimate.hidden.text(); !hidden.empty() && health.level <= HealthLevel::kWarn) {
     health.sentence += "; " + hidden;
+  }
+  // An arm that moves is known no better than its pictures' times, whatever else is known.
+  if (const double err_ms = 1e3 * facts.estimate.stamp_sd_s;
+      err_ms > kErringStamps_ms && health.level != HealthLevel::kStale) {
+    health.sentence += fmt::format("; pictures are taken {:.0f} ms before or after their stamps", err_ms);
+    health.level = std::max(health.level, HealthLevel::kWarn);
   }
   // What is wrong beside the offsets is said beside whatever is said of them.
   std::string found;

@@ -330,6 +330,14 @@ TEST(Health, WhatHidesTheHandIsSaidBesideWhatTheRestGives) {
   expect(facts, HealthLevel::kWarn, "95 % of the hand is hidden");
 }
 
+TEST(Health, StampsThatErrAreSaidBesideTheRest) {
+  HealthFacts facts = well();
+  facts.estimate.stamp_sd_s = 0.012;
+  expect(facts, HealthLevel::kWarn, "; pictures are taken 12 ms before or after their stamps");
+  facts.estimate.stamp_sd_s = 0.001;
+  EXPECT_EQ(assess(facts).level, HealthLevel::kOk);
+}
+
 TEST(Health, WhatThePicturesAskForIsSaidBesideTheRest) {
   HealthFacts facts = well();
   facts.estimate.findings.causes.push_back(
