@@ -21,7 +21,8 @@ void StampNoise::learn(const Quadratic& frame, const TimeEvidence& time, const M
   if (!(information > 0.0)) return;
   last_.push_back({score / information, 1.0 / information});
   if (last_.size() > limits::kRecentStamps) last_.pop_front();
-  constexpr double kRange = 1e3, kStep = 1.1;  // of the standard deviation, about what is believed of it
+  // Of the standard deviation, about what is believed of it: some hundred frames tell it no nearer than a step.
+  constexpr double kRange = 1e2, kStep = 1.2;
   double most = log_posterior(believed_s2_);
   variance_s2_ = believed_s2_;
   for (double factor = 1.0 / kRange; factor < kRange; factor *= kStep) {

@@ -208,6 +208,11 @@ void OutlineMeasurement::find_moved(std::span<const ContourPoint> outline, const
   const auto& k = projection_.intrinsics(camera);
   const double focal_px = k.fx * (1.0 + corrections.camera.focal_scale);
   moved_points_.clear();
+  // Points lie too far apart for less to bring one past another but by chance.
+  const bool moved = std::any_of(corrections.shapes.begin(), corrections.shapes.end(), [&](const auto& shape) {
+    return shape.thickness_m != 0.0 || std::abs(shape.dilation_px / k.reduction) >= spacing_px;
+  });
+  if (!moved) return;
   float most_px = 0.0f;
   bool covered = false;
   for (const auto& point : outline) {
@@ -218,7 +223,6 @@ void OutlineMeasurement::find_moved(std::span<const ContourPoint> outline, const
     covered = covered || shape.thickness_m > 0.0;
     moved_points_.push_back({point.pixel, point.pixel + by_px * point.normal, by_px});
   }
-  // Points lie too far apart for less to bring one past another but by chance.
   if (!covered && most_px < static_cast<float>(spacing_px)) moved_points_.clear();
 }
 
