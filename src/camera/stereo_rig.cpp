@@ -172,15 +172,6 @@ void resolve_relative(const Configuration& section, std::vector<CameraModel>& ca
   }
 }
 
-/// Nothing but its link says where such a camera is; no camera is where a robot's base begins, looking along its z.
-void require_mount(const CameraModel& camera, const std::string& root) {
-  const CameraMount& mount = camera.mount;
-  if (mount.relative || mount.parent != root || camera.link != root) return;
-  throw ConfigurationError(camera.place + " is '" + root +
-                           "', the robot's root, and nothing says where on it the camera is; expected X_link_optical "
-                           "beside it, the camera's own link, or 'pose: unknown'");
-}
-
 }  // namespace
 
 bool CameraModel::has_distortion() const {
@@ -224,7 +215,6 @@ std::shared_ptr<const RobotModel> load_robot(const RobotSetup& setup, const Ster
       throw ConfigurationError(camera.place + " is '" + carrier + "'; expected a link of robot '" + urdf->name() +
                                "'; did you mean '" + nearest_name(carrier, urdf->link_names()) + "'?");
     }
-    require_mount(camera, urdf->root_link());
     if (camera.link == carrier) continue;
     with_frames.model.added_frames.push_back({camera.link, camera.mount.parent, camera.mount.X_PC});
   }

@@ -211,23 +211,5 @@ TEST(LoadRobot, GivesEveryCameraItsFrame) {
   }
 }
 
-/// `pose: unknown` that somebody replaced by what is known, without saying it.
-TEST(LoadRobot, ACameraOnTheRobotsRootNeedsItsPlaceThere) {
-  RobotSetup setup;
-  setup.model.urdf = std::filesystem::path(BODYSCHEMA_SOURCE_DIR) / "meshes/arm7/arm7.urdf";
-  setup.hand_link = "hand";
-  const auto load = [&](const std::string& place) {
-    (void)load_robot(setup, parse("cameras:\n  a: {link: base, " + place + kLens + "}\n"));
-  };
-  for (const char* pose : {"", "pose: exact, ", "pose: known, ", "pose: roughly, pose_sd_deg: 1, pose_sd_mm: 10, "}) {
-    EXPECT_THAT([&] { load(pose); },
-                testing::ThrowsMessage<ConfigurationError>(HasSubstr(
-                    "key 'cameras.a.link' is 'base', the robot's root, and nothing says where on it the camera is; "
-                    "expected X_link_optical beside it, the camera's own link, or 'pose: unknown'")));
-  }
-  EXPECT_NO_THROW(load("pose: unknown, "));
-  EXPECT_NO_THROW(load("pose: exact, X_link_optical: {xyz_m: [0, 0, 0]}, "));
-}
-
 }  // namespace
 }  // namespace bodyschema

@@ -59,8 +59,7 @@ struct StereoRig {
 };
 
 /// RobotSetup::load with a frame for every camera that is no link of the URDF by itself. Throws as that does, and
-/// ConfigurationError naming file, key, link and the nearest one for a camera on a link that is not there, or on the
-/// root with nothing that says where on it.
+/// ConfigurationError naming file, key, link and the nearest one for a camera on a link that is not there.
 std::shared_ptr<const RobotModel> load_robot(const RobotSetup& setup, const StereoRig& rig);
 
 /// Straightens pictures of a distorted camera to its own pinhole intrinsics (bilinear); a copy when there
