@@ -33,14 +33,20 @@ void StampNoise::learn(const Quadratic& frame, const TimeEvidence& time, const M
   }
 }
 
-/// Normal stamps about the right time, seen with each frame's own variance; before any, an inverse chi-square
+/// Stamps of a normal distribution about a time that they may all be late by, each seen with its frame's own variance:
+/// that time integrated out (the restricted likelihood: Patterson and Thompson, 1971). Before any, an inverse chi-square
 /// distribution about what is believed.
 double StampNoise::log_posterior(double variance_s2) const {
   double sum = -0.5 * limits::kStampsBelieved * (std::log(variance_s2) + believed_s2_ / variance_s2);
+  double weights = 0.0, late = 0.0, square = 0.0;
   for (const auto& seen : last_) {
-    const double total = variance_s2 + seen.variance_s2;
-    sum -= 0.5 * (std::log(total) + seen.off_s * seen.off_s / total);
+    const double weight = 1.0 / (variance_s2 + seen.variance_s2);
+    weights += weight;
+    late += weight * seen.off_s;
+    square += weight * seen.off_s * seen.off_s;
+    sum += 0.5 * std::log(weight);
   }
+  if (weights > 0.0) sum -= 0.5 * (std::log(weights) + square - late * late / weights);
   return sum;
 }
 

@@ -17,7 +17,7 @@ struct TimeEvidence {
 /// How far the stamps of pictures err from picture to picture against those of the encoders: no frame of an arm that
 /// moves knows its joints nearer than by their motion in that time. Told from the last frames that agree with what is
 /// known: the most likely variance, with a prior that counts as some frames. That all are late alike is an effect
-/// (`latency`).
+/// (`latency`), and none of it.
 class StampNoise {
  public:
   /// @param believed_sd_s  before any frame

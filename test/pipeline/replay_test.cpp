@@ -285,7 +285,10 @@ TEST_F(ReplayTest, ErrorsAndTheLastPictureAreOfTheOffsetsThatAreReported) {
   Pipeline first(configuration());
   watch(first);
   ASSERT_GT(estimates.size(), 10u);
-  const double both_m = (estimates.end() - 5)->hand_sd_m, one_m = estimates.back().hand_sd_m;
+  // Of an arm that moves stamps have their say as well: two eyes at their best.
+  double both_m = 1.0;
+  for (auto e = estimates.begin(); e != estimates.end() - 4; ++e) both_m = std::min(both_m, e->hand_sd_m);
+  const double one_m = estimates.back().hand_sd_m;
   ASSERT_GT(one_m, 1.01 * both_m);
   const Configuration demanding =
       configuration({fmt::format("estimator.best.converged_hand_sd_mm={}", 1e3 * std::sqrt(both_m * one_m))});
