@@ -124,7 +124,7 @@ void ArmTracker::learn(const Frame& frame, const OutlineFit& fit, FrameOutcome& 
     return;
   }
   fitter_.learn_noise(fit);
-  if (outcome.verdict == FrameVerdict::kAgrees && !known_.young()) fitter_.learn_stamps(fit, known_.memory);
+  if (outcome.verdict == FrameVerdict::kAgrees && !known_.young()) fitter_.learn_stamps(frame, fit, known_.memory);
   const Eigen::VectorXd posture = posture_of(frame.exposures[0].at.encoder, model_.roles());
   const auto block = known_.memory.add(frame.time_s, posture, fit.seen.quadratic, fit.x);
   if (block) {

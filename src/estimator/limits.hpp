@@ -58,10 +58,12 @@ inline constexpr double kPerParameter = 9.0;
 /// Statistical. Encoder readings after which their noise is told anew, from twice as many.
 inline constexpr std::size_t kReadings = 200;
 
-/// Statistical. Frames of a moving arm from which the noise of stamps is told: a busy network is not so for ever; and
-/// how many what is believed of it counts as.
-inline constexpr std::size_t kRecentStamps = 200;
+/// Statistical. Pairs of frames of a moving arm from which the noise of stamps is told: a busy network is not so for
+/// ever; and how many what is believed of it counts as.
+inline constexpr std::size_t kRecentStamps = 100;
 inline constexpr double kStampsBelieved = 8.0;
+/// Physical. s; in so short a time an arm goes on as it did: what is wrong besides moves two frames' times alike.
+inline constexpr double kStampsBeside_s = 0.5;
 
 /// Statistical. Postures after which what one showed of the parts' shapes has faded to 1/e: the estimate that left its
 /// residuals is no longer held.

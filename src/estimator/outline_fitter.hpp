@@ -89,7 +89,7 @@ class OutlineFitter {
   /// Measures the outlines' noise on what a good fit leaves.
   void learn_noise(const OutlineFit& fit);
   /// Measures how far stamps err on a fit that agrees with a memory.
-  void learn_stamps(const OutlineFit& fit, const PostureMemory& memory);
+  void learn_stamps(const Frame& frame, const OutlineFit& fit, const PostureMemory& memory);
   [[nodiscard]] double stamp_sd_s() const { return stamps_.sd_s(); }
   /// Measures what outlines get wrong alike in all postures on what the fit of a new one leaves.
   /// @param fitted  parameters that all postures together tell

@@ -1,14 +1,14 @@
 #include "stamp_noise.hpp"
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <cmath>
 
 #include "limits.hpp"
 
 namespace bodyschema {
 
-void StampNoise::learn(const Quadratic& frame, const TimeEvidence& time, const MemoryEstimate& in_posture) {
+void StampNoise::learn(double time_s, const Quadratic& frame, const TimeEvidence& time,
+                       const MemoryEstimate& in_posture) {
   if (time.A <= 0.0) return;
   const auto n = in_posture.x.size();
   const auto A = frame.A.topLeftCorner(n, n);
@@ -19,10 +19,21 @@ void StampNoise::learn(const Quadratic& frame, const TimeEvidence& time, const M
   const double information = time.A - a.dot(h);
   const double score = time.b - a.dot(in_posture.x) - h.dot(frame.b.head(n) - A * in_posture.x);
   if (!(information > 0.0)) return;
-  last_.push_back({score / information, 1.0 / information});
-  if (last_.size() > limits::kRecentStamps) last_.pop_front();
-  // Of the standard deviation, about what is believed of it: some hundred frames tell it no nearer than a step.
-  constexpr double kRange = 1e2, kStep = 1.2;
+  const Off off{score / information, 1.0 / information};
+  if (!single_ || std::abs(time_s - single_at_s_) > limits::kStampsBeside_s) {
+    single_ = off;
+    single_at_s_ = time_s;
+    return;
+  }
+  pairs_.push_back({off.off_s - single_->off_s, off.variance_s2 + single_->variance_s2});
+  if (pairs_.size() > limits::kRecentStamps) pairs_.pop_front();
+  single_.reset();
+  find_variance();
+}
+
+void StampNoise::find_variance() {
+  // Of the standard deviation, about what is believed of it: some hundred pairs tell it no nearer than a step.
+  constexpr double kRange = 3e2, kStep = 1.2;
   double most = log_posterior(believed_s2_);
   variance_s2_ = believed_s2_;
   for (double factor = 1.0 / kRange; factor < kRange; factor *= kStep) {
@@ -33,20 +44,14 @@ void StampNoise::learn(const Quadratic& frame, const TimeEvidence& time, const M
   }
 }
 
-/// Stamps of a normal distribution about a time that they may all be late by, each seen with its frame's own variance:
-/// that time integrated out (the restricted likelihood: Patterson and Thompson, 1971). Before any, an inverse chi-square
-/// distribution about what is believed.
+/// Normal stamps, each seen with its frame's own variance; before any, an inverse chi-square distribution about what is
+/// believed.
 double StampNoise::log_posterior(double variance_s2) const {
   double sum = -0.5 * limits::kStampsBelieved * (std::log(variance_s2) + believed_s2_ / variance_s2);
-  double weights = 0.0, late = 0.0, square = 0.0;
-  for (const auto& seen : last_) {
-    const double weight = 1.0 / (variance_s2 + seen.variance_s2);
-    weights += weight;
-    late += weight * seen.off_s;
-    square += weight * seen.off_s * seen.off_s;
-    sum += 0.5 * std::log(weight);
+  for (const auto& pair : pairs_) {
+    const double total = 2.0 * variance_s2 + pair.variance_s2;
+    sum -= 0.5 * (std::log(total) + pair.off_s * pair.off_s / total);
   }
-  if (weights > 0.0) sum -= 0.5 * (std::log(weights) + square - late * late / weights);
   return sum;
 }
 

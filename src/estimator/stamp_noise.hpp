@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <deque>
+#include <optional>
 
 #include "bodyschema/evidence/posture_memory.hpp"
 
@@ -15,9 +16,9 @@ struct TimeEvidence {
 };
 
 /// How far the stamps of pictures err from picture to picture against those of the encoders: no frame of an arm that
-/// moves knows its joints nearer than by their motion in that time. Told from the last frames that agree with what is
-/// known: the most likely variance, with a prior that counts as some frames. That all are late alike is an effect
-/// (`latency`), and none of it.
+/// moves knows its joints nearer than by their motion in that time. Told from frames beside each other that agree with
+/// what is known, by how they differ: the most likely variance of the last such pairs, with a prior that counts as some
+/// of them. What pictures beside each other have in common is no noise: that all are late is an effect (`latency`).
 class StampNoise {
  public:
   /// @param believed_sd_s  before any frame
@@ -25,21 +26,24 @@ class StampNoise {
 
   /// Learns from a frame.
   /// @param frame  over the estimated parameters, and more that are not looked at
-  void learn(const Quadratic& frame, const TimeEvidence& time, const MemoryEstimate& in_posture);
+  void learn(double time_s, const Quadratic& frame, const TimeEvidence& time, const MemoryEstimate& in_posture);
   /// What is left of a frame's say, whenever it was taken.
   void take_out(const TimeEvidence& time, Quadratic& frame) const;
   [[nodiscard]] double sd_s() const;
   void forget();
 
  private:
-  /// How far off a frame's stamp was, as the frame alone tells it.
-  struct Seen {
+  /// How far off a stamp was, as its frame alone tells it; of a pair, how far the two were apart.
+  struct Off {
     double off_s, variance_s2;
   };
+  void find_variance();
   [[nodiscard]] double log_posterior(double variance_s2) const;
 
   double believed_s2_, variance_s2_;
-  std::deque<Seen> last_;
+  std::deque<Off> pairs_;
+  std::optional<Off> single_;  ///< has no partner yet
+  double single_at_s_ = 0.0;
 };
 
 }  // namespace bodyschema

@@ -55,9 +55,9 @@ TEST_F(Stamps, AreBelievedBeforeAnyFrame) {
 TEST_F(Stamps, ErrByWhatFramesOfAMovingArmShow) {
   for (const double sd_s : {3e-3, 15e-3}) {
     StampNoise stamps(1e-3);
-    for (int i = 0; i < 60; ++i) {
+    for (int i = 0; i < 100; ++i) {
       const Seen seen = frame(sd_s * normal_(random_), 0.5 + std::abs(normal_(random_)));
-      stamps.learn(seen.frame, seen.time, known());
+      stamps.learn(0.1 * i, seen.frame, seen.time, known());
     }
     EXPECT_GT(stamps.sd_s(), 0.6 * sd_s);
     EXPECT_LT(stamps.sd_s(), 1.5 * sd_s);
@@ -68,7 +68,7 @@ TEST_F(Stamps, ThatAreRightAreNotDoubted) {
   StampNoise stamps(1e-3);
   for (int i = 0; i < 200; ++i) {
     const Seen seen = frame(0.0, 1.0);
-    stamps.learn(seen.frame, seen.time, known());
+    stamps.learn(0.1 * i, seen.frame, seen.time, known());
   }
   EXPECT_LT(stamps.sd_s(), 1.2e-3);
 }
@@ -78,7 +78,7 @@ TEST_F(Stamps, ThatAreAllLateAlikeDoNotErr) {
   StampNoise stamps(1e-3);
   for (int i = 0; i < 100; ++i) {
     const Seen seen = frame(60e-3, 1.0);
-    stamps.learn(seen.frame, seen.time, known());
+    stamps.learn(0.1 * i, seen.frame, seen.time, known());
   }
   EXPECT_LT(stamps.sd_s(), 1.5e-3);
 }
@@ -87,7 +87,7 @@ TEST_F(Stamps, OfAnArmAtRestSayNothing) {
   StampNoise stamps(1e-3);
   Seen seen = frame(0.0, 0.0);
   const Quadratic before = seen.frame;
-  stamps.learn(seen.frame, seen.time, known());
+  stamps.learn(0.0, seen.frame, seen.time, known());
   stamps.take_out(seen.time, seen.frame);
   EXPECT_NEAR(stamps.sd_s(), 1e-3, 1e-12);
   EXPECT_EQ(before.A, seen.frame.A);
@@ -96,9 +96,9 @@ TEST_F(Stamps, OfAnArmAtRestSayNothing) {
 
 TEST_F(Stamps, AreForgottenWithAllElse) {
   StampNoise stamps(1e-3);
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < 100; ++i) {
     const Seen seen = frame(15e-3 * normal_(random_), 1.0);
-    stamps.learn(seen.frame, seen.time, known());
+    stamps.learn(0.1 * i, seen.frame, seen.time, known());
   }
   stamps.forget();
   EXPECT_NEAR(stamps.sd_s(), 1e-3, 1e-12);

@@ -32,7 +32,7 @@ struct EstimatorOptions {
   double outline_spacing_px = 3.0;
   OutlineNoise::Prior noise;  ///< best: believed of outlines before any was seen
   MemoryOptions memory;
-  double stamp_sd_s = 1e-3;          ///< best: of pictures' stamps, from picture to picture, before any was seen
+  double stamp_sd_s = 3e-4;          ///< best: of pictures' stamps, from picture to picture, before any was seen
   std::size_t least_postures = 3;    ///< distinct ones that must agree before `converged`
   double converged_hand_sd_m = 0.0;  ///< best: `converged` below this; 0: by tolerances and the camera's distance
   bool live_diagnosis = true;        ///< best: the service looks for what is wrong beside the state
