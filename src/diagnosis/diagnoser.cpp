@@ -331,12 +331,13 @@ class Diagnoser {
       spdlog::debug("diagnosis: {} {}, z {:.1f} (chance: {:.1f}), held-out gain {:.0f}", cause.text(),
                     best->candidate->variable, best->candidate->z(), field.threshold, best->gain);
       if (model) {
+        auto before = search_.now();
         search_.take(std::move(*model));
         spdlog::debug("diagnosis: fitted, cost {:.4f}, z {:.1f}", search_.cost(), z_of_last());
         // What is large bends the very sums by which it is judged: so it is judged where it is fitted.
         const double threshold = threshold_of(best->candidate->stated);
         if (best->candidate->z() >= threshold || z_of_last() >= threshold) return true;
-        search_.drop({search_.causes().size() - 1});
+        search_.go_back_to(std::move(before));
       }
       if (!best->candidate->generic()) refused_.push_back(cause);
       std::erase_if(trials, [&](const Trial& t) { return &t == best || t.candidate->cause == cause; });
@@ -524,11 +525,9 @@ class Diagnoser {
   /// Takes out the cause that the log needs least, where it does not need it any more.
   bool drop_one() {
     if (search_.causes().empty()) return false;
-    // A fit that was tried and taken back may have left the state a little elsewhere.
-    const bool known = asked_ && !search_.refits();
     std::optional<BlockRegression> anew;
-    if (!known) anew = search_.regression(search_.about(block_s_));
-    const BlockRegression& all = known ? asked_->base : *anew;
+    if (!asked_) anew = search_.regression(search_.about(block_s_));
+    const BlockRegression& all = asked_ ? asked_->base : *anew;
     const double with = all.heldout().total();
     std::size_t worst = 0;
     double least = 1e300;

@@ -448,6 +448,7 @@ Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Dir
 void ModelSearch::polish(double block_s) {
   constexpr int kRounds = 4;
   constexpr double kNegligible_sd = 0.05;
+  if (polished_ && polished_->second == block_s && are_same(polished_->first, state_.model())) return;
   slope_ = fit_.slope(state_, search(), mean_variance_px2(noise_), raster_, options_.seed);
   spdlog::debug("diagnosis: slope {:.3f}", slope_);
   double last = 0.0;
@@ -461,13 +462,14 @@ void ModelSearch::polish(double block_s) {
     // tell: it is least where nothing that is considered besides takes its share.
     if (round > 0 && in_sd.norm() >= last) {
       state_.set(before);
-      return;
+      break;
     }
-    if (in_sd.cwiseAbs().maxCoeff() < kNegligible_sd) return;
+    if (in_sd.cwiseAbs().maxCoeff() < kNegligible_sd) break;
     last = in_sd.norm();
     before = state_.x();
     state_.set(before + step);
   }
+  polished_.emplace(state_.model(), block_s);
 }
 
 void ModelSearch::look_for_lost_part() {

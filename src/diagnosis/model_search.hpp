@@ -82,7 +82,6 @@ class ModelSearch {
   [[nodiscard]] bool refits() const { return !given_; }
   /// Whether a cause is in the state; others stand in the regression alone, at zero.
   [[nodiscard]] bool in_state(const FoundCause& cause) const { return !given_ && !cause.generic(); }
-  [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
   [[nodiscard]] double cost() const { return cost_; }
   /// Positions of a cause's parameters in the base.
   [[nodiscard]] std::vector<Eigen::Index> columns_of(std::size_t cause) const;
@@ -125,7 +124,8 @@ class ModelSearch {
   std::vector<FoundCause> causes_;
   std::vector<OutlineNoise> noise_;
   double cost_ = 0.0;
-  double slope_ = 1.0;  ///< LogFit::slope, about the model that was polished last
+  double slope_ = 1.0;                                     ///< LogFit::slope, about the model that was polished last
+  std::optional<std::pair<ErrorModel, double>> polished_;  ///< that one, and the blocks' length
   struct Linearised {
     ErrorModel model;
     double robust_px = 0.0, slope = 1.0;

@@ -41,9 +41,14 @@ struct Trial {
 };
 
 /// Levenberg's and Marquardt's step.
+struct DampedStep {
+  Eigen::VectorXd x;
+  double promised;  ///< chi-square that it takes off, were all as straight as it is about the trial
+};
+
 /// @param precision, away  of the beliefs, and of the state from them
-Eigen::VectorXd damped_step(const std::vector<StateEvidence>& pictures, double variance_px2,
-                            const Eigen::VectorXd& precision, const Eigen::VectorXd& away, double damping) {
+DampedStep damped_step(const std::vector<StateEvidence>& pictures, double variance_px2,
+                       const Eigen::VectorXd& precision, const Eigen::VectorXd& away, double damping) {
   Eigen::MatrixXd H = precision.asDiagonal();
   Eigen::VectorXd g = -precision.cwiseProduct(away);
   for (const auto& e : pictures) {
@@ -54,7 +59,8 @@ Eigen::VectorXd damped_step(const std::vector<StateEvidence>& pictures, double v
   const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd S = scale.asDiagonal() * H * scale.asDiagonal();
   S.diagonal().array() += damping;
-  return scale.asDiagonal() * S.ldlt().solve(scale.asDiagonal() * g);
+  const Eigen::VectorXd x = scale.asDiagonal() * S.ldlt().solve(scale.asDiagonal() * g);
+  return {x, 2.0 * x.dot(g) - x.dot(H * x)};
 }
 
 }  // namespace
@@ -302,8 +308,7 @@ std::vector<OutlineNoise> LogFit::noise(const ErrorModel& model, const OutlineSe
             [&](std::size_t p, std::span<const OutlinePoint> seen) { points[p].assign(seen.begin(), seen.end()); });
   std::vector<OutlineNoise> noise(log_.rig().cameras.size(), OutlineNoise(prior));
   for (std::size_t p = 0; p < points.size(); ++p) {
-    const auto camera = log_.pictures()[p].camera;
-    if (!points[p].empty()) noise[camera].add(points[p], picture_unit(log_.rig().cameras[camera].intrinsics));
+    if (!points[p].empty()) noise[log_.pictures()[p].camera].add(points[p], unit_of(p));
   }
   return noise;
 }
@@ -323,13 +328,16 @@ std::vector<std::uint32_t> LogFit::moved_by(const ErrorModel& model, const std::
   return {moved.begin(), moved.end()};
 }
 
+double LogFit::unit_of(std::size_t picture) const {
+  return picture_unit(log_.rig().cameras[log_.pictures()[picture].camera].intrinsics);
+}
+
 double LogFit::mean_cost(const LinearLog& at, double usual_points, double OutlineEvidence::*cost) const {
   double sum = 0.0, points = 0.0, worst = 0.0;
   for (std::size_t p = 0; p < at.evidence.size(); ++p) {
     const auto& evidence = at.evidence[p];
     if (evidence.sampled <= 0.0) continue;
-    const double unit = picture_unit(log_.rig().cameras[log_.pictures()[p].camera].intrinsics);
-    const double own = evidence.*cost / (unit * unit);
+    const double own = evidence.*cost / std::pow(unit_of(p), 2);
     sum += own;
     points += evidence.sampled;
     worst = std::max(worst, own / evidence.sampled);
@@ -373,7 +381,7 @@ double LogFit::fit(State& state, const FitSettings& settings, std::span<const st
     // From afar the way to the outlines may lead over worse places: every step is taken, the best kept.
     Trial trial = best;
     for (double search_px = settings.from_px;; search_px = std::max(settings.finest_px, kNarrow * search_px)) {
-      trial = look(trial.x + step(trial, 1e-3), search_px);
+      trial = look(trial.x + step(trial, 1e-3).x, search_px);
       if (trial.cost < best.cost) best = trial;
       if (search_px <= settings.finest_px) break;
     }
@@ -381,17 +389,20 @@ double LogFit::fit(State& state, const FitSettings& settings, std::span<const st
   }
   double damping = 1e-6, lowest = best.cost;
   int retreats = 0, idle = 0;
-  for (int i = 0; i < settings.iterations && retreats < 5;) {
+  for (int i = 0; i < settings.iterations && retreats < 3;) {
     // Points of an outline come and go: near the end the cost goes up and down by some ten thousandths.
     constexpr double kWorse = 1e-3, kLower = 1e-4;  // shares
     constexpr int kIdle = 2;                        // steps that do not lower it
-    Trial trial = look(best.x + step(best, damping), settings.finest_px);
+    const DampedStep next = step(best, damping);
+    const double promised = settings.variance_px2 * next.promised / std::max(1.0, usual_points);
+    if (promised < kLower * best.cost) break;
+    Trial trial = look(best.x + next.x, settings.finest_px);
     if (trial.cost > (1.0 + kWorse) * best.cost) {
-      damping = std::max(1e-3, 10.0 * damping);
+      if (promised < kWorse * best.cost) break;  // no step is too long for so little
+      damping = std::max(0.1, 10.0 * damping);   // less changes no step
       ++retreats;
       continue;
     }
-    const double gained = best.cost - trial.cost;
     best = std::move(trial);
     damping *= 0.1;
     retreats = 0;
@@ -399,7 +410,7 @@ double LogFit::fit(State& state, const FitSettings& settings, std::span<const st
     if (settings.progress) settings.progress(static_cast<double>(i) / settings.iterations);
     idle = best.cost < (1.0 - kLower) * lowest ? 0 : idle + 1;
     lowest = std::min(lowest, best.cost);
-    if (idle >= kIdle || std::abs(gained) < 1e-5 * best.cost) break;
+    if (idle >= kIdle) break;
   }
   state.set(best.x);
   return best.cost;
