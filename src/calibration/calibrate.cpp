@@ -145,8 +145,7 @@ class Calibrator {
                         "masks (vision.method: given) or say roughly where the camera is (cameras.{}.pose: roughly)",
                         options_.log.string(), rig_.cameras[c].name, rig_.cameras[c].name));
       }
-      CameraSearch search(*log_, threads_of(options_));
-      const auto places = search.find(c, limits::kPlaces);
+      const auto places = find_camera(*log_, c, limits::kPlaces, threads_of(options_));
       if (places.empty()) {
         throw DataError(
             fmt::format("{}: camera '{}' is to be found, and saw the robot in fewer than three postures; "

@@ -94,7 +94,6 @@ std::optional<NextPosture> next_posture(LogFit& fit, const BatchFit& batch, cons
     if (best == trials.end() || best->sd[j] > kWorthIt * sd[j]) continue;
     NextPosture next;
     next.tells = state.parameters()[static_cast<std::size_t>(j)].name;
-    next.sd_rad = best->sd[j];
     for (const auto& name : setup.estimated_joints) next.joints_rad[name] = best->q[log.robot()->joint_index(name)];
     return next;
   }

@@ -13,7 +13,6 @@ namespace bodyschema {
 struct NextPosture {
   std::map<std::string, double> joints_rad;  ///< the arm's, as its encoders are to read
   std::string tells;                         ///< the joint whose interval it shrinks most
-  double sd_rad = 0.0;                       ///< of its offset then
 };
 
 /// Of many random postures within the joints' limits and in view of the cameras, the one after which the joint that is

@@ -12,7 +12,7 @@ namespace bodyschema::diagnosis {
 struct BaseBlock {
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
-  double square = 0.0, weight = 0.0;
+  double square = 0.0;
 };
 
 /// Further columns: what a candidate would add, block by block.

@@ -166,7 +166,6 @@ std::vector<BaseBlock> base_blocks(const LogAbout& log) {
       for (const auto& step : own) block.H.col(j) += step.amount * rows.col(step.coordinate);
     }
     block.square += log.precision[p] * evidence.square;
-    block.weight += log.precision[p] * evidence.weight;
   }
   for (auto& block : blocks) block.H.triangularView<Eigen::StrictlyUpper>() = block.H.transpose();
   return blocks;

@@ -87,8 +87,7 @@ Reduced without(const ModelSearch& search, const BlockRegression& all, const std
     const auto& block = all.parts()[b];
     const Eigen::VectorXd g = block.g + block.H(Eigen::all, out) * value;
     blocks.push_back({block.H(kept, kept), g(kept),
-                      block.square + 2.0 * value.dot(block.g(out)) + value.dot(block.H(out, out) * value),
-                      block.weight});
+                      block.square + 2.0 * value.dot(block.g(out)) + value.dot(block.H(out, out) * value)});
     own.B[b] = block.H(kept, out);
     own.C[b] = block.H(out, out);
     own.d[b] = g(out);

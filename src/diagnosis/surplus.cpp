@@ -5,30 +5,11 @@
 
 #include "bodyschema/core/order_statistics.hpp"
 #include "bodyschema/pipeline/silhouette_preview.hpp"
+#include "bodyschema/vision/mask_operations.hpp"
 #include "limits.hpp"
 
 namespace bodyschema::diagnosis {
 namespace {
-
-/// Every pixel that has one of the mask's within `reach` columns and rows.
-BinaryMask grown(const BinaryMask& mask, int reach) {
-  BinaryMask along(mask.width(), mask.height()), result(mask.width(), mask.height());
-  for (int v = 0; v < mask.height(); ++v) {
-    for (int u = 0, last = -reach - 1; u < mask.width() + reach; ++u) {
-      if (u < mask.width() && mask.at(u, v)) last = u;
-      const int centre = u - reach;
-      if (centre >= 0 && last >= centre - reach) along.set(centre, v);
-    }
-  }
-  for (int u = 0; u < mask.width(); ++u) {
-    for (int v = 0, last = -reach - 1; v < mask.height() + reach; ++v) {
-      if (v < mask.height() && along.at(u, v)) last = v;
-      const int centre = v - reach;
-      if (centre >= 0 && last >= centre - reach) result.set(u, centre);
-    }
-  }
-  return result;
-}
 
 /// Pixels that are seen and lie beyond.
 double beyond(const Picture& picture, const BinaryMask& allowed) {
@@ -46,14 +27,16 @@ double beyond(const Picture& picture, const BinaryMask& allowed) {
 
 Surplus surplus(LogFit& fit, const LogAbout& log, const std::vector<std::size_t>& pictures) {
   SilhouettePreview preview(fit.log());
+  MaskMorphology morphology;
   std::vector<std::vector<double>> of_block(log.blocks);
   for (const auto p : pictures) {
     if (log.precision[p] <= 0.0) continue;
     const auto& picture = fit.log().pictures()[p];
     const auto& k = fit.log().rig().cameras[picture.camera].intrinsics;
     const double reach_px = limits::kSearch_px * picture_unit(k);
-    const auto silhouette = preview.draw(picture.joints.q, log.at.corrections[p], picture.camera);
-    const double pixels = beyond(picture, grown(silhouette, static_cast<int>(std::lround(reach_px))));
+    auto silhouette = preview.draw(picture.joints.q, log.at.corrections[p], picture.camera);
+    morphology.dilate(silhouette, static_cast<int>(std::lround(reach_px)));
+    const double pixels = beyond(picture, silhouette);
     auto& measurement = fit.measurement();
     measurement.projection().place(picture.joints.q, log.at.corrections[p], picture.camera);
     const double depth = std::max(0.0, measurement.projection().hand().translation().z());

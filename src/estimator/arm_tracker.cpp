@@ -316,10 +316,4 @@ void ArmTracker::begin_again() {
   gate_.forget();
 }
 
-void ArmTracker::reset() {
-  begin_again();
-  eyes_.forget();
-  known_.in_frame = known_.memory.in_posture();
-}
-
 }  // namespace bodyschema

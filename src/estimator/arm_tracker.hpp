@@ -50,7 +50,6 @@ class ArmTracker {
   /// How well the hand is known, as reported of the last frame.
   void hand_known_to(double sd_m) { hand_sd_m_ = sd_m; }
   [[nodiscard]] double usual() const { return gate_.usual(); }
-  void reset();
 
  private:
   void learn(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome);

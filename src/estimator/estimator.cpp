@@ -237,13 +237,6 @@ struct Estimator::Impl {
     return x;
   }
 
-  void reset() {
-    tracker.reset();
-    particles.reset();
-    fitter.forget();
-    model.forget();
-  }
-
   EstimatorOptions options;
   StereoRig rig;
   State state_at_first;
@@ -288,9 +281,6 @@ Estimate Estimator::step(const Observation& observation) {
   times.scoring_ms = impl_->scorer.take_scoring_ms();
   estimate.times = times;
   return estimate;
-}
-void Estimator::reset() {
-  impl_->reset();
 }
 
 const Exposure& Estimator::exposure(std::size_t camera) const {

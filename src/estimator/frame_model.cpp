@@ -250,7 +250,7 @@ void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::sp
   const Eigen::Index n = state_.size() + beside_count();
   out.cameras.resize(frame.seen.size());
   out.cost.assign(frame.seen.size(), 0.0);
-  out.sampled = out.matched = out.square = out.weight = out.odd = out.covered = 0.0;
+  out.sampled = out.matched = out.square = out.weight = out.odd = 0.0;
   out.samples.assign(with_beside ? frame.seen.size() : 0, {});
   out.time.assign(with_beside ? frame.seen.size() : 0, {});
   for (std::size_t c = 0; c < frame.seen.size(); ++c) {
@@ -271,7 +271,6 @@ void FrameModel::linearise(const Frame& frame, const Eigen::VectorXd& x, std::sp
     const OutlineMeasurement& measurement = measurement_of(c);
     if (with_beside) out.samples[c].assign(measurement.samples().begin(), measurement.samples().end());
     out.odd += answer.odd;
-    out.covered += answer.covered;
     out.sampled += answer.sampled;
     out.matched += answer.matched;
     const double unit = picture_unit_px(c), unit2 = unit * unit;

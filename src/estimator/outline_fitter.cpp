@@ -237,7 +237,7 @@ void OutlineFitter::learn_noise(const OutlineFit& fit) {
 }
 
 void OutlineFitter::learn_stamps(const Frame& frame, const OutlineFit& fit, const PostureMemory& memory) {
-  stamps_.learn(frame.time_s, fit.at_its_stamp, fit.time, memory.in_posture());
+  stamps_.learn(frame.time_s, fit.at_its_stamp, fit.time, memory);
 }
 
 void OutlineFitter::learn_shape(const OutlineFit& fit, double fitted) {

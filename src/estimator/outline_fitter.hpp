@@ -99,11 +99,6 @@ class OutlineFitter {
   /// the frame would tell if nothing else erred.
   [[nodiscard]] double shape_variance_share(double fitted) const;
   [[nodiscard]] const std::vector<OutlineNoise>& noise() const { return noise_; }
-  void forget() {
-    noise_.assign(noise_.size(), OutlineNoise(options_.noise));
-    shape_.forget();
-    stamps_.forget();
-  }
   /// What outlines get wrong in all postures was learned about an arm that is somewhere else.
   void forget_shape() { shape_.forget(); }
 

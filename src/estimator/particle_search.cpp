@@ -143,11 +143,6 @@ void ParticleSearch::restart() {
   filter_.reset(Eigen::VectorXd::Zero(joints_));
 }
 
-void ParticleSearch::reset() {
-  filter_ = ParticleFilter(joints_, options_.filter);
-  covariance_ = filter_.covariance();
-}
-
 double ParticleSearch::take_placing_ms() {
   return std::exchange(placing_ms_, 0.0);
 }

@@ -54,8 +54,6 @@ class ParticleSearch {
 
   /// Spread as at first, about nothing known; what is random goes on.
   void restart();
-  /// As if no picture had been seen.
-  void reset();
   /// Wall clock spent placing particles since the last call.
   double take_placing_ms();
 

@@ -7,17 +7,16 @@
 
 namespace bodyschema {
 
-void StampNoise::learn(double time_s, const Quadratic& frame, const TimeEvidence& time,
-                       const MemoryEstimate& in_posture) {
+void StampNoise::learn(double time_s, const Quadratic& frame, const TimeEvidence& time, const PostureMemory& memory) {
   if (time.A <= 0.0) return;
-  const auto n = in_posture.x.size();
+  const Eigen::VectorXd& x = memory.estimate().x;
+  const auto n = x.size();
   const auto A = frame.A.topLeftCorner(n, n);
   const Eigen::VectorXd a = time.with_state.head(n);
   // With all that is not known of the state integrated out, in this posture.
-  const Eigen::MatrixXd precision = in_posture.covariance.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-  const Eigen::VectorXd h = (A + precision).ldlt().solve(a);
+  const Eigen::VectorXd h = (A + memory.posture_precision()).ldlt().solve(a);
   const double information = time.A - a.dot(h);
-  const double score = time.b - a.dot(in_posture.x) - h.dot(frame.b.head(n) - A * in_posture.x);
+  const double score = time.b - a.dot(x) - h.dot(frame.b.head(n) - A * x);
   if (!(information > 0.0)) return;
   const Off off{score / information, 1.0 / information};
   if (!single_ || std::abs(time_s - single_at_s_) > limits::kStampsBeside_s) {
@@ -64,10 +63,6 @@ void StampNoise::take_out(const TimeEvidence& time, Quadratic& frame) const {
 
 double StampNoise::sd_s() const {
   return std::sqrt(variance_s2_);
-}
-
-void StampNoise::forget() {
-  *this = StampNoise(std::sqrt(believed_s2_));
 }
 
 }  // namespace bodyschema

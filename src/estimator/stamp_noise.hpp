@@ -24,13 +24,12 @@ class StampNoise {
   /// @param believed_sd_s  before any frame
   explicit StampNoise(double believed_sd_s) : believed_s2_(believed_sd_s * believed_sd_s), variance_s2_(believed_s2_) {}
 
-  /// Learns from a frame.
-  /// @param frame  over the estimated parameters, and more that are not looked at
-  void learn(double time_s, const Quadratic& frame, const TimeEvidence& time, const MemoryEstimate& in_posture);
+  /// Learns from a frame that agrees with a memory.
+  /// @param frame  over the memory's parameters; what is considered is not looked at
+  void learn(double time_s, const Quadratic& frame, const TimeEvidence& time, const PostureMemory& memory);
   /// What is left of a frame's say, whenever it was taken.
   void take_out(const TimeEvidence& time, Quadratic& frame) const;
   [[nodiscard]] double sd_s() const;
-  void forget();
 
  private:
   /// How far off a stamp was, as its frame alone tells it; of a pair, how far the two were apart.

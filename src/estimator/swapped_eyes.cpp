@@ -73,10 +73,4 @@ bool SwappedEyes::go_on(const Frame& shown, const PostureMemory& memory, StartSe
   return fitter_.go_on(shown, memory.beliefs(), search, room);
 }
 
-void SwappedEyes::forget() {
-  order_ = {};
-  search_.reset();
-  found_.reset();
-}
-
 }  // namespace bodyschema

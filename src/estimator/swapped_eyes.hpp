@@ -24,7 +24,6 @@ class SwappedEyes {
   std::optional<bool> from_the_start(const Frame& frame, const PostureMemory& memory);
   /// Whether a search has begun and is not through.
   [[nodiscard]] bool searching() const { return search_.has_value(); }
-  void forget();
 
  private:
   bool go_on(const Frame& shown, const PostureMemory& memory, StartSearch& search);

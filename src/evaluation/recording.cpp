@@ -36,7 +36,6 @@ struct RecordingResult {
   TipErrors uncorrected;   ///< encoders as they are, all poses
   TipErrors final;         ///< the last estimate applied to all poses
   double online_px = 0.0;  ///< each estimate at its time, last 30 poses
-  Eigen::VectorXd offset_deg;
   std::vector<std::string> joint_names;
   std::vector<Eigen::VectorXd> offsets;  ///< deg, frame by frame (Fig. 9)
   HonestyLog honesty;                    ///< frame by frame
@@ -179,7 +178,6 @@ RecordingResult watch(const Configuration& configuration, const fs::path& log, c
                         Statistics::of(before_deg).mean};
   result.final = {Statistics::of(after_px).mean, Statistics::of(after_mm).mean, Statistics::of(after_deg).mean};
   result.online_px = Statistics::of(online_px).mean;
-  result.offset_deg = last.offset_rad * (180.0 / kPi);
   return result;
 }
 

@@ -107,7 +107,6 @@ void BatchFit::run(double from_px, const std::vector<std::size_t>& pictures) {
                        .spacing_px = settings_.spacing_px,
                        .variance_px2 = mean_variance_px2(noise_)};
   fit_.fit(state_, settings, pictures);
-  if (settings_.progress) settings_.progress(0.5);
   measure(pictures);
   // With the noise as it is: how far beliefs and pictures pull, and which outlines are somebody else's.
   double robust_px = 0.0;
@@ -117,9 +116,7 @@ void BatchFit::run(double from_px, const std::vector<std::size_t>& pictures) {
   settings.variance_px2 = mean_variance_px2(noise_);
   fit_.fit(state_, settings, pictures);
   measure(pictures);
-  if (settings_.progress) settings_.progress(0.8);
   fuse(pictures);
-  if (settings_.progress) settings_.progress(1.0);
 }
 
 void BatchFit::measure(const std::vector<std::size_t>& pictures) {

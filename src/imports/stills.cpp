@@ -67,12 +67,13 @@ void list_pictures(const fs::path& folder, std::map<std::int64_t, fs::path>& pic
   }
 }
 
-/// Where the pictures of each camera of the rig are: those of a folder of its name, or of the one that is configured.
+/// Where pictures of a camera are: in a folder of its name, or in the one that is configured.
 std::string folder_of(const std::string& camera, const std::map<std::string, std::string>& given) {
   const auto other = given.find(camera);
   return other != given.end() ? other->second : camera;
 }
 
+/// The same of each camera of the rig; empty where there is no such folder.
 std::vector<std::string> folders_of(const ImportTarget& target, const std::map<std::string, std::string>& given,
                                     const std::map<std::string, std::map<std::int64_t, fs::path>>& there) {
   std::vector<std::string> folders;

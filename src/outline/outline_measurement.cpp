@@ -69,7 +69,7 @@ double picture_unit(const PinholeIntrinsics& k) {
 void OutlineEvidence::clear(Eigen::Index coordinates) {
   A.setZero(coordinates, coordinates);
   b.setZero(coordinates);
-  square = weight = cost = misfit = sampled = matched = covered = odd = 0.0;
+  square = weight = cost = misfit = sampled = matched = odd = 0.0;
 }
 
 OutlineMeasurement::OutlineMeasurement(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup,
@@ -90,22 +90,23 @@ void OutlineMeasurement::linearise(const ObservedEdges& edges, const Eigen::Ref<
                                    const Corrections& corrections, std::size_t camera,
                                    std::span<const std::uint32_t> active, const OutlineSearch& search,
                                    OutlineEvidence& out) {
-  out.clear(static_cast<Eigen::Index>(active.size()));
-  projection_.place(q, corrections, camera);
-  find_shutter_motion(q, corrections, camera, active);
-  compare(&edges, corrections, camera, search, out);
-  if (points_.empty() || active.empty()) return;
-  find_motions(q, corrections, camera, active);
-  differentiate(corrections, projection_.intrinsics(camera), active, out);
+  measure(&edges, q, corrections, camera, active, search, out);
 }
 
 void OutlineMeasurement::expect(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
                                 std::size_t camera, std::span<const std::uint32_t> active, const OutlineSearch& search,
                                 OutlineEvidence& out) {
+  measure(nullptr, q, corrections, camera, active, search, out);
+}
+
+void OutlineMeasurement::measure(const ObservedEdges* edges, const Eigen::Ref<const Eigen::VectorXd>& q,
+                                 const Corrections& corrections, std::size_t camera,
+                                 std::span<const std::uint32_t> active, const OutlineSearch& search,
+                                 OutlineEvidence& out) {
   out.clear(static_cast<Eigen::Index>(active.size()));
   projection_.place(q, corrections, camera);
   find_shutter_motion(q, corrections, camera, active);
-  compare(nullptr, corrections, camera, search, out);
+  compare(edges, corrections, camera, search, out);
   if (points_.empty() || active.empty()) return;
   find_motions(q, corrections, camera, active);
   differentiate(corrections, projection_.intrinsics(camera), active, out);
@@ -181,9 +182,7 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
     const double r = distance.value_or(0.0);
     const bool found = distance && std::abs(r) <= search_px;
     samples_.push_back({point.part, point.pixel, point.normal, found ? distance : std::nullopt, covered});
-    if (covered) {
-      out.covered += 1.0;
-    } else {
+    if (!covered) {
       out.sampled += 1.0;
       out.misfit += distance ? r * r * damping(r, misfit_px) : misfit_px * misfit_px;
       if (!found) out.cost += robust_px * robust_px;
@@ -272,7 +271,13 @@ void OutlineMeasurement::find_motions(const Eigen::Ref<const Eigen::VectorXd>& q
     number = value;
     for (std::size_t l = 0; l < links_.size(); ++l) {
       // d(X X0^-1)/d coordinate: a twist acting on points of the camera's frame.
-      motion_[i * links_.size() + l] = motion_between(links_[l], moved_.links()[l], kStep);
+      auto& motion = motion_[i * links_.size() + l];
+      const auto& X = moved_.links()[l];
+      if (X.matrix() == links_[l].matrix()) {
+        motion.setZero();  // most joints move few of the links
+      } else {
+        motion = motion_between(links_[l], X, kStep);
+      }
     }
   }
 }

@@ -26,7 +26,7 @@ struct Rows {
     for (Eigen::Index b = 0; b < blocks; ++b) {
       const Eigen::MatrixXd x = X.middleRows(b * length(), length());
       const Eigen::VectorXd r = y.segment(b * length(), length());
-      list.push_back({x.transpose() * x, x.transpose() * r, r.squaredNorm(), static_cast<double>(length())});
+      list.push_back({x.transpose() * x, x.transpose() * r, r.squaredNorm()});
     }
     return list;
   }

@@ -17,7 +17,6 @@ class TrackerOfOwnRobot : public OutlinesOfOwnRobot {
       : known_(model_->state(), layout(), {}, kLeastPostures), occlusion_(*model_, *scorer_, rig_, setup_.hand_link),
         tracker_(*model_, *scorer_, *particles_, fitter_, occlusion_, known_, options_) {
     known_.x = nothing_;
-    tracker_.reset();
   }
 
   FrameOutcome track(Frame frame) {
@@ -105,9 +104,6 @@ TEST_F(TrackerOfOwnRobot, OutOfSightTheMemoryStays) {
   tracker_.lose_sight();
   EXPECT_EQ(known_.memory.postures(), postures);
   EXPECT_EQ(known_.in_frame.x, known_.memory.estimate().x);
-  tracker_.reset();
-  EXPECT_TRUE(known_.memory.empty());
-  EXPECT_EQ(known_.in_frame.x, model_->state().prior_mean());
 }
 
 }  // namespace

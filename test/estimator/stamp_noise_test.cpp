@@ -32,11 +32,12 @@ class Stamps : public testing::Test {
     }
     return seen;
   }
-  [[nodiscard]] MemoryEstimate known() const {
-    MemoryEstimate estimate;
-    estimate.x = x_;
-    estimate.own = estimate.covariance = 1e-4 * Eigen::Matrix2d::Identity();
-    return estimate;
+  [[nodiscard]] PostureMemory known() const {
+    return {{.prior_mean = x_,
+             .prior_sd = Eigen::Vector2d::Constant(1e-2),
+             .is_joint = {false, false},
+             .considered_root = {}},
+            {}};
   }
 
   static constexpr int kNumbers = 30;
@@ -92,16 +93,6 @@ TEST_F(Stamps, OfAnArmAtRestSayNothing) {
   EXPECT_NEAR(stamps.sd_s(), 1e-3, 1e-12);
   EXPECT_EQ(before.A, seen.frame.A);
   EXPECT_EQ(before.b, seen.frame.b);
-}
-
-TEST_F(Stamps, AreForgottenWithAllElse) {
-  StampNoise stamps(1e-3);
-  for (int i = 0; i < 100; ++i) {
-    const Seen seen = frame(15e-3 * normal_(random_), 1.0);
-    stamps.learn(0.1 * i, seen.frame, seen.time, known());
-  }
-  stamps.forget();
-  EXPECT_NEAR(stamps.sd_s(), 1e-3, 1e-12);
 }
 
 /// What a frame says of the state is what the state and its time together say, the time integrated out.

@@ -1,7 +1,6 @@
 #pragma once
 
-#include <memory>
-#include <string>
+#include <cstddef>
 #include <vector>
 
 #include "bodyschema/camera/stereo_rig.hpp"
@@ -21,20 +20,11 @@ struct CameraPlace {
 /// For every direction of sight and roll, the position follows in closed form from where the masks' centres lie; what
 /// remains is ranked by how silhouettes and masks agree, and the best places are moved until they agree best (random
 /// search that narrows down, Rubinstein 1999). Joints may be off by some degrees. Deterministic.
-class CameraSearch {
- public:
-  /// @param log  its robot and masks
-  /// @param threads  0: one per core
-  CameraSearch(PictureLog& log, int threads);
-  ~CameraSearch();
-
-  /// The best places of a camera, distinct ones, best first; none where it saw the robot in fewer than three postures.
-  /// @param most  so many at most
-  [[nodiscard]] std::vector<CameraPlace> find(std::size_t camera, std::size_t most);
-
- private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
-};
+/// @param log      its robot and masks
+/// @param most     places, at most
+/// @param threads  0: one per core
+/// @return the best places of the camera, distinct ones, best first; none where it saw the robot in fewer than three
+///         postures
+[[nodiscard]] std::vector<CameraPlace> find_camera(PictureLog& log, std::size_t camera, std::size_t most, int threads);
 
 }  // namespace bodyschema

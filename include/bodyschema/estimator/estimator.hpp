@@ -38,8 +38,6 @@ class Estimator {
 
   /// Masks must have been filled in; a camera that is absent is not used.
   Estimate step(const Observation& observation);
-  /// Starts over, as if no picture had been seen.
-  void reset();
 
   /// Likelihood 1 - d (equation 4) of joint offsets, one hypothesis per column, all else nominal.
   /// Zero where the hand is not in view. Leaves the estimate as it is.

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <vector>
 
 #include "bodyschema/evidence/log_fit.hpp"
@@ -14,9 +13,8 @@ namespace bodyschema {
 struct BatchSettings {
   OutlineNoise::Prior noise;
   MemoryOptions memory;
-  double spacing_px = 3.0;                 ///< of outline samples, px of a 320x240 picture
-  int iterations = 25;                     ///< at most, of each of the fits
-  std::function<void(double)> progress{};  ///< called with the share done
+  double spacing_px = 3.0;  ///< of outline samples, px of a 320x240 picture
+  int iterations = 25;      ///< at most, of each of the fits
 };
 
 /// The answer of a whole log at once: a state fitted to all of its pictures, with the noise measured on what the fit

@@ -130,6 +130,8 @@ class PostureMemory {
   [[nodiscard]] MemoryEstimate in_posture(const Quadratic& frame) const;
   /// The same of a frame without evidence.
   [[nodiscard]] MemoryEstimate in_posture() const;
+  /// ... its covariance's inverse.
+  [[nodiscard]] const Eigen::MatrixXd& posture_precision() const;
   /// What pictures say of what is considered, in units of its standard deviations, all that is estimated integrated
   /// out.
   [[nodiscard]] Quadratic of_considered() const;
@@ -192,7 +194,6 @@ class PostureMemory {
   [[nodiscard]] Quadratic of_pictures() const;
   [[nodiscard]] Quadratic prior() const;
   [[nodiscard]] Eigen::VectorXd wider(const MemoryEstimate& estimate) const;
-  [[nodiscard]] const Eigen::MatrixXd& posture_precision() const;
   void changed();
   [[nodiscard]] Eigen::MatrixXd with_considered(const MemoryEstimate& estimate) const;
   void learn_posture_error(const Block& block);

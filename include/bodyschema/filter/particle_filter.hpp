@@ -55,7 +55,6 @@ class ParticleFilter {
   void set_spread(double spread_rad) { spread_rad_ = spread_rad; }
 
   [[nodiscard]] std::mt19937_64& random() { return random_; }
-  [[nodiscard]] const ParticleFilterOptions& options() const { return options_; }
 
  private:
   ParticleFilterOptions options_;

@@ -58,7 +58,6 @@ struct OutlineEvidence {
   double misfit = 0.0;   ///< the same with one c for all: comparable however far was searched
   double sampled = 0.0;  ///< points of the predicted outline in the picture
   double matched = 0.0;  ///< ... that found a counterpart within the search
-  double covered = 0.0;  ///< points that were not looked for; not among `sampled`
   double odd = 0.0;      ///< points of `sampled` that were left out: they show something else
   void clear(Eigen::Index coordinates);
   [[nodiscard]] double rms_px() const { return weight > 0.0 ? std::sqrt(square / weight) : 0.0; }
@@ -106,6 +105,10 @@ class OutlineMeasurement {
                                 std::size_t camera, std::span<const std::uint32_t> active, std::size_t link);
 
  private:
+  /// @param edges  null: every point is where it is predicted
+  void measure(const ObservedEdges* edges, const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections,
+               std::size_t camera, std::span<const std::uint32_t> active, const OutlineSearch& search,
+               OutlineEvidence& out);
   void find_motions(const Eigen::Ref<const Eigen::VectorXd>& q, const Corrections& corrections, std::size_t camera,
                     std::span<const std::uint32_t> active);
   /// How links move while rows are read out; nothing where no row is another one's time, or nothing moves.
@@ -113,7 +116,7 @@ class OutlineMeasurement {
                            std::size_t camera, std::span<const std::uint32_t> active);
   /// Moves a point to where its row saw it.
   void roll(const Corrections& corrections, const PinholeIntrinsics& k, OutlinePoint& point) const;
-  /// @param edges  null: every point is where it is predicted
+  /// @param edges  as above
   void compare(const ObservedEdges* edges, const Corrections& corrections, std::size_t camera,
                const OutlineSearch& search, OutlineEvidence& out);
   /// Where covers and fat masks move the outline of the meshes. @param spacing_px  of its points

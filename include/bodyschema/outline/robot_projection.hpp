@@ -44,8 +44,6 @@ class RobotProjection {
   [[nodiscard]] const Pose& hand() const { return X_CB_[part_count_]; }
   [[nodiscard]] std::size_t hand_link() const { return part_count_; }
   [[nodiscard]] std::span<const Pose> fingertips() const { return std::span(X_CB_).subspan(part_count_ + 1); }
-  /// Pose of the camera in the root frame.
-  [[nodiscard]] const Pose& X_WC() const { return kinematics_.X_WC(); }
   /// What `parts` does to a point of the camera's frame before it is drawn with the rig's intrinsics.
   [[nodiscard]] const Eigen::Matrix3d& warp() const { return warp_; }
 

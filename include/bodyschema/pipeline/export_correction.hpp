@@ -74,12 +74,11 @@ void write_corrected_urdf(const std::filesystem::path& urdf, const Correction& c
 /// estimated included: arm and head offsets hold together. With other effects also `cameras.yaml` (where these change
 /// intrinsics or cameras' places) and `what_was_applied.txt`: which of its effects these files hold, and which only
 /// work where the model itself is loaded. Each file is written whole or, where that fails, stays as it was.
-/// @param anyway  as of read_correction, and also when the summary's `model_hash` is another robot's or its
-///                cameras are others than `rig`, with a warning
+/// @param anyway  as of read_correction, and also when the summary's `model_hash` is another robot's or its cameras are
+///                others than `rig`, with a warning
 /// Throws as read_correction does, as replace_file for a file that cannot be written, and ConfigurationError when the
 /// summary was made with another URDF, other meshes, other cameras or another extended model than `setup` and `rig`
-/// have. Returns warnings and
-/// files, for people.
+/// have. Returns warnings and files, for people.
 std::string export_correction(const std::filesystem::path& summary, const RobotSetup& setup, const StereoRig& rig,
                               const std::filesystem::path& out, bool anyway = false);
 

@@ -60,8 +60,6 @@ class Pipeline {
   bool segment(Observation& observation);
   /// One step of the estimator on an observation that has its masks.
   Estimate estimate(const Observation& observation);
-  /// Starts over; a learned background is kept.
-  void reset() { estimator_.reset(); }
 
   /// Takes over the background that the pipeline this one replaces has learned, where cameras and
   /// vision settings are the same: a hand in view would be learned as background now. Of a background that is
