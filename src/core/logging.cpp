@@ -8,6 +8,8 @@
 
 #include <cstdlib>
 #include <memory>
+#include <mutex>
+#include <set>
 
 #include "bodyschema/core/error.hpp"
 
@@ -55,6 +57,13 @@ void set_up_logging(const std::string& level) {
   }
   logger->set_level(parsed);
   spdlog::set_default_logger(logger);
+}
+
+void warn_once(const std::string& text) {
+  static std::mutex mutex;
+  static std::set<std::string> said;
+  const std::scoped_lock lock(mutex);
+  if (said.insert(text).second) spdlog::warn("{}", text);
 }
 
 }  // namespace bodyschema

@@ -11,6 +11,7 @@
 #include "bodyschema/camera/lens_knowledge.hpp"
 #include "bodyschema/camera/picture_reduction.hpp"
 #include "bodyschema/camera/shutter.hpp"
+#include "bodyschema/core/logging.hpp"
 #include "bodyschema/imports/joint_mapping.hpp"
 #include "bodyschema/imports/yarp_import.hpp"
 #include "bodyschema/outline/outline_measurement.hpp"
@@ -107,11 +108,11 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
       configuration.section("vision").section("background_pictures").fail(camera.name, "a file for each camera");
     }
     if (lens_knowledge(configuration.section("cameras").section(camera.name)) == LensKnowledge::kUnknown) {
-      spdlog::warn(
+      warn_once(fmt::format(
           "camera '{}' has no distortion in the configuration: how its lens bends pictures (k1) is estimated beside "
           "the offsets, which takes longer and tells them less well; set cameras.{}.distortion, to zeros where "
           "pictures come straightened (bodyschema new-robot --rectified)",
-          camera.name, camera.name);
+          camera.name, camera.name));
     }
     std::optional<Undistorter> undistorter;
     if (camera.has_distortion()) undistorter.emplace(camera);

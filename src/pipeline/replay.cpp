@@ -210,9 +210,9 @@ class Replay {
       for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
         const auto& seen = observation.cameras[c];
         if (!seen || seen->mask.empty()) continue;
-        write_mask_png(
-            options_.out / "masks" / fmt::format("{}_{:05d}.png", pipeline_.rig().cameras[c].name, frames_.size()),
-            seen->mask, seen->valid);
+        const auto& camera = pipeline_.rig().cameras[c];
+        write_mask_png(options_.out / "masks" / fmt::format("{}_{:05d}.png", camera.name, frames_.size()), seen->mask,
+                       seen->valid, camera.intrinsics.reduction);
       }
     }
     const bool complete =

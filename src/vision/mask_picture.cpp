@@ -34,7 +34,7 @@ void write(const std::filesystem::path& file, const cv::Mat& picture) {
 
 }  // namespace
 
-void write_mask_png(const std::filesystem::path& file, const BinaryMask& mask, const BinaryMask& valid) {
+void write_mask_png(const std::filesystem::path& file, const BinaryMask& mask, const BinaryMask& valid, int n) {
   if (mask.empty()) throw FileError(file.string() + ": there is no mask to write");
   cv::Mat picture(mask.height(), mask.width(), CV_8UC1);
   for (int v = 0; v < mask.height(); ++v) {
@@ -43,6 +43,7 @@ void write_mask_png(const std::filesystem::path& file, const BinaryMask& mask, c
       picture.at<std::uint8_t>(v, u) = !known ? 128 : (mask.at(u, v) ? 255 : 0);
     }
   }
+  cv::resize(picture, picture, {}, n, n, cv::INTER_NEAREST);
   write(file, picture);
 }
 

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
 #include <stdlib.h>
 #include <sys/stat.h>
@@ -9,6 +10,8 @@
 #include <unistd.h>
 
 #include <array>
+#include <memory>
+#include <sstream>
 #include <string>
 
 namespace bodyschema {
@@ -46,6 +49,20 @@ TEST(Logging, TheJournalGetsPrioritiesAndKeepsTheTimeItself) {
 
 TEST(Logging, OtherStreamsGetTimeAndLevel) {
   EXPECT_THAT(logged(false), testing::MatchesRegex("[0-9:]+ warning no light\n[0-9:]+ info going on\n"));
+}
+
+/// A calibration that reads its configuration for every start said the same each time.
+TEST(Logging, WhatAConfigurationLacksIsSaidOnce) {
+  std::ostringstream said;
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(
+      std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(said)));
+  for (int i = 0; i < 3; ++i) warn_once("camera 'left' has no lens");
+  warn_once("camera 'right' has no lens");
+  spdlog::set_default_logger(before);
+  const std::string text = said.str();
+  EXPECT_EQ(text.find("'left'"), text.rfind("'left'"));
+  EXPECT_NE(text.find("'right'"), std::string::npos);
 }
 
 }  // namespace

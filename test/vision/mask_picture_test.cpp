@@ -36,6 +36,19 @@ TEST_F(MaskPicture, MaskReadsBack) {
   EXPECT_EQ(*read.pixel(68, 7), 255);
 }
 
+/// Of pictures that are looked at reduced (1280x720) masks were written half as large, and could not be given back.
+TEST_F(MaskPicture, AMaskOfAReducedPictureIsWrittenAsLargeAsTheCamerasOwn) {
+  BinaryMask mask(6, 4);
+  mask.set(2, 1);
+  write_mask_png(folder_ / "mask.png", mask, {}, 2);
+  const auto read = read_picture(folder_ / "mask.png");
+  ASSERT_EQ(read.width, 12);
+  ASSERT_EQ(read.height, 8);
+  for (int v = 0; v < 8; ++v) {
+    for (int u = 0; u < 12; ++u) EXPECT_EQ(*read.pixel(u, v), u / 2 == 2 && v / 2 == 1 ? 255 : 0) << u << ' ' << v;
+  }
+}
+
 TEST_F(MaskPicture, ColoursAreReadAsRgb) {
   std::filesystem::create_directories(folder_);
   std::ofstream(folder_ / "colour.ppm", std::ios::binary) << "P6\n2 1\n255\n\xc8\x01\x02\x03\x04\x05";
