@@ -33,8 +33,9 @@ constexpr double kLeastGain = 1e-3;       ///< share of the misfit: points of an
 constexpr double kGenericGain = 2.0;      ///< a free curve must explain so much more than any known cause
 
 // Computational.
-constexpr double kRounding = 1e-7;  ///< share of a column beyond others: less is rounding
-constexpr double kWide = 4.0;       ///< typical sizes: a belief that is none
+constexpr double kLeastPromise = 1e-4;  ///< share of the misfit: a step that promises less is not taken
+constexpr double kRounding = 1e-7;      ///< share of a column beyond others: less is rounding
+constexpr double kWide = 4.0;           ///< typical sizes: a belief that is none
 constexpr std::size_t kMostCauses = 6;
 constexpr std::size_t kMostRounds = 10;    ///< causes taken or dropped, blocks made longer
 constexpr std::size_t kMostTried = 4;      ///< candidates a round that are fitted for real

@@ -121,7 +121,8 @@ double ModelSearch::fit(State& state, double from_px, std::span<const std::size_
                    .finest_px = limits::kSearch_px,
                    .robust_px = search().robust_px,
                    .spacing_px = options_.spacing_px,
-                   .variance_px2 = mean_variance_px2(noise_) * slope_},
+                   .variance_px2 = mean_variance_px2(noise_) * slope_,
+                   .least_promise = limits::kLeastPromise},
                   pictures);
 }
 
@@ -448,7 +449,8 @@ Size ModelSearch::size_of(const LogAbout& log, const std::vector<std::vector<Dir
 void ModelSearch::polish(double block_s) {
   constexpr int kRounds = 4;
   constexpr double kNegligible_sd = 0.05;
-  if (polished_ && polished_->second == block_s && are_same(polished_->first, state_.model())) return;
+  const bool known = polished_ && polished_->causes == causes_.size() && polished_->block_s == block_s;
+  if (known && are_same(polished_->model, state_.model())) return;
   slope_ = fit_.slope(state_, search(), mean_variance_px2(noise_), raster_, options_.seed);
   spdlog::debug("diagnosis: slope {:.3f}", slope_);
   double last = 0.0;
@@ -469,7 +471,7 @@ void ModelSearch::polish(double block_s) {
     before = state_.x();
     state_.set(before + step);
   }
-  polished_.emplace(state_.model(), block_s);
+  polished_.emplace(Polished{state_.model(), causes_.size(), block_s});
 }
 
 void ModelSearch::look_for_lost_part() {

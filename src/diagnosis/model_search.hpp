@@ -124,8 +124,13 @@ class ModelSearch {
   std::vector<FoundCause> causes_;
   std::vector<OutlineNoise> noise_;
   double cost_ = 0.0;
-  double slope_ = 1.0;                                     ///< LogFit::slope, about the model that was polished last
-  std::optional<std::pair<ErrorModel, double>> polished_;  ///< that one, and the blocks' length
+  double slope_ = 1.0;  ///< LogFit::slope, about the model that was polished last
+  struct Polished {
+    ErrorModel model;
+    std::size_t causes = 0;  ///< those that are not in the model have columns beside it
+    double block_s = 0.0;
+  };
+  std::optional<Polished> polished_;  ///< that one: it is as it should be
   struct Linearised {
     ErrorModel model;
     double robust_px = 0.0, slope = 1.0;

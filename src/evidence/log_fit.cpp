@@ -389,20 +389,21 @@ double LogFit::fit(State& state, const FitSettings& settings, std::span<const st
   }
   double damping = 1e-6, lowest = best.cost;
   int retreats = 0, idle = 0;
-  for (int i = 0; i < settings.iterations && retreats < 3;) {
+  for (int i = 0; i < settings.iterations && retreats < 5;) {
     // Points of an outline come and go: near the end the cost goes up and down by some ten thousandths.
     constexpr double kWorse = 1e-3, kLower = 1e-4;  // shares
     constexpr int kIdle = 2;                        // steps that do not lower it
     const DampedStep next = step(best, damping);
     const double promised = settings.variance_px2 * next.promised / std::max(1.0, usual_points);
-    if (promised < kLower * best.cost) break;
+    if (promised < settings.least_promise * best.cost) break;
     Trial trial = look(best.x + next.x, settings.finest_px);
     if (trial.cost > (1.0 + kWorse) * best.cost) {
-      if (promised < kWorse * best.cost) break;  // no step is too long for so little
-      damping = std::max(0.1, 10.0 * damping);   // less changes no step
+      if (promised < 10.0 * settings.least_promise * best.cost) break;  // no step is too long for so little
+      damping = std::max(1e-3, 10.0 * damping);
       ++retreats;
       continue;
     }
+    const double gained = best.cost - trial.cost;
     best = std::move(trial);
     damping *= 0.1;
     retreats = 0;
@@ -410,7 +411,7 @@ double LogFit::fit(State& state, const FitSettings& settings, std::span<const st
     if (settings.progress) settings.progress(static_cast<double>(i) / settings.iterations);
     idle = best.cost < (1.0 - kLower) * lowest ? 0 : idle + 1;
     lowest = std::min(lowest, best.cost);
-    if (idle >= kIdle) break;
+    if (idle >= kIdle || std::abs(gained) < 1e-5 * best.cost) break;
   }
   state.set(best.x);
   return best.cost;
