@@ -94,6 +94,7 @@ class CameraSearch {
 
   std::vector<CameraPlace> find(std::size_t camera, std::size_t most) {
     if (!prepare(camera)) return {};
+    const Eigen::Vector3d middle = middle_of_postures();
     std::vector<CameraPlace> places;
     for (int d = 0; d < kDirections; ++d) {
       for (int r = 0; r < kRolls; ++r) {
@@ -101,8 +102,6 @@ class CameraSearch {
         const auto place = placed(R_PC);
         if (!place) continue;
         // The surface that shows is a guess: nearer and further, too.
-        Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-        for (const auto& posture : postures_) middle += posture.centre_P / static_cast<double>(postures_.size());
         for (const double further : {0.75, 1.0, 1.35}) {
           auto moved = *place;
           moved.X_PC.translation() = middle + further * (place->X_PC.translation() - middle);
@@ -112,21 +111,10 @@ class CameraSearch {
     }
     score(places);
     sort(places);
-    std::vector<CameraPlace> seeds;
-    for (const auto& place : places) {
-      if (seeds.size() >= kSeeds) break;
-      const bool known = std::any_of(seeds.begin(), seeds.end(), [&](const auto& seed) { return alike(seed, place); });
-      if (!known) seeds.push_back(place);
-    }
+    auto seeds = distinct(places, kSeeds);
     for (std::size_t i = 0; i < seeds.size(); ++i) seeds[i] = narrowed(seeds[i], i);
     sort(seeds);
-    std::vector<CameraPlace> best;
-    for (const auto& place : seeds) {
-      if (best.size() >= most) break;
-      const bool known = std::any_of(best.begin(), best.end(), [&](const auto& other) { return alike(other, place); });
-      if (!known) best.push_back(place);
-    }
-    return best;
+    return distinct(seeds, most);
   }
 
  private:
@@ -294,12 +282,28 @@ class CameraSearch {
            (a.X_PC.translation() - b.X_PC.translation()).norm() < kShare * reach;
   }
 
+  /// The first ones of a list that are not alike.
+  [[nodiscard]] static std::vector<CameraPlace> distinct(const std::vector<CameraPlace>& places, std::size_t most) {
+    std::vector<CameraPlace> list;
+    for (const auto& place : places) {
+      if (list.size() >= most) break;
+      const bool known = std::any_of(list.begin(), list.end(), [&](const auto& other) { return alike(other, place); });
+      if (!known) list.push_back(place);
+    }
+    return list;
+  }
+
+  [[nodiscard]] Eigen::Vector3d middle_of_postures() const {
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    for (const auto& posture : postures_) middle += posture.centre_P / static_cast<double>(postures_.size());
+    return middle;
+  }
+
   /// Moved until silhouettes agree best: random places about the best ones so far, ever nearer.
   [[nodiscard]] CameraPlace narrowed(const CameraPlace& start, std::size_t seed) {
     std::mt19937_64 random(seed + 1);
     std::normal_distribution<double> normal;
-    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-    for (const auto& posture : postures_) middle += posture.centre_P / static_cast<double>(postures_.size());
+    const Eigen::Vector3d middle = middle_of_postures();
     std::vector<CameraPlace> elite = {start};
     double turn = 0.25, shift = 0.2;  // rad; share of the distance
     for (int round = 0; round < kRounds; ++round) {

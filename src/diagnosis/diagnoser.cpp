@@ -333,10 +333,10 @@ class Diagnoser {
       if (model) {
         auto before = search_.now();
         search_.take(std::move(*model));
-        spdlog::debug("diagnosis: fitted, cost {:.4f}, z {:.1f}", search_.cost(), z_of_last());
         // What is large bends the very sums by which it is judged: so it is judged where it is fitted.
-        const double threshold = threshold_of(best->candidate->stated);
-        if (best->candidate->z() >= threshold || z_of_last() >= threshold) return true;
+        const double z = z_of_last(), threshold = threshold_of(best->candidate->stated);
+        spdlog::debug("diagnosis: fitted, cost {:.4f}, z {:.1f}", search_.cost(), z);
+        if (best->candidate->z() >= threshold || z >= threshold) return true;
         search_.go_back_to(std::move(before));
       }
       if (!best->candidate->generic()) refused_.push_back(cause);

@@ -63,7 +63,7 @@ TEST_F(ParticlesOfOwnRobot, LikelihoodIsLargestAtTheTruthWhateverTheBatch) {
   EXPECT_EQ(best, n - 2);
 }
 
-TEST_F(ParticlesOfOwnRobot, PaperEstimateIsOneOfThemAndResettingRepeatsIt) {
+TEST_F(ParticlesOfOwnRobot, PaperEstimateIsOneOfThemAndTheCloudNarrows) {
   options_.mode = EstimatorMode::kPaper;
   const auto best = [&] {
     particles_->score(frame_, nothing_);

@@ -11,9 +11,8 @@ namespace bodyschema {
 
 /// A mask as a picture: white where set, black elsewhere, gray where not valid. Creates missing folders.
 /// @param valid  may be empty
-/// @param n  each pixel of the mask is n x n of the file: PinholeIntrinsics::reduction gives it the size of the
-/// camera's
-///   own pictures
+/// @param n  each pixel of the mask is n x n of the file: PinholeIntrinsics::reduction gives it the size of
+///           the camera's own pictures
 /// Throws as write_file (core/write_file.hpp), FileError for another ending than a picture's.
 void write_mask_png(const std::filesystem::path& file, const BinaryMask& mask, const BinaryMask& valid = {}, int n = 1);
 
