@@ -16,31 +16,15 @@ constexpr double kThick_px = 1.0;  ///< a piece is at least twice as thick: the 
 constexpr double kBlend_px = 3.0;  ///< so far from such a piece an outline may be part of it
 constexpr double kMost = 0.5;      ///< share of the pictures in which what is fixed to a link shows
 
-void subtract(BinaryMask& mask, const BinaryMask& other) {
-  for (int v = 0; v < mask.height(); ++v) {
-    for (int w = 0; w < mask.words_per_row(); ++w) mask.row(v)[w] &= ~other.row(v)[w];
-  }
-}
-
-void add(BinaryMask& mask, const BinaryMask& other) {
-  for (int v = 0; v < mask.height(); ++v) {
-    for (int w = 0; w < mask.words_per_row(); ++w) mask.row(v)[w] |= other.row(v)[w];
-  }
-}
-
-bool meet(const BinaryMask& a, const BinaryMask& b) {
-  for (int v = 0; v < a.height(); ++v) {
-    for (int w = 0; w < a.words_per_row(); ++w) {
-      if ((a.row(v)[w] & b.row(v)[w]) != 0) return true;
-    }
-  }
-  return false;
+bool meet(BinaryMask a, const BinaryMask& b) {
+  a &= b;
+  return a.count() > 0;
 }
 
 /// Pieces of one that reach further than `err` beyond the other and are no thin strips.
 BinaryMask pieces(BinaryMask one, BinaryMask other, int err, int thick, MaskMorphology& morphology) {
   morphology.dilate(other, err);
-  subtract(one, other);
+  one -= other;
   morphology.erode(one, thick);
   morphology.dilate(one, thick);
   return one;
@@ -65,13 +49,13 @@ BeyondModel beyond_model(const PictureLog& log, std::span<const Corrections> cor
     if (!picture.valid.empty()) {
       BinaryMask unknown(known.width(), known.height());
       unknown.fill(true);
-      subtract(unknown, picture.valid);
-      add(known, unknown);  // it may be robot: the model lacks nothing there
+      unknown -= picture.valid;
+      known |= unknown;  // it may be robot: the model lacks nothing there
     }
     BinaryMask more = pieces(picture.mask, model, px(kErr_px), px(kThick_px), morphology);
     const BinaryMask less = pieces(std::move(predicted), std::move(known), px(kErr_px), px(kThick_px), morphology);
     BinaryMask all = more;
-    add(all, less);
+    all |= less;
     if (all.count() == 0) continue;
     ++result.pictures;
     morphology.dilate(all, px(kErr_px + kBlend_px));
@@ -120,7 +104,7 @@ void leave_out(PictureLog& log, const BeyondModel& beyond) {
         seen.valid = BinaryMask(seen.mask.width(), seen.mask.height());
         seen.valid.fill(true);
       }
-      subtract(seen.valid, beyond.where[p]);
+      seen.valid -= beyond.where[p];
     }
     left.add(o);
   }

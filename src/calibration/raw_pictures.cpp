@@ -71,12 +71,9 @@ void RawPictures::segment(std::size_t camera, std::size_t i, const PredictedRobo
   segmenters_[camera][recording_[i]].segment(kept_[i].cameras[camera]->image, out.mask, out.valid, out.coverage,
                                              predicted);
   const BinaryMask& shown = shown_[camera];
-  for (int v = 0; v < shown.height(); ++v) {
-    for (int w = 0; w < shown.words_per_row(); ++w) {
-      out.mask.row(v)[w] &= shown.row(v)[w];
-      out.valid.row(v)[w] &= shown.row(v)[w];
-    }
-  }
+  if (shown.empty()) return;
+  out.mask &= shown;
+  out.valid &= shown;
 }
 
 bool RawPictures::cameras_stood_still() {

@@ -28,16 +28,10 @@ constexpr std::size_t kFewestCubes = 8;
 /// Whether masks show more beside the robot than one cube: less is ragged outlines.
 bool shows_something(const HeldThing::View& view) {
   const double cube_px = kCube_m * view.camera->fx / view.X_CP.translation().z();
-  std::size_t foreign = 0;
-  for (int v = 0; v < view.mask->height(); ++v) {
-    const auto *mask = view.mask->row(v), *robot = view.robot->row(v);
-    const auto* valid = view.valid->empty() ? nullptr : view.valid->row(v);
-    for (int w = 0; w < view.mask->words_per_row(); ++w) {
-      const auto beside = mask[w] & ~robot[w] & (valid != nullptr ? valid[w] : ~std::uint64_t{0});
-      foreign += static_cast<std::size_t>(std::popcount(beside));
-    }
-  }
-  return static_cast<double>(foreign) > cube_px * cube_px;
+  BinaryMask foreign = *view.mask;
+  foreign -= *view.robot;
+  if (!view.valid->empty()) foreign &= *view.valid;
+  return static_cast<double>(foreign.count()) > cube_px * cube_px;
 }
 
 }  // namespace

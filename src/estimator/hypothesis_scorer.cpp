@@ -19,9 +19,7 @@ void leave_out(const BinaryMask& pixels, BinaryMask& valid) {
     valid = BinaryMask(pixels.width(), pixels.height());
     valid.fill(true);
   }
-  for (int v = 0; v < valid.height(); ++v) {
-    for (int w = 0; w < valid.words_per_row(); ++w) valid.row(v)[w] &= ~pixels.row(v)[w];
-  }
+  valid -= pixels;
 }
 
 }  // namespace

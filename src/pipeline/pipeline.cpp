@@ -212,12 +212,10 @@ bool Pipeline::frozen(const PictureChange& change) {
 }
 
 void Pipeline::Look::leave_out_all_but(const BinaryMask& seen) {
+  valid &= seen;
+  mask &= seen;
   std::size_t i = 0;
   for (int v = 0; v < seen.height(); ++v) {
-    for (int w = 0; w < seen.words_per_row(); ++w) {
-      valid.row(v)[w] &= seen.row(v)[w];
-      mask.row(v)[w] &= seen.row(v)[w];
-    }
     for (int u = 0; u < seen.width(); ++u, ++i) {
       if (!seen.at(u, v)) coverage[i] = 0;
     }

@@ -44,11 +44,8 @@ class ObservationMasks {
       } else {
         valid = observations[c].valid;
       }
-      for (int v = 0; v < observed.height(); ++v) {
-        for (int w = 0; w < observed.words_per_row(); ++w) {
-          observed.row(v)[w] = observations[c].mask.row(v)[w] & valid.row(v)[w];
-        }
-      }
+      observed = observations[c].mask;
+      observed &= valid;
       counts_[c] = static_cast<std::uint32_t>(observed.count());
     }
   }

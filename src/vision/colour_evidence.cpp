@@ -113,9 +113,8 @@ void ColourEvidence::measure_distance() {
   morphology_.dilate(band_, asked_px);
   work_ = predicted_;
   morphology_.erode(work_, asked_px);
-  for (int v = 0; v < band_.height(); ++v) {
-    for (int w = 0; w < band_.words_per_row(); ++w) band_.row(v)[w] &= ~work_.row(v)[w] & in_box_.row(v)[w];
-  }
+  band_ -= work_;
+  band_ &= in_box_;
   distance_.assign(static_cast<std::size_t>(box_.height() + 2) * stride_ + 1, kFar);
   mark_outline();
   for (int v = box_.v0; v <= box_.v1; ++v) pass_on(v, true);

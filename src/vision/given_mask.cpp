@@ -33,12 +33,11 @@ void GivenMask::read(const Image& given, const Undistorter* lens, BinaryMask& ma
       if (known.data[i] == kFull) valid.set(u, v);
     }
   }
-  const BinaryMask with_specks = mask;
+  BinaryMask specks = mask;
   const double least_px = setup_.min_piece_share * static_cast<double>(components_.largest_piece(mask));
   components_.remove_small(mask, static_cast<int>(std::ceil(least_px)));
-  for (int v = 0; v < given.height; ++v) {
-    for (int w = 0; w < mask.words_per_row(); ++w) valid.row(v)[w] &= ~(with_specks.row(v)[w] & ~mask.row(v)[w]);
-  }
+  specks -= mask;
+  valid -= specks;
   components_.fill_small_holes(mask, setup_.max_hole_px);
   coverage = std::move(robot.data);
   i = 0;

@@ -174,9 +174,7 @@ void RegionStatistics::separate(const Image& image, const BinaryMask& predicted,
   const auto invert = [&](BinaryMask& mask) {
     work_ = mask;
     mask.fill(true);
-    for (int v = 0; v < mask.height(); ++v) {
-      for (int w = 0; w < mask.words_per_row(); ++w) mask.row(v)[w] &= ~work_.row(v)[w];
-    }
+    mask -= work_;
     for (int v = 0; v < mask.height(); ++v) {
       auto* row = mask.row(v);
       for (int w = 0; w < mask.words_per_row(); ++w) {

@@ -65,13 +65,6 @@ VisionSetup in_pixels_of(VisionSetup setup, int width, int height) {
   return setup;
 }
 
-/// What is in both.
-void intersect(BinaryMask& mask, const BinaryMask& other) {
-  for (int v = 0; v < mask.height(); ++v) {
-    for (int w = 0; w < mask.words_per_row(); ++w) mask.row(v)[w] &= other.row(v)[w];
-  }
-}
-
 // Of `auto`. Lengths are those of a 320x240 picture.
 // Light and background are compared at every so many pixels along each axis.
 constexpr int kLightGrid = 3;
@@ -409,9 +402,7 @@ void Segmenter::Impl::refine(const Image& image, const BackgroundModel& model, B
   if (setup.method == SegmentationMethod::kStatistics) {
     soften(mask, coverage);
   } else {
-    for (int v = 0; v < height; ++v) {
-      for (int w = 0; w < valid.words_per_row(); ++w) valid.row(v)[w] &= ~uncertain.row(v)[w];
-    }
+    valid -= uncertain;
   }
   components.remove_small(mask, setup.min_component_px);
   components.fill_small_holes(mask, setup.max_hole_px);
@@ -584,7 +575,7 @@ void Segmenter::Impl::compare(const Image& image, const BackgroundModel& model, 
   detect(image, model, 1.0f, everything(), nullptr);
   components.remove_small(detected, setup.min_component_px);
   components.fill_small_holes(detected, setup.max_hole_px);
-  intersect(sure, detected);
+  sure &= detected;
   components.fill_small_holes(sure, std::max(setup.max_hole_px, 4));
   refine(image, model, mask, valid, coverage);
 }
@@ -743,12 +734,8 @@ void Segmenter::Impl::forget_background() {
 }
 
 void Segmenter::Impl::doubt_background() {
-  for (int v = 0; v < height; ++v) {
-    for (int w = 0; w < known.words_per_row(); ++w) {
-      known.row(v)[w] &= ~evidence.denied().row(v)[w];
-      detected.row(v)[w] &= ~evidence.denied().row(v)[w];
-    }
-  }
+  known -= evidence.denied();
+  detected -= evidence.denied();
 }
 
 /// The background about the outline of what is `sure`, where coverage asks for it: as learned, or as it is nearby.
@@ -826,7 +813,7 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
     detect(seen, learned.model(), edge_variance, evidence.box(), everywhere ? nullptr : &beside);
     components.remove_small(detected, setup.min_component_px);
     components.fill_small_holes(detected, setup.max_hole_px);
-    intersect(sure, detected);
+    sure &= detected;
     components.fill_small_holes(sure, std::max(setup.max_hole_px, 4));
   }
   if (looks.channels != channels) looks = {};
@@ -849,9 +836,8 @@ void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryM
   valid.fill(true);
   refine(seen, local, mask, valid, coverage);
   evidence.mark_weak(robot);
-  for (int v = 0; v < height; ++v) {
-    for (int w = 0; w < known.words_per_row(); ++w) valid.row(v)[w] &= ~(robot.row(v)[w] & ~known.row(v)[w]);
-  }
+  robot -= known;
+  valid -= robot;
 }
 
 void Segmenter::Impl::adapt_auto(const Image& image, const BinaryMask& mask, const PredictedRobot& predicted) {
@@ -859,9 +845,7 @@ void Segmenter::Impl::adapt_auto(const Image& image, const BinaryMask& mask, con
   const Image& seen = relit_is_this ? relit : image;
   robot = mask;
   morphology.dilate(robot, 3);
-  for (int v = 0; v < height; ++v) {
-    for (int w = 0; w < robot.words_per_row(); ++w) robot.row(v)[w] |= beside.row(v)[w];
-  }
+  robot |= beside;
   // A prediction that nothing has confirmed yet may be far from the arm, whose ghost would stay in the background.
   if (!predicted.trusted) morphology.dilate(robot, static_cast<int>(kFarOff_px * unit_of(width, height)));
   constexpr int kEager = 20;

@@ -42,10 +42,7 @@ class OutlinesBeforeMountedCameras : public OutlinesOfOwnRobot {
         q(model_->state().parameters()[static_cast<std::size_t>(k)].joint) -= predicted[k];
       }
       const BinaryMask there = reach_.draw(q, reach_.roles().no_corrections(), c).mask;
-      BinaryMask& mask = seen_.cameras[c]->mask;
-      for (int v = 0; v < mask.height(); ++v) {
-        for (int w = 0; w < mask.words_per_row(); ++w) mask.row(v)[w] |= there.row(v)[w];
-      }
+      seen_.cameras[c]->mask |= there;
     }
     Frame frame = model_->take(seen_, predicted);
     scorer_->observe(frame, options_.min_mask_share);

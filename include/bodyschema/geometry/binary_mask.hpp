@@ -49,6 +49,19 @@ class BinaryMask {
     for (const auto word : words_) n += static_cast<std::size_t>(std::popcount(word));
     return n;
   }
+  // Of two pictures of one size, pixel by pixel: what is in both, in either, in the first alone.
+  BinaryMask& operator&=(const BinaryMask& other) {
+    for (std::size_t i = 0; i < words_.size(); ++i) words_[i] &= other.words_[i];
+    return *this;
+  }
+  BinaryMask& operator|=(const BinaryMask& other) {
+    for (std::size_t i = 0; i < words_.size(); ++i) words_[i] |= other.words_[i];
+    return *this;
+  }
+  BinaryMask& operator-=(const BinaryMask& other) {
+    for (std::size_t i = 0; i < words_.size(); ++i) words_[i] &= ~other.words_[i];
+    return *this;
+  }
   friend bool operator==(const BinaryMask&, const BinaryMask&) = default;
 
  private:
