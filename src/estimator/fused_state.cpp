@@ -46,7 +46,10 @@ double FusedState::disagreement() const {
 
 void FusedState::hand_was_missed(double share) {
   ++postures_;
-  postures_missed_ += share > limits::kBreakdown;
+  const bool missed = share > limits::kBreakdown;
+  postures_missed_ += missed;
+  missed_lately_ +=
+      ((missed ? 1.0 : 0.0) - missed_lately_) / std::min(static_cast<double>(postures_), limits::kRecentPostures);
   postures_without_hand_ += share > limits::kMostHidden;
 }
 

@@ -19,9 +19,12 @@ struct FusedState {
 
   /// Too few postures for what is remembered to be relied on.
   [[nodiscard]] bool young() const { return memory.postures() < least_postures; }
-  /// Most of the hand's outline was not where it is believed to be, in most postures that were learned from: something
-  /// may hide a hand now and then, but what is fitted to the smaller part of it time and again is some other outline.
-  [[nodiscard]] bool hand_is_lost() const { return postures_ >= least_postures && 2 * postures_missed_ > postures_; }
+  /// Most of the hand's outline was not where it is believed to be, in most postures that were learned from and in most
+  /// of the last ones: something may hide a hand now and then, but what is fitted to the smaller part of it time and
+  /// again is some other outline.
+  [[nodiscard]] bool hand_is_lost() const {
+    return postures_ >= least_postures && 2 * postures_missed_ > postures_ && missed_lately_ > 0.5;
+  }
   /// ... and so much of it that nothing is known of the hand: nothing is lost with what was learned of it.
   [[nodiscard]] bool hand_was_never_seen() const {
     return postures_ >= least_postures && 2 * postures_without_hand_ > postures_;
@@ -30,7 +33,10 @@ struct FusedState {
   [[nodiscard]] bool unsure() const { return young() || hand_is_lost(); }
   /// What a posture that was learned from did not show of the hand: a share of its outline.
   void hand_was_missed(double share);
-  void forget_missed() { postures_ = postures_missed_ = postures_without_hand_ = 0; }
+  void forget_missed() {
+    postures_ = postures_missed_ = postures_without_hand_ = 0;
+    missed_lately_ = 0.0;
+  }
   /// Joints that may be anywhere, or of which nothing is known any more, where they were last; the rest fused.
   [[nodiscard]] Eigen::VectorXd where_it_was() const;
   /// What postures disagree by, times what is claimed of them: no estimate is better than the postures that it is made
@@ -62,6 +68,7 @@ struct FusedState {
   std::size_t postures_ = 0;               ///< that were learned from since something was forgotten ...
   std::size_t postures_missed_ = 0;        ///< ... and did not show most of the hand's outline
   std::size_t postures_without_hand_ = 0;  ///< ... or next to nothing of it
+  double missed_lately_ = 0.0;             ///< share of the last ones that did not show most of it
 };
 
 }  // namespace bodyschema

@@ -65,8 +65,8 @@ inline constexpr double kStampsBelieved = 8.0;
 /// Physical. s; in so short a time an arm goes on as it did: what is wrong besides moves two frames' times alike.
 inline constexpr double kStampsBeside_s = 0.5;
 
-/// Statistical. Postures after which what one showed of the parts' shapes has faded to 1/e: the estimate that left its
-/// residuals is no longer held.
+/// Statistical. Postures after which what one showed of the parts' shapes, and of the hand, has faded to 1/e: the
+/// estimate that left its residuals is no longer held.
 inline constexpr double kRecentPostures = 12.0;
 
 /// Statistical. A parameter further from what was believed than this many of its standard deviations contradicts it.

@@ -67,6 +67,21 @@ TEST_F(FusedStateOfOwnRobot, AHandThatMostPosturesDoNotShowIsLostAndNotHidden) {
   EXPECT_FALSE(known.hand_is_lost());
 }
 
+/// Thirty postures before the arm was found were held against it until thirty more had shown the hand.
+TEST_F(FusedStateOfOwnRobot, AHandThatIsShownAgainIsNoLongerLost) {
+  FusedState known = state();
+  for (int posture = 0; posture < 30; ++posture) {
+    see(known, paper_offsets_rad());
+    known.hand_was_missed(0.9);
+  }
+  for (int posture = 0; posture < 5; ++posture) known.hand_was_missed(0.1);
+  EXPECT_TRUE(known.hand_is_lost());  // by chance, perhaps
+  for (int posture = 0; posture < 7; ++posture) known.hand_was_missed(0.1);
+  EXPECT_FALSE(known.hand_is_lost());
+  for (int posture = 0; posture < 7; ++posture) known.hand_was_missed(0.9);
+  EXPECT_TRUE(known.hand_is_lost());
+}
+
 /// What hides the hand of an arm that is well known costs no knowledge.
 TEST_F(FusedStateOfOwnRobot, AHandThatWasSeenLongEnoughMayBeHiddenForAsLong) {
   FusedState known = state();
