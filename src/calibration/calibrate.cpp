@@ -605,9 +605,12 @@ class Calibrator {
     if (left.empty()) return;
     const State held(log_->roles(), held_as_believed(beliefs_.state, batch.state(), left));
     BatchFit again(fit, held, beliefs_.tolerances, settings());
-    again.start_at(fitted + given_as_believed(batch.state(), batch.estimate(), left) - batch.state().x());
+    // By what the pictures alone say: the estimate's covariance contains by how much the answer may be wrong, and that
+    // does not trade as pictures do.
+    const auto& seen = batch.memory().estimate();
+    again.start_at(fitted + given_as_believed(batch.state(), seen, left) - seen.x);
     again.run(0.0, {});
-    batch.move_to(batch.state().x() + again.state().x() - fitted);
+    batch.move_to(again.state().x() + beside(batch.state(), seen, left, batch.state().x() - fitted));
     const Eigen::VectorXd sd = sds_of(batch);
     for (std::size_t k = 0; k < result_.joints.size(); ++k) {
       auto& joint = result_.joints[k];

@@ -281,10 +281,12 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
   if (!c.parameters.empty()) {
     page.heading("What else was estimated");
     rows.clear();
+    const auto short_of = [](double value, int digits) {
+      return std::abs(value) < 100.0 ? fmt::format("{:.{}g}", value, digits) : fmt::format("{:.0f}", value);
+    };
     for (const auto& p : c.parameters) {
       if (!worth_a_line(p)) continue;
-      rows.push_back({p.name, fmt::format("{:.3g}", p.value), fmt::format("{:.2g}", p.sd),
-                      fmt::format("{:.2g}", p.prior_sd), p.unit});
+      rows.push_back({p.name, short_of(p.value, 3), short_of(p.sd, 2), short_of(p.prior_sd, 2), p.unit});
     }
     page.table({"effect", "value", "sd", "sd believed before", "unit"}, rows);
   }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "bodyschema/pipeline/silhouette_preview.hpp"
 #include "limits.hpp"
 
 namespace bodyschema {
@@ -116,14 +117,21 @@ std::optional<Objection> objection_of_postures(const BatchFit& batch, const Doub
   const Eigen::VectorXd innovation = batch.memory().belief_innovation();
   for (std::size_t k = 0; k < result.joints.size(); ++k) {
     const auto& joint = result.joints[k];
-    if (joint.told || !joint.applied || std::abs(innovation[static_cast<Eigen::Index>(k)]) <= limits::kFarUntold_sd)
-      continue;
+    const auto at = static_cast<Eigen::Index>(k);
+    if (joint.seen_sd_rad > limits::kScattered * batch.state().prior_sd()[at]) {
+      return Objection{CalibrationState::kModelMisfit,
+                       fmt::format("Model misfit: parts of the log put {} {:.0f} deg and more apart, further than is "
+                                   "believed possible; is its sign, or where it is zero, another than the URDF's?",
+                                   joint.name, degrees(joint.seen_sd_rad))};
+    }
+    if (joint.told || !joint.applied || std::abs(innovation[at]) <= limits::kFarUntold_sd) continue;
     return Objection{CalibrationState::kModelMisfit,
                      fmt::format("Model misfit: the pictures ask for {:.0f} deg in {} and hardly tell it; is its sign, "
                                  "or where it is zero, another than the URDF's?",
                                  degrees(joint.offset_rad), joint.name)};
   }
-  if (doubts.found.hand_is_lost) {
+  const bool covered = !doubts.own_masks && doubts.found.hand_covered > limits::kCovered;
+  if (doubts.found.hand_is_lost && !covered) {
     return Objection{CalibrationState::kNotConverged,
                      "Not converged: next to nothing of the hand's outline is found, so that no picture shows where it "
                      "is; is it hidden, not on this robot, or turned by a joint whose sign or zero is another than the "
@@ -134,6 +142,21 @@ std::optional<Objection> objection_of_postures(const BatchFit& batch, const Doub
                      "Not converged: the pictures tell no joint's offset; record postures that differ more."};
   }
   return std::nullopt;
+}
+
+/// How much of where some parts are predicted the masks show robot.
+double covered_share(const PictureLog& log, const BatchFit& batch, std::span<const std::size_t> pictures,
+                     const std::vector<bool>& parts) {
+  SilhouettePreview preview(log);
+  double predicted = 0.0, covered = 0.0;
+  for (const auto p : pictures) {
+    const auto& picture = log.pictures()[p];
+    BinaryMask there = preview.draw_parts(picture.joints.q, batch.at().corrections[p], picture.camera, parts);
+    predicted += static_cast<double>(there.count());
+    there &= picture.mask;
+    covered += static_cast<double>(there.count());
+  }
+  return covered / std::max(1.0, predicted);
 }
 
 }  // namespace
@@ -152,6 +175,7 @@ FoundOutlines found_outlines(LogFit& fit, const BatchFit& batch, std::span<const
       matched += other.matched;
     }
   } all, seen, hand;
+  std::vector<bool> of_hand(links.size(), false);
   OutlineEvidence evidence;
   for (const auto& segment : log.roles().segments) {
     for (const auto part : segment.parts) {
@@ -167,7 +191,10 @@ FoundOutlines found_outlines(LogFit& fit, const BatchFit& batch, std::span<const
         own.add({evidence.sampled, evidence.matched});
       }
       all.add(own);
-      if (segment.name == log.setup().hand_link) hand.add(own);
+      if (segment.name == log.setup().hand_link) {
+        hand.add(own);
+        of_hand[part] = true;
+      }
       if (own.is_lost()) {
         result.lost.push_back(links[part]);
       } else {
@@ -176,6 +203,7 @@ FoundOutlines found_outlines(LogFit& fit, const BatchFit& batch, std::span<const
     }
   }
   result.hand_is_lost = hand.is_lost();
+  if (result.hand_is_lost) result.hand_covered = covered_share(log, batch, pictures, of_hand);
   result.share = seen.matched / std::max(1.0, seen.sampled);
   result.seen = seen.sampled / std::max(1.0, all.sampled);
   return result;

@@ -17,6 +17,9 @@ struct FoundOutlines {
   double seen = 0.0;              ///< share of the whole outline that these parts make
   std::vector<std::string> lost;  ///< links of which next to nothing is found
   bool hand_is_lost = false;      ///< the same of the hand as a whole, with all that is fixed to it
+  /// Of a lost hand: the share of where it is predicted that the masks show robot. A tool that covers it hides its
+  /// outline all the same; of a hand that is elsewhere they show what is behind.
+  double hand_covered = 0.0;
 };
 
 /// @param pictures  that are looked at

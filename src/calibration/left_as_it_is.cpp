@@ -17,6 +17,15 @@ std::vector<Eigen::Index> parameters_of(const State& state, const std::vector<st
   return list;
 }
 
+/// How the whole estimate moves where some of its parameters are moved by so much.
+Eigen::VectorXd moved_along(const Eigen::MatrixXd& covariance, const std::vector<Eigen::Index>& own,
+                            const Eigen::VectorXd& by) {
+  const Eigen::MatrixXd C = covariance(own, own);
+  Eigen::VectorXd moved = covariance(Eigen::all, own) * C.ldlt().solve(by);
+  moved(own) = by;
+  return moved;
+}
+
 }  // namespace
 
 std::vector<std::size_t> left_as_they_are(const State& state, const MemoryEstimate& estimate,
@@ -38,11 +47,13 @@ std::vector<std::size_t> left_as_they_are(const State& state, const MemoryEstima
 Eigen::VectorXd given_as_believed(const State& state, const MemoryEstimate& estimate,
                                   const std::vector<std::size_t>& effects) {
   const auto own = parameters_of(state, effects);
-  const Eigen::VectorXd away = (state.prior_mean() - estimate.x)(own);
-  const Eigen::MatrixXd C = estimate.covariance(own, own);
-  Eigen::VectorXd x = estimate.x + estimate.covariance(Eigen::all, own) * C.ldlt().solve(away);
-  for (const auto k : own) x[k] = state.prior_mean()[k];
-  return x;
+  return estimate.x + moved_along(estimate.covariance, own, (state.prior_mean() - estimate.x)(own));
+}
+
+Eigen::VectorXd beside(const State& state, const MemoryEstimate& estimate, const std::vector<std::size_t>& effects,
+                       const Eigen::VectorXd& change) {
+  const auto own = parameters_of(state, effects);
+  return change - moved_along(estimate.covariance, own, change(own));
 }
 
 std::vector<Belief> held_as_believed(std::vector<Belief> beliefs, const State& state,

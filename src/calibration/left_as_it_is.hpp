@@ -24,6 +24,10 @@ std::vector<std::size_t> left_as_they_are(const State& state, const MemoryEstima
 Eigen::VectorXd given_as_believed(const State& state, const MemoryEstimate& estimate,
                                   const std::vector<std::size_t>& effects);
 
+/// A change of the estimate without what it changes in these effects: what is correlated with them goes back along.
+Eigen::VectorXd beside(const State& state, const MemoryEstimate& estimate, const std::vector<std::size_t>& effects,
+                       const Eigen::VectorXd& change);
+
 /// Beliefs that hold these effects of the state where they are believed to be.
 std::vector<Belief> held_as_believed(std::vector<Belief> beliefs, const State& state,
                                      const std::vector<std::size_t>& effects);

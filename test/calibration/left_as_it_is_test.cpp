@@ -70,6 +70,18 @@ TEST_F(LeftAsItIs, WhatHoldsTogetherWithItMovesAlong) {
   EXPECT_NEAR(degrees(x[turn_]), 0.99 * 4.0, 1e-9);
 }
 
+/// The turn went with the joint: of what both changed together nothing is left, of what is another joint's all.
+TEST_F(LeftAsItIs, AChangeIsSeenBesideIt) {
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(state_.size());
+  change[0] = radians(1.0);
+  change[1] = radians(0.2);
+  change[turn_] = -0.99 * radians(1.0);
+  const Eigen::VectorXd left = beside(state_, estimate_, {0}, change);
+  EXPECT_EQ(left[0], 0.0);
+  EXPECT_NEAR(degrees(left[1]), 0.2, 1e-9);
+  EXPECT_NEAR(degrees(left[turn_]), 0.0, 1e-9);
+}
+
 TEST_F(LeftAsItIs, BeliefsHoldThatAndNothingElse) {
   const auto held = held_as_believed(beliefs(roles_), state_, {0});
   ASSERT_EQ(held.size(), 8u);
