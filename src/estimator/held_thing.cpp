@@ -1,7 +1,6 @@
 #include "held_thing.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 namespace bodyschema {

@@ -246,8 +246,7 @@ class Calibrated : public ::testing::Test {
 
   /// The arm's URDF with the hand far from the arm's end.
   fs::path urdf_with_the_hand_aside() {
-    std::ifstream in(fs::path(BODYSCHEMA_SOURCE_DIR) / "meshes/arm7/arm7.urdf");
-    const std::string own((std::istreambuf_iterator<char>(in)), {});
+    const std::string own = text_of(fs::path(BODYSCHEMA_SOURCE_DIR) / "meshes/arm7/arm7.urdf");
     const fs::path file = folder_ / "aside.urdf";
     std::ofstream(file) << std::regex_replace(own, std::regex("<child link=\"hand\"/><origin xyz=\"0 0 "),
                                               "<child link=\"hand\"/><origin xyz=\"0.2 0.2 ");
@@ -358,9 +357,7 @@ TEST_F(Calibrated, AHeadThatTurnsBeforeARoomIsCalibratedWithoutALearnedBackgroun
   EXPECT_THAT(result.remarks, ::testing::Contains(HasSubstr("a camera turned before a room")));
   EXPECT_THAT(to_table(result), HasSubstr("note: a camera turned before a room"));
   for (const char* file : {"calibration.json", "report.html"}) {
-    std::ifstream in(folder_ / "out" / file);
-    EXPECT_THAT(std::string(std::istreambuf_iterator<char>(in), {}), HasSubstr("a camera turned before a room"))
-        << file;
+    EXPECT_THAT(text_of(folder_ / "out" / file), HasSubstr("a camera turned before a room")) << file;
   }
 }
 
@@ -615,9 +612,7 @@ TEST_F(Calibrated, AJointThatTurnsTheOtherWayIsNotGood) {
   EXPECT_EQ(first, "# NOT TO BE APPLIED. " + found.sentence);
   for (const char* file : {"corrected.urdf", "ros/joint_calibration.yaml", "ros/camera_info/left.yaml",
                            "ros/static_transforms.sh", "ros/ros2_control_transmissions.xml"}) {
-    std::ifstream stream(options.out / file);
-    const std::string text((std::istreambuf_iterator<char>(stream)), {});
-    EXPECT_THAT(text, HasSubstr("NOT TO BE APPLIED. " + found.sentence)) << file;
+    EXPECT_THAT(text_of(options.out / file), HasSubstr("NOT TO BE APPLIED. " + found.sentence)) << file;
   }
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Three recordings of physical arms that nothing of this project was built on, and what `calibrate` says of them.
+"""Three recordings of physical arms, tried when nearly all of `calibrate` was written, and what it says of them.
 
 They are in the history of github.com/lbr-stack/roboreg (Apache-2.0), each with masks by SAM 2 and one camera:
 
@@ -16,9 +16,9 @@ github.com/xArm-Developer/xarm_ros (meshes xarm7/visual, its default kinematics)
 Offsets of 4 deg standard deviation are added to the recorded angles, none with the first seed, and nothing is told to
 the three commands but URDF and folder. Printed for each: state, joints told, errors of these but the first against the
 encoders as they are (rms, and the worst in published standard deviations and 0.1 deg), and the outlines' distance in
-the masks on postures left out. `--postures` draws so many with each seed. `--reversed` turns the sign of one joint's angles after the other instead, which should
-not be `good`. Exit status 1 where a result is `good` and wrong: a told joint off by more than 5 standard deviations, or
-by more than 3 and 0.5 deg. Needs git and numpy.
+the masks on postures left out. `--postures` draws so many with each seed. `--reversed` turns the sign of one joint's
+angles after the other instead, which should not be `good`. Exit status 1 where a result is `good` and wrong: a told
+joint off by more than 5 standard deviations, or by more than 3 and 0.5 deg. Needs git and numpy.
 """
 import argparse
 import csv
@@ -132,7 +132,6 @@ def main():
                              folder / tag, not arguments.no_masks)
 
         every = range(recording["postures"])
-
         if arguments.reversed:
             for k, joint in enumerate(joints):
                 turned = angles.copy()
@@ -150,10 +149,12 @@ def main():
             line, wrong, errors = line_of(name, str(seed), result, dict(zip(joints, hidden)))
             print(line, flush=True)
             any_wrong |= wrong
-            found.append(errors)
-        both = set.intersection(*(set(errors) for errors in found))
-        apart = [max(e[j] for e in found) - min(e[j] for e in found) for j in both]
-        print(f"{name:9} answers to different offsets lie within {max(apart, default=0.0):.2f} deg of each other")
+            if result["state"] == "good":
+                found.append(errors)
+        always = set.intersection(*map(set, found)) if found else set()
+        apart = [max(e[joint] for e in found) - min(e[joint] for e in found) for joint in always]
+        print(f"{name:9} good answers to different offsets lie within {max(apart, default=math.nan):.2f} deg of each "
+              f"other, in {len(always)} joints told by all of them")
     return 1 if any_wrong else 0
 
 
