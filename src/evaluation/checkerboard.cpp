@@ -2,29 +2,24 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <functional>
-#include <sstream>
 
 #include "bodyschema/core/error.hpp"
+#include "bodyschema/imports/csv_table.hpp"
+#include "bodyschema/simulator/lens.hpp"
 
 namespace bodyschema {
 namespace {
 
 using Corner = Eigen::Vector2d;
 
-Eigen::Vector2d distorted(const Eigen::Vector2d& x, const std::array<double, 5>& d) {
-  const double r2 = x.squaredNorm(), radial = 1.0 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
-  return {x.x() * radial + 2.0 * d[2] * x.x() * x.y() + d[3] * (r2 + 2.0 * x.x() * x.x()),
-          x.y() * radial + d[2] * (r2 + 2.0 * x.y() * x.y()) + 2.0 * d[3] * x.x() * x.y()};
-}
-
 struct Lens {
   const PinholeIntrinsics& k;
   const std::array<double, 5>& d;
   [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& p_C) const {
-    const Eigen::Vector2d x = distorted(p_C.head<2>() / p_C.z(), d);
+    const Eigen::Vector2d x = simulator::bend(d, p_C.x() / p_C.z(), p_C.y() / p_C.z());
     return {k.fx * x.x() + k.cx, k.fy * x.y() + k.cy};
   }
   /// Ray of a pixel, z = 1: the distortion is small, so that what it did is taken back by repetition.
@@ -32,7 +27,7 @@ struct Lens {
     const Eigen::Vector2d seen((pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy);
     Eigen::Vector2d x = seen;
     constexpr int kRounds = 20;
-    for (int i = 0; i < kRounds; ++i) x += seen - distorted(x, d);
+    for (int i = 0; i < kRounds; ++i) x += seen - simulator::bend(d, x.x(), x.y());
     return x;
   }
 };
@@ -131,7 +126,7 @@ std::pair<double, double> scatter(const std::vector<Pose>& poses, const Eigen::V
   double square = 0.0, turn = 0.0;
   for (const auto& X : poses) {
     square += (X * middle - mean).squaredNorm();
-    turn += std::pow(Eigen::AngleAxisd(Eigen::Matrix3d(R.transpose() * X.linear())).angle(), 2);
+    turn += std::pow(rotation_distance(R, X.linear()), 2);
   }
   const double n = static_cast<double>(poses.size());
   return {std::sqrt(square / n), std::sqrt(turn / n)};
@@ -140,20 +135,12 @@ std::pair<double, double> scatter(const std::vector<Pose>& poses, const Eigen::V
 }  // namespace
 
 std::map<std::int64_t, BoardCorners> read_checkerboard(const std::filesystem::path& csv) {
-  std::ifstream in(csv);
-  if (!in) throw FileError(csv.string() + ": cannot be read");
+  const CsvTable table = CsvTable::read(csv);
   std::map<std::int64_t, BoardCorners> boards;
-  std::string line;
-  std::getline(in, line);
-  for (int number = 2; std::getline(in, line); ++number) {
-    std::stringstream cells(line);
-    std::array<double, 5> value{};
-    char comma = ',';
-    bool good = static_cast<bool>(cells >> value[0]);
-    for (std::size_t i = 1; i < value.size(); ++i) good = good && cells >> comma >> value[i] && comma == ',';
-    if (!good) {
-      throw FileError(csv.string() + ":" + std::to_string(number) + ": expected posture,column,row,u_px,v_px");
-    }
+  for (const auto& row : table.rows) {
+    const auto& value = row.values;
+    const bool numbers = std::none_of(value.begin(), value.end(), [](double v) { return std::isnan(v); });
+    if (value.size() != 5 || !numbers) throw FileError(table.where(row) + ": expected posture,column,row,u_px,v_px");
     auto& board = boards[static_cast<std::int64_t>(value[0])];
     board.board.emplace_back(value[1], value[2]);
     board.pixel.emplace_back(value[3], value[4]);

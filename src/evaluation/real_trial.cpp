@@ -9,6 +9,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/write_file.hpp"
+#include "bodyschema/imports/csv_table.hpp"
 #include "bodyschema/imports/stills.hpp"
 
 namespace bodyschema {
@@ -49,21 +50,11 @@ JointTable JointTable::read(const fs::path& set) {
 }
 
 JointTable JointTable::read_file(const fs::path& file) {
-  std::ifstream in(file);
-  if (!in) throw FileError(file.string() + ": cannot be read");
-  JointTable table;
-  std::string line;
-  while (std::getline(in, line)) {
-    std::stringstream cells(line);
-    std::string cell;
-    if (table.columns.empty()) {
-      while (std::getline(cells, cell, ',')) table.columns.push_back(cell);
-      continue;
-    }
-    std::vector<double> row;
-    while (std::getline(cells, cell, ',')) row.push_back(std::stod(cell));
-    if (row.size() != table.columns.size()) throw FileError(file.string() + ": rows of different lengths");
-    table.rows.push_back(std::move(row));
+  const CsvTable csv = CsvTable::read(file);
+  JointTable table{csv.names, {}};
+  for (const auto& row : csv.rows) {
+    if (!row.words.empty()) throw csv.not_a_number(row, row.words.begin()->first);
+    table.rows.push_back(row.values);
   }
   return table;
 }

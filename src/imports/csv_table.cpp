@@ -1,4 +1,4 @@
-#include "csv_table.hpp"
+#include "bodyschema/imports/csv_table.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -106,6 +106,7 @@ CsvTable CsvTable::read(const std::filesystem::path& file) {
     if (trimmed(line).empty()) continue;
     Row row;
     row.line = number;
+    row.place = table.rows.size() + table.bad.count;
     const std::string where = file.string() + ":" + std::to_string(number);
     auto fields = line.size() > kMaxLineBytes ? std::vector<std::string>() : fields_of(line, separator);
     if (!fields.empty() && are_empty(fields)) continue;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -227,8 +226,9 @@ std::string LerobotImport::text() const {
   for (const Log& log : logs) out += log.summary.text(log.file);
   out += fmt::format("{} log{} written", logs.size(), logs.size() == 1 ? "" : "s");
   if (episodes_left_out.count > 0) {
-    out += fmt::format("; {} episodes left out, {}{}", episodes_left_out.count,
-                       episodes_left_out.count == 1 ? "" : "the first: ", episodes_left_out.first);
+    out += episodes_left_out.count == 1
+               ? "; 1 episode left out, " + episodes_left_out.first
+               : fmt::format("; {} episodes left out, the first: {}", episodes_left_out.count, episodes_left_out.first);
   }
   return out + "\n";
 }

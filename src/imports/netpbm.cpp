@@ -4,12 +4,11 @@
 #include <string>
 
 #include "bodyschema/core/error.hpp"
+#include "picture_file.hpp"
 
 namespace bodyschema {
 
 namespace {
-
-constexpr int kMaxNetpbmSide_px = 16384;
 
 /// The next number of the header, behind white space and comments; -1 when there is none.
 int header_number(std::istream& in) {
@@ -43,10 +42,10 @@ Image read_netpbm(const std::filesystem::path& file) {
   const int width = header_number(in);
   const int height = header_number(in);
   const int largest = header_number(in);
-  if (width < 1 || height < 1 || width > kMaxNetpbmSide_px || height > kMaxNetpbmSide_px || largest != 255) {
+  if (width < 1 || height < 1 || width > kMaxSide_px || height > kMaxSide_px || largest != 255) {
     throw FileError(file.string() + ": header says " + std::to_string(width) + "x" + std::to_string(height) +
-                    " with values up to " + std::to_string(largest) + "; expected 1 to " +
-                    std::to_string(kMaxNetpbmSide_px) + " px a side and 255");
+                    " with values up to " + std::to_string(largest) + "; expected 1 to " + std::to_string(kMaxSide_px) +
+                    " px a side and 255");
   }
   const int channels = kind == '6' ? 3 : 1;
   const auto size =

@@ -6,13 +6,12 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <optional>
 #include <set>
 
 #include "bodyschema/camera/camera_info.hpp"
-#include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "camera_check.hpp"
 #include "picture_file.hpp"
@@ -373,12 +372,13 @@ class BagImport {
 
   void compare(const Record& record) {
     const std::string topic = record.text("topic");
+    if (const int messages = ++compared_[topic]; messages > 1) {
+      if (messages > 2) return;
+      builder_.note(topic + " changes within the bag; its first message was compared with the configuration");
+      return;
+    }
     for (std::size_t c = 0; c < selection_.infos.size(); ++c) {
       if (selection_.infos[c] != topic) continue;
-      if (!compared_.insert(topic).second) {
-        builder_.note(topic + " changes within the bag; its first message was compared with the configuration");
-        break;
-      }
       try {
         const CameraInfo info = CameraInfo::from(Configuration::parse(record.json("info")), topic);
         if (const auto difference = camera_difference(target_.rig.cameras[c], info, topic)) builder_.note(*difference);
@@ -392,8 +392,8 @@ class BagImport {
   const ImportTarget& target_;
   LogBuilder builder_;
   Frames frames_;
-  std::vector<std::string> frames_of_;  ///< of each camera's pictures
-  std::set<std::string> compared_;
+  std::vector<std::string> frames_of_;                     ///< of each camera's pictures
+  std::map<std::string, int> compared_;                    ///< messages of each topic that says how a camera is built
   std::optional<double> joints_late_s_, pictures_late_s_;  ///< of the first, from its stamp to its record
   std::uint64_t unstamped_ = 0;
 };

@@ -11,7 +11,7 @@
 
 #include "bodyschema/core/nearest_name.hpp"
 #include "camera_check.hpp"
-#include "csv_table.hpp"
+#include "bodyschema/imports/csv_table.hpp"
 #include "picture_file.hpp"
 #include "row_slopes.hpp"
 
@@ -249,7 +249,7 @@ class StillsImport {
       if (folder.empty()) continue;
       for (const auto& [number, file] : folder_.images.at(folder)) numbers.insert(number);
     }
-    const bool one_each = numbers.size() == table_.rows.size() && !numbers.empty() &&
+    const bool one_each = numbers.size() == table_.rows.size() + table_.bad.count && !numbers.empty() &&
                           *numbers.rbegin() - *numbers.begin() + 1 == static_cast<std::int64_t>(numbers.size());
     return one_each ? *numbers.begin() : 0;
   }
@@ -267,7 +267,7 @@ class StillsImport {
         check_fields(row);
         Posture posture{&row, 0, std::nullopt};
         if (number_column_ == CsvTable::kNone) {
-          posture.number = first + static_cast<std::int64_t>(&row - table_.rows.data());
+          posture.number = first + static_cast<std::int64_t>(row.place);
         } else if (const double number = row.values[number_column_]; !std::isnan(number)) {
           constexpr double kMostNumber = 1e15;
           if (number != std::floor(number) || number < 0.0 || number > kMostNumber) {

@@ -1,14 +1,11 @@
 #include "bodyschema/imports/yarp_import.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/core/error.hpp"
-#include "bodyschema/core/file_size.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/core/write_file.hpp"
 #include "bodyschema/geometry/pose.hpp"
@@ -146,10 +143,6 @@ struct Pictures {
       throw FileError(where + ": picture " + name + " is missing");
     }
     const Image image = read_picture_file(file);
-    if (std::max(image.width, image.height) > kMaxSide_px) {
-      throw FileError(where + ": " + name + " is " + std::to_string(image.width) + "x" + std::to_string(image.height) +
-                      " px, at most " + std::to_string(kMaxSide_px) + " px a side are received");
-    }
     if (width == 0) {
       width = image.width;
       height = image.height;

@@ -68,12 +68,13 @@ class RosBag : public ::testing::Test {
                         topic, utime * 1000, stamp * 1000, encoding, width, height),
             std::vector<std::uint8_t>(bytes, 200));
   }
-  ImportSummary import(RecordedBytes& bag, const ImportTarget& to) const {
+  ImportSummary import(RecordedBytes& bag, const ImportTarget& to,
+                       const std::vector<std::string>& infos = {"/i", ""}) const {
     BagSelection selection;
     selection.joints = {"/j"};
     selection.pictures = {"/l", "/r"};
     selection.masks = {"/ml", ""};
-    selection.infos = {"/i", ""};
+    selection.infos = infos;
     return import_bag_records(bag, "my.bag", selection, to, folder_.path() / "out.lcmlog");
   }
   TemporaryFolder folder_;
@@ -214,6 +215,26 @@ TEST_F(RosBag, MessagesBecomeALogAndWhatIsBadIsCounted) {
   EXPECT_THAT(summary.left_out.at("readings").first, HasSubstr("is nan, not a finite number"));
   EXPECT_EQ(summary.left_out.at("messages").count, 1u);
   EXPECT_THAT(summary.notes, Contains(HasSubstr("1 messages have no stamp")));
+}
+
+/// One description for both cameras is none that changes; one that does is said once, however often it changes.
+TEST_F(RosBag, OneDescriptionMayBeOfTwoCameras) {
+  const auto notes = [&](int descriptions) {
+    RecordedBytes bag;
+    joints(bag, 1'000'000);
+    picture(bag, "/l", 1'000'000, 1'000'000);
+    for (int i = 0; i < descriptions; ++i) {
+      bag.add(R"({"kind": "camera_info", "topic": "/i", "info": {"width": 4, "height": 2, "k": [)" +
+              std::to_string(8 + i) + R"(, 0, 1.5, 0, 8, 0.5, 0, 0, 1]}})");
+    }
+    bag.add(R"({"kind": "end"})");
+    return import(bag, target(), {"/i", "/i"}).notes;
+  };
+  const auto once = notes(1);
+  EXPECT_THAT(once, Not(Contains(HasSubstr("changes within the bag"))));
+  EXPECT_EQ(std::count_if(once.begin(), once.end(), [](const auto& n) { return n.find("/i has 8") != n.npos; }), 2);
+  const auto thrice = notes(3);
+  EXPECT_EQ(std::count_if(thrice.begin(), thrice.end(), [](const auto& n) { return n.find("changes") != n.npos; }), 1);
 }
 
 TEST_F(RosBag, WhatTheBagSaysOfACameraIsComparedWithTheConfiguration) {

@@ -440,6 +440,27 @@ TEST_F(Stills, AFewBadRowsAreCounted) {
   EXPECT_EQ(summary.cameras[0].pictures, 1u);
 }
 
+/// Rows without a number belong to pictures in order: one that is damaged takes its own picture away, no other's.
+TEST_F(Stills, ADamagedRowLeavesTheOthersTheirPictures) {
+  std::string csv = "joint1,joint2,joint3,joint4,joint5,joint6,joint7\n";
+  for (int i = 0; i < 40; ++i) {
+    csv += i == 0 ? "0,0,0\n" : "0." + std::to_string(i) + ",0,0,0,0,0,0\n";
+    if (i < 2) continue;
+    for (const char* camera : {"left", "right"}) {
+      for (const char* kind : {"images", "masks"}) {
+        const auto folder = stills_.path() / kind / camera;
+        if (fs::exists(folder / "01.png")) fs::copy_file(folder / "01.png", folder / (std::to_string(i) + ".png"));
+      }
+    }
+  }
+  stills_.write("joints.csv", csv);
+  const auto summary = import(target());
+  EXPECT_EQ(summary.left_out.at("rows").count, 1u);
+  const auto seen = observations(target());
+  ASSERT_EQ(seen.size(), 39u);
+  EXPECT_NEAR(seen[0].cameras[0]->joints.q(0), 0.1, 1e-6) << "of picture 1, not of picture 0";
+}
+
 TEST_F(Stills, WhatWasThereStaysWhereAnImportFails) {
   (void)import(target());
   const auto before = fs::file_size(log());

@@ -164,7 +164,8 @@ TEST_F(YarpImport, NamesFileAndLineOfWhatIsWrong) {
   EXPECT_THAT(with("left/data.log", "-1 100.0 ../right/b.ppm\n"), HasSubstr("not the name of a picture"));
   EXPECT_THAT(with("left/a.ppm", "P3\n1 1\n255\n0 0 0\n"), HasSubstr("not a binary PPM"));
   EXPECT_THAT(with("left/a.ppm", ppm(4, 2, 'L').substr(0, 30)), AllOf(HasSubstr("a.ppm"), HasSubstr("cut short")));
-  EXPECT_THAT(with("left/a.ppm", "P6\n16000 16000\n255\n"), HasSubstr("cut short"));
+  EXPECT_THAT(with("left/a.ppm", "P6\n4000 4000\n255\n"), HasSubstr("cut short"));
+  EXPECT_THAT(with("left/a.ppm", "P6\n5000 2\n255\n"), AllOf(HasSubstr("5000x2"), HasSubstr("1 to 4096 px a side")));
   EXPECT_THAT(with("left/a.ppm", "P6\n99999999999999 2\n255\n"), HasSubstr("header says"));
   EXPECT_THAT(with("left/a.ppm", "P6\n4 2\n65535\n" + std::string(48, 'x')), HasSubstr("65535"));
   EXPECT_THAT(with("left/a.ppm", ""), HasSubstr("not a binary PPM"));

@@ -17,7 +17,8 @@ namespace bodyschema {
 /// empty rows do not count; rows with too few or too many fields are left out and counted.
 struct CsvTable {
   struct Row {
-    std::uint64_t line = 0;  ///< of the file, from 1
+    std::uint64_t line = 0;   ///< of the file, from 1
+    std::uint64_t place = 0;  ///< among all rows that hold something, from 0, those left out too
     std::vector<double> values;
     std::map<std::size_t, std::string> words;  ///< fields that hold something and no number, by column
   };
