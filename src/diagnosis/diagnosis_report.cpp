@@ -148,7 +148,7 @@ std::string DiagnosisReport::to_json() const {
   j["noise_px"] = number(noise_px);
   j["side_left_over"] = optional_text(side_left_over);
   j["not_in_model"] = optional_text(not_in_model);
-  return j.dump(2) + "\n";
+  return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";  // names of files may be no UTF-8
 }
 
 void DiagnosisReport::prepare(const std::filesystem::path& directory) {

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "agreed_motion.hpp"
+#include "bodyschema/core/order_statistics.hpp"
 #include "bodyschema/evidence/distributions.hpp"
 #include "bodyschema/evidence/encoder_noise.hpp"
 #include "left_over.hpp"
@@ -565,7 +566,11 @@ void Findings::find_class(const Reduced& reduced, const std::vector<Eigen::Index
 }
 
 void Findings::check_outlines(const LogAbout& log) {
-  const double depth = report_.samples.empty() ? 0.0 : report_.samples.front().depth_m;
+  std::vector<double> depths;  // of a hand before the camera
+  for (const auto& sample : report_.samples) {
+    if (sample.depth_m > 0.0) depths.push_back(sample.depth_m);
+  }
+  const double depth = median(std::move(depths));
   const auto left = left_over(fit_, log, search_.search(), {options_.level, options_.matters_m, depth});
   report_.side_left_over = left.side;
   report_.noise_px = left.noise_px;

@@ -202,11 +202,10 @@ class Window {
     auto measured = fit_.predict(best_ ? *best_ : state_.model(), joints_, fresh);
     bring_near(measured, fresh, x);
     measured.coordinates = all_;
-    OutlineSearch search{.search_px = diagnosis::limits::kSearch_px, .spacing_px = diagnosis_.spacing_px};
-    for (const auto& noise : noise_) search.robust_px = std::max(search.robust_px, noise.robust_px());
+    const OutlineSearch search{diagnosis::limits::kSearch_px, diagnosis_.spacing_px, widest_robust_px(noise_)};
     fit_.measure(measured, search, fresh, [&](std::size_t p, std::span<const OutlinePoint> points) {
       const auto camera = log_.pictures()[p].camera;
-      noise_[camera].add(points, unit_of(p), kNoisePictures);
+      noise_[camera].add(points, log_.unit_px(p), kNoisePictures);
     });
     for (const auto p : fresh) {
       move(measured.evidence[p], measured.corrections[p], now->corrections[p], now->evidence[p]);
@@ -254,7 +253,7 @@ class Window {
   /// Where a picture by itself has the arm's joints, from where they are predicted.
   [[nodiscard]] Eigen::VectorXd own_step(const LinearLog& measured, std::size_t p) const {
     const auto& evidence = measured.evidence[p];
-    const double variance = noise_[log_.pictures()[p].camera].variance_px2() * std::pow(unit_of(p), 2);
+    const double variance = noise_[log_.pictures()[p].camera].variance_px2() * std::pow(log_.unit_px(p), 2);
     Eigen::MatrixXd precision = evidence.A / variance;
     precision.diagonal().array() += std::pow(diagnosis::limits::kOneFrame_rad, -2);
     return precision.ldlt().solve(evidence.b / variance);
@@ -263,7 +262,8 @@ class Window {
   /// Whether that moves outlines so little that they are measured where they are predicted.
   [[nodiscard]] bool is_near(const LinearLog& measured, std::size_t p, const Eigen::VectorXd& step) const {
     const auto& evidence = measured.evidence[p];
-    return evidence.weight > 0.0 && step.dot(evidence.A * step) <= std::pow(kNear_px * unit_of(p), 2) * evidence.weight;
+    return evidence.weight > 0.0 &&
+           step.dot(evidence.A * step) <= std::pow(kNear_px * log_.unit_px(p), 2) * evidence.weight;
   }
 
   /// What earlier looks measured of a picture, where that is still in the window. Evidence is a quadratic about the
@@ -285,11 +285,6 @@ class Window {
 
   /// Of both cameras, whose pictures are alike but for odd rigs: of the first.
   [[nodiscard]] int reduction() const { return log_.rig().cameras.front().intrinsics.reduction; }
-
-  /// Pixels of a picture in one of 320x240.
-  [[nodiscard]] double unit_of(std::size_t p) const {
-    return picture_unit(log_.rig().cameras[log_.pictures()[p].camera].intrinsics);
-  }
 
   [[nodiscard]] Eigen::VectorXd step_between(const Corrections& from, const Corrections& to) const {
     Eigen::VectorXd before(fit_.coordinates().size()), after(before.size());

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "bodyschema/core/order_statistics.hpp"
 #include "bodyschema/core/rounded.hpp"
@@ -310,7 +309,7 @@ std::string LogComparison::to_json() const {
                                    {"ci95_deg", c.ci95_deg}});
   }
   j["offsets_not_compared"] = not_compared;
-  return j.dump(2) + "\n";
+  return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";  // names of files may be no UTF-8
 }
 
 void LogComparison::write(const std::filesystem::path& directory) const {

@@ -17,14 +17,6 @@ constexpr std::size_t kShown = 3;
 constexpr int kHalfPart_px = 75;
 constexpr int kEnlargement = 3;
 
-/// Position of the picture of a camera at that time.
-std::optional<std::size_t> find(const PictureLog& log, const CameraObservation& seen, std::size_t camera) {
-  for (std::size_t p = 0; p < log.pictures().size(); ++p) {
-    if (log.pictures()[p].camera == camera && log.pictures()[p].joints.utime == seen.utime) return p;
-  }
-  return std::nullopt;
-}
-
 /// Those that show most of what the extension gains; without causes, spread over the log.
 std::vector<std::size_t> choose(const PictureLog& log, const std::vector<Observation>& kept,
                                 const DiagnosisReport& report) {
@@ -35,7 +27,7 @@ std::vector<std::size_t> choose(const PictureLog& log, const std::vector<Observa
     std::size_t n = 0;
     for (std::size_t c = 0; c < kept[i].cameras.size(); ++c) {
       const auto& seen = kept[i].cameras[c];
-      const auto p = seen ? find(log, *seen, c) : std::nullopt;
+      const auto p = seen ? log.find(c, seen->utime) : std::nullopt;
       if (!p || report.samples[*p].before.rms_px <= 0.0) continue;
       sum += report.samples[*p].before.rms_px - report.samples[*p].after.rms_px;
       ++n;
@@ -92,7 +84,7 @@ std::optional<std::pair<Image, std::string>> draw_parts(const PictureLog& log, c
   for (const auto& observation : kept) {
     for (std::size_t c = 0; c < observation.cameras.size(); ++c) {
       const auto& seen = observation.cameras[c];
-      const auto p = seen ? find(log, *seen, c) : std::nullopt;
+      const auto p = seen ? log.find(c, seen->utime) : std::nullopt;
       if (!p || seen->image.empty()) continue;
       const auto& q = log.pictures()[*p].joints.q;
       auto marked = preview.draw_parts(q, after.corrections[*p], c, parts);
@@ -129,7 +121,7 @@ std::vector<std::pair<Image, std::string>> draw_pictures(LogFit& fit, const std:
     std::vector<OverlayView> views;
     for (std::size_t c = 0; c < kept[i].cameras.size(); ++c) {
       const auto& seen = kept[i].cameras[c];
-      const auto p = seen ? find(log, *seen, c) : std::nullopt;
+      const auto p = seen ? log.find(c, seen->utime) : std::nullopt;
       if (!p || seen->image.empty()) continue;
       const auto& q = log.pictures()[*p].joints.q;
       OverlayView view{&seen->image, preview.draw(q, before.corrections[*p], c),

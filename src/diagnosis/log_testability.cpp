@@ -59,9 +59,10 @@ LogTestability testability_of(const Configuration& configuration, const std::fil
   result.not_testable =
       diagnosis::untestable(roles, diagnosis::log_motion(pictures, cameras, encoders, model, setup, roles));
   result.refusal = diagnosis::why_too_short(diagnosis::log_length(pictures, roles, {}), result.not_testable, roles, {});
-  for (const auto& name : effect_names()) {
-    if (name == "joint_offset") continue;  // always fitted, never a finding
-    for (const auto& target : effect_targets(name, roles)) {
+  for (const auto& kind : effect_kinds()) {
+    const auto& name = kind.get().name;
+    if (name == "joint_offset" || kind.get().where_believed) continue;  // never a finding
+    for (const auto& target : kind.get().targets(roles)) {
       const CauseName cause{name, target.joint, target.source};
       const bool refused = std::any_of(result.not_testable.begin(), result.not_testable.end(),
                                        [&](const auto& n) { return n.cause == cause; });

@@ -100,9 +100,7 @@ ModelSearch::ModelSearch(LogFit& fit, State state, std::shared_ptr<const LinearL
       raster_(raster_of(fit.log(), options.most_pictures)), state_(std::move(state)), noise_(std::move(noise)) {}
 
 OutlineSearch ModelSearch::search() const {
-  double robust_px = 0.0;
-  for (const auto& noise : noise_) robust_px = std::max(robust_px, noise.robust_px());
-  return {limits::kSearch_px, options_.spacing_px, robust_px};
+  return {limits::kSearch_px, options_.spacing_px, widest_robust_px(noise_)};
 }
 
 void ModelSearch::measure_noise() {

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 #include "bodyschema/evidence/log_fit.hpp"
 #include "candidates.hpp"
 

@@ -6,7 +6,7 @@ namespace bodyschema::effects {
 /// The cameras are further apart: the second lies that much further along its x axis.
 EffectKind baseline() {
   return {.name = "baseline",
-          .targets = [](const JointRoles& roles) { return roles.cameras.size() > 1 ? whole_robot(roles) : Targets{}; },
+          .targets = camera_pair_targets,
           .make = everywhere("baseline", {in_mm("distance", 1.0)},
                              [](Parameters p, const Instant& at, Corrections& c) {
                                if (at.camera == 1) c.camera.shift_m.x() += p[0].value;

@@ -5,7 +5,7 @@ namespace bodyschema::effects {
 /// The second camera sits elsewhere against the first than configured: moved along and turned about its own axes.
 EffectKind camera_pair() {
   return {.name = "camera_pair",
-          .targets = [](const JointRoles& roles) { return roles.cameras.size() > 1 ? whole_robot(roles) : Targets{}; },
+          .targets = camera_pair_targets,
           .make = everywhere("camera_pair",
                              {in_mm("x", 1.0), in_mm("y", 1.0), in_mm("z", 1.0), in_degrees("turn_x", 0.2),
                               in_degrees("turn_y", 0.2), in_degrees("turn_z", 0.2)},

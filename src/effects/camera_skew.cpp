@@ -3,12 +3,12 @@
 
 namespace bodyschema::effects {
 
-/// The right picture is taken later than the left one although their stamps agree; along the arm's path, as latency
-/// is.
+/// The second camera's picture is taken later than the first's although their stamps agree; along the arm's path, as
+/// latency is.
 EffectKind camera_skew() {
   return {
       .name = "camera_skew",
-      .targets = whole_robot,
+      .targets = camera_pair_targets,
       .make = everywhere(
           "camera_skew", {in_ms("skew", 20.0)},
           [](Parameters p, const Instant& at, Corrections& c) {
@@ -25,7 +25,7 @@ EffectKind camera_skew() {
           },
       .lookalikes = {"latency", "backlash"},
       .splitting_motion = "Repeat the same path at two speeds and in both directions.",
-      .remark = "stamp the right camera's pictures later by the skew"};
+      .remark = "stamp the second camera's pictures later by the skew"};
 }
 
 }  // namespace bodyschema::effects

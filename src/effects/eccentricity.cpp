@@ -1,4 +1,5 @@
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -12,8 +13,11 @@ EffectKind eccentricity() {
                            }),
           .sentence =
               [](const Effect& e, const JointRoles&, std::span<const std::string> amounts) {
-                return "the encoder disc of " + e.target().joint + " runs off centre: its error swings with the angle" +
-                       " by " + amounts[0] + " (sine) and " + amounts[1] + " (cosine)";
+                const auto& p = e.parameters();
+                return "the encoder disc of " + e.target().joint +
+                       " runs off centre: its error swings with the angle, by " + amounts[0] +
+                       by_sign(p[0], " times the sine", " times minus the sine") + " and " + amounts[1] +
+                       by_sign(p[1], " times the cosine", " times minus the cosine");
               },
           .not_testable = joint_hardly_moved,
           .lookalikes = {"encoder_gain"},

@@ -311,11 +311,7 @@ void ErrorModel::corrections(const Instant& at, Corrections& out) const {
 StereoRig ErrorModel::corrected(const StereoRig& rig) const {
   const auto joints = static_cast<Eigen::Index>(roles_.names.size());
   StereoRig result = rig;
-  Instant at;
-  at.encoder.setZero(joints);
-  at.q.setZero(joints);
-  at.qdot.setZero(joints);
-  at.qddot.setZero(joints);
+  Instant at = Instant::at_rest(Eigen::VectorXd::Zero(joints), 0);
   Corrections corrections = roles_.no_corrections();
   for (std::size_t c = 0; c < result.cameras.size(); ++c) {
     at.camera = c;

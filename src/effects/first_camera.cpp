@@ -6,7 +6,7 @@ namespace bodyschema::effects {
 /// Neither camera_pair nor camera_pose says so: they move the second alone, or both.
 EffectKind first_camera() {
   return {.name = "first_camera",
-          .targets = [](const JointRoles& roles) { return roles.cameras.size() > 1 ? whole_robot(roles) : Targets{}; },
+          .targets = camera_pair_targets,
           .make = everywhere("first_camera",
                              {in_mm("x", 1.0), in_mm("y", 1.0), in_mm("z", 1.0), in_degrees("turn_x", 0.2),
                               in_degrees("turn_y", 0.2), in_degrees("turn_z", 0.2)},

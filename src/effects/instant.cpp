@@ -32,6 +32,14 @@ void add_motion(const Instant& at, double after_s, double share, Eigen::VectorXd
 
 }  // namespace
 
+Instant Instant::at_rest(const Eigen::VectorXd& q, std::size_t camera) {
+  Instant at;
+  at.camera = camera;
+  at.encoder = at.q = q;
+  at.qdot = at.qddot = Eigen::VectorXd::Zero(q.size());
+  return at;
+}
+
 void Instant::show_later(double after_s, Corrections& c) const {
   add_motion(*this, c.later_s, -1.0, c.dq);
   c.later_s += after_s;

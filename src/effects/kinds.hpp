@@ -87,6 +87,10 @@ auto on_joint(const char* name, std::vector<EffectParameter> parameters, Apply a
 inline Targets whole_robot(const JointRoles&) {
   return {EffectTarget{}};
 }
+/// What is between two cameras.
+inline Targets camera_pair_targets(const JointRoles& roles) {
+  return roles.cameras.size() > 1 ? whole_robot(roles) : Targets{};
+}
 inline Targets joint_targets(const JointRoles& roles, const std::vector<Eigen::Index>& joints) {
   Targets targets;
   for (const auto joint : joints) targets.push_back({roles.names[static_cast<std::size_t>(joint)], ""});

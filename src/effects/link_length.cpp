@@ -1,6 +1,5 @@
 #include <algorithm>
 
-#include "bodyschema/core/error.hpp"
 #include "kinds.hpp"
 #include "words.hpp"
 

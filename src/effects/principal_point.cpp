@@ -1,5 +1,7 @@
-#include "bodyschema/core/error.hpp"
+#include <algorithm>
+
 #include "kinds.hpp"
+#include "words.hpp"
 
 namespace bodyschema::effects {
 
@@ -39,8 +41,9 @@ EffectKind principal_point() {
                 const std::string where = source == "common"       ? "of the cameras"
                                           : source == "difference" ? "of the first camera, against the second's,"
                                                                    : "of camera '" + source + "'";
-                return "the principal point " + where + " lies elsewhere than configured, by " + amounts[0] +
-                       " along x and " + amounts.back() + " along y";
+                return "the principal point " + where + " lies elsewhere than configured, " + amounts[0] +
+                       by_sign(e.parameters()[0], " to the right", " to the left") + " and " + amounts[1] +
+                       by_sign(e.parameters()[1], " further down", " further up");
               },
           .not_testable =
               [](const EffectTarget& target, const JointRoles& roles, const LogMotion& motion) {

@@ -52,7 +52,7 @@ std::string escaped(const std::string& text) {
 /// JSON that may stand inside a <script>: without '<' nothing in it can end or begin an element.
 std::string script_json(const Json& json) {
   std::string out;
-  for (const char c : json.dump(-1, ' ', true)) {
+  for (const char c : json.dump(-1, ' ', true, Json::error_handler_t::replace)) {
     if (c == '<') {
       out += "\\u003c";
     } else {
@@ -243,9 +243,8 @@ void Report::picture(const Image& image, const std::string& caption) {
                      const_cast<std::uint8_t*>(image.data.data()));
   cv::Mat bgr = view.clone();
   if (image.channels == 3) {
-    for (auto pixel = bgr.begin<cv::Vec3b>(); pixel != bgr.end<cv::Vec3b>(); ++pixel) {
-      std::swap((*pixel)[0], (*pixel)[2]);
-    }
+    constexpr int kSwapped[] = {0, 2, 1, 1, 2, 0};
+    cv::mixChannels(&view, 1, &bgr, 1, kSwapped, 3);
   }
   std::vector<std::uint8_t> jpeg;
   cv::imencode(".jpg", bgr, jpeg, {cv::IMWRITE_JPEG_QUALITY, 90});

@@ -72,6 +72,7 @@ TEST(LogTestability, FollowsTheMotion) {
   EXPECT_TRUE(contains(result.testable, {"compliance", "r_elbow", ""}));
   EXPECT_FALSE(contains(result.testable, {"backlash", "r_wrist_yaw", ""}));
   EXPECT_TRUE(contains(result.testable, {"latency", "", ""}));
+  EXPECT_FALSE(contains(result.testable, {"joint_place", "r_elbow", ""})) << "no diagnosis looks for it";
   EXPECT_THAT(result.text(), HasSubstr("backlash of r_elbow\n"));
   EXPECT_THAT(result.text(), HasSubstr("r_wrist_yaw moved 0.0 deg"));
   EXPECT_THAT(result.text(), HasSubstr("slip of every arm joint"));

@@ -45,6 +45,17 @@ TEST(Words, LeaveOutWhatMayBeNothingBesideWhatIsSomething) {
             "the axis of elbow is tilted against the URDF's, by 0.6 deg (0.5 to 0.7) about +x");
 }
 
+/// Amounts come without a sign: one that is applied the wrong way round doubles the error.
+TEST(Words, OfTwoSignedNumbersSayWhichWay) {
+  EXPECT_EQ(
+      said("eccentricity", {"elbow", ""}, {-0.01, 0.02}, {"0.6 deg", "1.1 deg"}),
+      "the encoder disc of elbow runs off centre: its error swings with the angle, by 0.6 deg times minus the sine "
+      "and 1.1 deg times the cosine");
+  EXPECT_EQ(
+      said("principal_point", {"", "common"}, {-2.0, 1.0}, {"2 px", "1 px"}),
+      "the principal point of the cameras lies elsewhere than configured, 2 px to the left and 1 px further down");
+}
+
 /// Directions across an axis are made up; the URDF's axes are not.
 TEST(Words, OfDirectionsAreTheAxesOfTheUrdf) {
   EXPECT_EQ(effects::direction_in_words({0.0, 1.0, 0.0}), "+y");

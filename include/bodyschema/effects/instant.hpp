@@ -29,6 +29,9 @@ struct Instant {
   /// joint_path() about the instant, where samples after it are known, as in a log; else empty.
   Eigen::MatrixXd path;
 
+  /// One of an arm that stands, whose encoders are right and on which nothing pulls.
+  static Instant at_rest(const Eigen::VectorXd& q, std::size_t camera);
+
   /// Shows the joints so much later (negative: earlier) than `c` has them: along their paths, and by velocity and
   /// acceleration where these are not known. Times add up: of a picture that is late and skewed the path is followed
   /// once, by both together.

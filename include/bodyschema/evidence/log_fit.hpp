@@ -118,7 +118,6 @@ class LogFit {
   [[nodiscard]] double mean_cost(const LinearLog& at, double usual_points, double OutlineEvidence::*cost) const;
 
   /// px of the picture in one of a 320x240 picture.
-  [[nodiscard]] double unit_of(std::size_t picture) const;
 
   PictureLog& log_;
   std::vector<std::unique_ptr<OutlineMeasurement>> workers_;
