@@ -35,7 +35,7 @@ void ArmTracker::lose_sight() {
 bool ArmTracker::shows_wrong_eyes(const Frame& frame, FrameOutcome& outcome) {
   const auto swapped = eyes_.from_the_start(frame, known_.memory);
   if (swapped.value_or(false)) {
-    begin_again();
+    forget_everything();
     doubt(known_.x, outcome);
     outcome.cameras_swapped = true;
     return true;
@@ -81,7 +81,7 @@ void ArmTracker::find(const Frame& frame, FrameOutcome& outcome) {
   if (fitter_.fits(frame, fit.evidence)) {
     learn(frame, fit, outcome);
   } else if (strayed(fit.x)) {
-    begin_again();
+    forget_everything();
     doubt(known_.x, outcome);
     outcome.state = EstimatorState::kConverging;
   } else {
@@ -152,7 +152,7 @@ void ArmTracker::settle_on(const Frame& frame, const OutlineFit& fit, FrameOutco
   known_.see_loose_joints();
   outcome.rms_px = fit.seen.evidence.rms_px();
   outcome.near = fitter_.fits(frame, fit.evidence);
-  outcome.hidden = occlusion_.hidden(fit.seen.evidence);
+  outcome.hidden = occlusion_.hidden(frame, fit.seen.evidence);
   outcome.best_likelihood = hammoude_likelihood(scorer_.distance(known_.in_frame.x));
   outcome.state = EstimatorState::kConverging;
 }
@@ -196,7 +196,7 @@ void ArmTracker::explain(const Frame& frame, const OutlineFit& fit, FrameOutcome
   }
   if (agrees) {
     learn(frame, fit, outcome);
-  } else if (!unexplained_ || !take_for_hidden(fit, outcome)) {
+  } else if (!unexplained_ || !take_for_hidden(frame, fit, outcome)) {
     // Before all has been tried nothing is taken for hidden, but what was tried in vain on the pictures before.
     stay(frame, fit, outcome);
   }
@@ -236,9 +236,9 @@ void ArmTracker::take(const Frame& frame, Explanation better, FrameOutcome& outc
 
 /// Nothing happened to the robot, and what is seen of it agrees with what is known: something hides the rest. The
 /// memory stays, nothing is learned.
-bool ArmTracker::take_for_hidden(const OutlineFit& fit, FrameOutcome& outcome) {
+bool ArmTracker::take_for_hidden(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome) {
   if (known_.young()) return false;
-  outcome.hidden = occlusion_.hidden(fit.seen.evidence);
+  outcome.hidden = occlusion_.hidden(frame, fit.seen.evidence);
   const bool rest = fitter_.rest_fits(fit.seen);
   if (rest) {
     const Innovation of_rest = known_.memory.innovation(fit.seen.quadratic);
@@ -273,7 +273,7 @@ void ArmTracker::stay(const Frame& frame, const OutlineFit& fit, FrameOutcome& o
   if (frame.time_s - doubted_since_s_ <= limits::kPatience_s) return;
   outcome.verdict = FrameVerdict::kContradicts;
   outcome.state = EstimatorState::kDiverged;
-  if (known_.young()) begin_anew();
+  if (known_.young()) forget_memory();
 }
 
 // --- from frame to frame -----------------------------------------------------------------------
@@ -293,22 +293,22 @@ void ArmTracker::put_off_searches() {
   round_.reset();
   lost_.reset();
   unexplained_ = false;
+  doubted_since_s_ = -1.0;
 }
 
 /// What a few pictures taught is contradicted by all that follow: it was theirs, the next frame is searched.
-void ArmTracker::begin_anew() {
+void ArmTracker::forget_memory() {
   put_off_searches();
   known_.memory.forget_all();
   known_.forget_missed();
   fitter_.forget_shape();
   keyframes_.forget();
-  doubted_since_s_ = -1.0;
   gate_.forget_usual();
 }
 
 /// Nothing that was learned holds.
-void ArmTracker::begin_again() {
-  begin_anew();
+void ArmTracker::forget_everything() {
+  forget_memory();
   found_in_doubt_ = false;
   known_.forget();
   particles_.restart();

@@ -55,13 +55,13 @@ class ArmTracker {
   void learn(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome);
   void settle_on(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome);
   void doubt(const Eigen::VectorXd& x, FrameOutcome& outcome);
-  bool take_for_hidden(const OutlineFit& fit, FrameOutcome& outcome);
+  bool take_for_hidden(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome);
   void take(const Frame& frame, Explanation better, FrameOutcome& outcome);
   void stay(const Frame& frame, const OutlineFit& fit, FrameOutcome& outcome);
   [[nodiscard]] bool strayed(const Eigen::VectorXd& x) const;
   void put_off_searches();
-  void begin_again();
-  void begin_anew();
+  void forget_everything();
+  void forget_memory();
 
   FrameModel& model_;
   HypothesisScorer& scorer_;

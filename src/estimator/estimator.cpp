@@ -313,14 +313,6 @@ Eigen::Matrix3d Estimator::hand_covariance_m2(const Exposure& exposure) {
   return hand_uncertainty(impl_->model, exposure, impl_->known, impl_->shape_and_readings()).covariance_m2;
 }
 
-std::vector<Eigen::Vector3d> Estimator::fingertips(const Exposure& exposure, bool corrected) {
-  auto& projection =
-      corrected ? impl_->model.project(exposure, impl_->known.x) : impl_->model.project_nominal(exposure);
-  std::vector<Eigen::Vector3d> tips;
-  for (const auto& X_CT : projection.fingertips()) tips.push_back(X_CT.translation());
-  return tips;
-}
-
 std::string Estimator::engine_description() const {
   return impl_->scorer.description();
 }

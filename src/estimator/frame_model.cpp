@@ -95,7 +95,9 @@ Frame FrameModel::take(const Observation& observation, const Eigen::VectorXd& x)
   state_.set(x);
   probes_.follow(state_.model());
   Frame frame;
-  frame.time_s = seconds(observation.utime);
+  const double stamp_s = seconds(observation.utime);
+  behind_s_ = std::max(behind_s_, last_s_ - stamp_s);  // a clock that stepped back: for what was learned time goes on
+  frame.time_s = last_s_ = stamp_s + behind_s_;
   frame.exposures.resize(rig_.cameras.size());
   frame.seen.resize(rig_.cameras.size(), nullptr);
   // The earlier exposure first: what has a memory goes with time.
@@ -126,12 +128,9 @@ Frame FrameModel::take(const Observation& observation, const Eigen::VectorXd& x)
 
 Exposure FrameModel::at_rest(const Eigen::VectorXd& q, std::size_t camera) {
   Exposure exposure;
-  Instant& at = exposure.at;
-  track_.torques_at({0, q, Eigen::VectorXd::Zero(q.size())}, state_.model().offsets(), at);
-  at.camera = camera;
-  at.encoder = q;
-  at.q = q - state_.model().offsets();
-  at.qdot = at.qddot = Eigen::VectorXd::Zero(q.size());
+  exposure.at = Instant::at_rest(q, camera);
+  exposure.at.q -= state_.model().offsets();
+  track_.torques_at({0, q, exposure.at.qdot}, state_.model().offsets(), exposure.at);
   return exposure;
 }
 

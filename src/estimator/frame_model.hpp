@@ -24,7 +24,7 @@ struct FrameEvidence {
   double sampled = 0.0, matched = 0.0;  ///< outline points of all cameras
   double square = 0.0, weight = 0.0;    ///< of residuals, as OutlineEvidence
   std::vector<double> cost;             ///< per camera: robust cost of the whole outline
-  double odd = 0.0, covered = 0.0;      ///< outline points left out, as OutlineEvidence
+  double odd = 0.0;                     ///< outline points left out, as OutlineEvidence
   std::vector<std::vector<OutlineSample>> samples;  ///< per camera: of the last look; where wanted
   [[nodiscard]] double rms_px() const { return weight > 0.0 ? std::sqrt(square / weight) : 0.0; }
   [[nodiscard]] double matched_share() const { return sampled > 0.0 ? matched / sampled : 0.0; }
@@ -33,7 +33,7 @@ struct FrameEvidence {
 
 /// The pictures of one frame with what is known of their exposures: all that is needed to look at them again.
 struct Frame {
-  double time_s = 0.0;
+  double time_s = 0.0;                         ///< by its stamp; goes on where the stamps' clock stepped back
   std::vector<Exposure> exposures;             ///< per camera; where one saw nothing, another's
   std::vector<const CameraObservation*> seen;  ///< per camera; null: nothing. Not owned
   std::vector<BinaryMask> covered;             ///< per camera: where a held thing may be; empty: nowhere
@@ -120,6 +120,7 @@ class FrameModel {
   std::vector<OutlineMeasurement> more_measurements_;  ///< of further cameras
   std::unique_ptr<BackgroundWorker> worker_;           ///< asks the second camera; null: there is one
   std::vector<bool> still_parts_;
+  double last_s_ = 0.0, behind_s_ = 0.0;  ///< time of the last frame; how far stamps have stepped back since the first
   EncoderTrack track_;
   EffectProbes probes_, beside_, time_;
   const Frame* settled_frame_ = nullptr;

@@ -44,7 +44,7 @@ Eigen::Vector3d HeldThing::centre(std::size_t cube) const {
 
 bool HeldThing::is_new(const Pose& X_CP) const {
   return std::none_of(views_.begin(), views_.end(), [&](const Pose& before) {
-    const double turned = Eigen::AngleAxisd(before.linear().transpose() * X_CP.linear()).angle();
+    const double turned = rotation_distance(before.linear(), X_CP.linear());
     const double moved = (before.translation() - X_CP.translation()).norm() / X_CP.translation().norm();
     return turned < kTurned_rad && moved < kMoved;
   });
@@ -73,7 +73,7 @@ void HeldThing::look(const View& view) {
     const double u = std::round(pixel.x()), v = std::round(pixel.y());
     if (!(u >= 0.0 && v >= 0.0 && u < k.width && v < k.height)) continue;
     const int column = static_cast<int>(u), row = static_cast<int>(v);
-    if (view.valid != nullptr && !view.valid->empty() && !view.valid->at(column, row)) continue;
+    if (!view.valid->empty() && !view.valid->at(column, row)) continue;
     if (view.robot->at(column, row)) continue;  // in front of it or behind: nobody knows
     auto& evidence = evidence_[cube];
     const int change = view.mask->at(column, row) ? kForeign : kBackground;

@@ -10,20 +10,6 @@
 #include "stage_timer.hpp"
 
 namespace bodyschema {
-namespace {
-
-/// Takes pixels out of those that count; an empty `valid` is all of them.
-void leave_out(const BinaryMask& pixels, BinaryMask& valid) {
-  if (pixels.empty()) return;
-  if (valid.empty()) {
-    valid = BinaryMask(pixels.width(), pixels.height());
-    valid.fill(true);
-  }
-  valid -= pixels;
-}
-
-}  // namespace
-
 HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes,
                                    const SilhouetteModel* outlines, std::vector<PinholeIntrinsics> cameras,
                                    const SilhouetteOptions& options, std::size_t slots)

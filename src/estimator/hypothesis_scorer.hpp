@@ -20,8 +20,7 @@ namespace bodyschema {
 class HypothesisScorer {
  public:
   /// @param outlines  where hypotheses are only where a search begins: what full pictures are drawn from
-  /// (outline_level);
-  ///   null: hypotheses are the estimate, and all is drawn from `silhouettes`
+  ///   (outline_level); null: hypotheses are the estimate, and all is drawn from `silhouettes`
   /// @param slots  hypotheses that can be scored at once
   /// Throws gl::ContextError when the engine cannot be had.
   HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes, const SilhouetteModel* outlines,

@@ -27,6 +27,9 @@ inline constexpr double kLeastExplained = 0.5;
 inline constexpr double kFewOdd = 0.1;
 /// Physical. Share of the hand's outline; of a hand that is hidden by more too little is seen to claim where it is now.
 inline constexpr double kMostHidden = 0.8;
+/// Physical. Of the hand's outline that is not found: lies so much of it within masks that others made, a tool on the
+/// flange hides it, and nothing says that the hand is not there.
+inline constexpr double kWithinMasks = 0.8;
 /// Statistical: where so much of what a robust fit is given does not belong to it, it may end anywhere (its breakdown
 /// point).
 inline constexpr double kBreakdown = 0.5;

@@ -6,6 +6,14 @@
 #include "limits.hpp"
 
 namespace bodyschema {
+namespace {
+
+/// Whether somebody else's mask has robot there. Masks that are made about a prediction have it wherever that is.
+bool shows_robot(const CameraObservation* seen, const Eigen::Vector2d& pixel) {
+  return seen != nullptr && seen->mask_is_given && seen->mask.shows(pixel.x(), pixel.y());
+}
+
+}  // namespace
 
 std::vector<OutlinePoint> without_hidden(std::span<const OutlineSample> samples, std::span<const OutlinePoint> points,
                                          double reach_px, double parallel_px) {
@@ -94,11 +102,11 @@ void Occlusion::learn(const Frame& frame, const Eigen::VectorXd& x, double hand_
   held_.learn(views);
 }
 
-HiddenShare Occlusion::hidden(const FrameEvidence& seen) const {
+HiddenShare Occlusion::hidden(const Frame& frame, const FrameEvidence& seen) const {
   HiddenShare hidden;
-  double hand = 0.0, hand_gone = 0.0, hand_covered = 0.0, robot = 0.0, robot_gone = 0.0;
-  for (const auto& samples : seen.samples) {
-    for (const auto& sample : samples) {
+  double hand = 0.0, hand_gone = 0.0, hand_covered = 0.0, hand_within = 0.0, robot = 0.0, robot_gone = 0.0;
+  for (std::size_t c = 0; c < seen.samples.size(); ++c) {
+    for (const auto& sample : seen.samples[c]) {
       const bool gone = sample.odd || sample.covered;
       robot += 1.0;
       robot_gone += gone;
@@ -106,10 +114,12 @@ HiddenShare Occlusion::hidden(const FrameEvidence& seen) const {
       hand += 1.0;
       hand_gone += gone;
       hand_covered += sample.covered;
+      hand_within += gone && !sample.covered && shows_robot(frame.seen[c], sample.pixel);
     }
   }
   if (hand > 0.0) hidden.hand = hand_gone / hand;
-  if (hand > hand_covered) hidden.hand_missed = (hand_gone - hand_covered) / (hand - hand_covered);
+  const double missed = hand_gone - hand_covered;
+  if (missed > 0.0 && hand_within < limits::kWithinMasks * missed) hidden.hand_missed = missed / (hand - hand_covered);
   if (robot > 0.0) hidden.robot = robot_gone / robot;
   hidden.holds = held_.known();
   return hidden;

@@ -34,7 +34,7 @@ class Occlusion {
   /// Learns from a frame that shows the arm at x what masks show beside it.
   void learn(const Frame& frame, const Eigen::VectorXd& x, double hand_sd_m);
   /// What a frame's outlines left out.
-  [[nodiscard]] HiddenShare hidden(const FrameEvidence& seen) const;
+  [[nodiscard]] HiddenShare hidden(const Frame& frame, const FrameEvidence& seen) const;
   void forget() { held_.forget(); }
 
  private:

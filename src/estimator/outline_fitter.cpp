@@ -10,7 +10,7 @@
 namespace bodyschema {
 namespace {
 
-constexpr double kNear_px[] = {8.0, 5.0};
+constexpr double kFollow_px[] = {8.0, 5.0};
 constexpr double kWide_px[] = {30.0, 20.0, 14.0, 10.0, 7.0, 5.0};
 /// Of the distance at which outlines are looked for: what passes for a residual.
 constexpr double kOfReach = 0.5;
@@ -141,7 +141,7 @@ void OutlineFitter::refine(const Frame& frame, const PostureMemory& memory, std:
 OutlineFit OutlineFitter::follow(const Frame& frame, const PostureMemory& memory, const Eigen::VectorXd& start) {
   OutlineFit fit;
   fit.x = start;
-  refine(frame, memory, kNear_px, 0, fit);
+  refine(frame, memory, kFollow_px, 0, fit);
   return fit;
 }
 
@@ -182,7 +182,7 @@ OutlineFit OutlineFitter::found(const Frame& frame, const PostureMemory& memory,
 std::optional<Quadratic> OutlineFitter::about(const Frame& frame, const Eigen::VectorXd& x) {
   OutlineFit fit;
   fit.x = x;
-  look_twice(frame, kNear_px[std::size(kNear_px) - 1], fit);
+  look_twice(frame, kFollow_px[std::size(kFollow_px) - 1], fit);
   if (!fits(frame, fit.evidence)) return std::nullopt;
   return std::move(fit.seen.quadratic);
 }

@@ -1,6 +1,5 @@
 #include "shown_steps.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -56,7 +55,7 @@ std::optional<double> shown_share(const Frame& frame, const FrameEvidence& evide
   for (std::size_t c = 0; c < evidence.samples.size(); ++c) {
     const auto* seen = frame.seen[c];
     if (seen == nullptr || seen->image.empty()) continue;
-    const double unit_px = std::sqrt(static_cast<double>(seen->image.width) * seen->image.height / (320.0 * 240.0));
+    const double unit_px = picture_unit(seen->image.width, seen->image.height);
     const ShownSteps own = shown_steps(seen->image, evidence.samples[c], unit_px);
     all.looked += own.looked;
     all.shown += own.shown;

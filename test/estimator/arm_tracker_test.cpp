@@ -106,5 +106,29 @@ TEST_F(TrackerOfOwnRobot, OutOfSightTheMemoryStays) {
   EXPECT_EQ(known_.in_frame.x, known_.memory.estimate().x);
 }
 
+/// A contradiction lasts as long as pictures show it: two bad ones, a minute without the hand between them, are two.
+TEST_F(TrackerOfOwnRobot, APauseEndsADoubt) {
+  reach();
+  offset_by(Eigen::VectorXd::Constant(7, radians(25.0)));
+  // What may have happened takes more pictures than one to search.
+  OutlineFitter slow_fitter(*model_, *scorer_, options_, rig_.cameras.size(), 0);
+  ArmTracker slow(*model_, *scorer_, *particles_, slow_fitter, occlusion_, known_, options_);
+  const auto look = [&] {
+    Frame frame = at(0.5);
+    FrameOutcome outcome;
+    slow.begin_frame(frame);
+    const OutlineFit fit = slow.measure(frame);
+    slow.gate(frame, fit, outcome);
+    slow.explain(frame, fit, outcome);
+    EXPECT_TRUE(outcome.contradicted);
+    return outcome.state;
+  };
+  EXPECT_NE(look(), EstimatorState::kDiverged);
+  slow.lose_sight();
+  time_us_ += 60'000'000;
+  EXPECT_NE(look(), EstimatorState::kDiverged);
+  EXPECT_EQ(look(), EstimatorState::kDiverged) << "a second later";
+}
+
 }  // namespace
 }  // namespace bodyschema

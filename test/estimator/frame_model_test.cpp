@@ -107,6 +107,24 @@ TEST(FrameModel, BaseIsStillBeforeCamerasThatStandStill) {
   EXPECT_EQ(frames.still_parts(), (std::vector<bool>{true, false, false}));
 }
 
+/// What was learned is kept by frames' times: for it time goes on where the stamps' clock steps back, once or again.
+TEST_F(FrameModelOfOwnRobot, TimeGoesOnWhereTheClockStepsBack) {
+  FrameModel frames = model(ErrorModel(roles_));
+  double last_s = 0.0;
+  for (const int start_ms : {3'600'000, 10'000, 5'000}) {
+    for (int i = 0; i < 3; ++i) {
+      Observation seen = observe((start_ms + 100 * i) * kMs, (start_ms + 100 * i) * kMs, (start_ms + 100 * i) * kMs, 0);
+      seen.encoders_begin_anew = i == 0;
+      const double time_s = frames.take(seen, nothing_).time_s;
+      EXPECT_GE(time_s, last_s);
+      if (i > 0) {
+        EXPECT_NEAR(time_s - last_s, 0.1, 1e-6);
+      }
+      last_s = time_s;
+    }
+  }
+}
+
 TEST_F(FrameModelOfOwnRobot, OtherEncodersBeginWithoutAMemory) {
   ErrorModel known(roles_);
   known.add("backlash", {"r_elbow", ""}).parameters()[0].value = radians(2.0);

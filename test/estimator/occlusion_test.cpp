@@ -138,6 +138,23 @@ TEST_F(OcclusionOnOwnRobot, AThingInTheHandFromTheFirstPictureOnIsLearned) {
   EXPECT_GT(converged, 30);
 }
 
+/// A network's masks show a tool with the robot, and nothing of the hand within it: no mask says that it is elsewhere.
+TEST_F(OcclusionOnOwnRobot, AHandWithinAToolThatGivenMasksShowIsNotMissed) {
+  const auto with_tool = [&](bool given) {
+    return Paint([this, given, tool = ball(0.06)](int frame, std::size_t camera, CameraObservation& seen) {
+      tool(frame, camera, seen);
+      seen.mask_is_given = given;
+    });
+  };
+  const Paint of_others = with_tool(true), own = with_tool(false);
+  for (int frame = 0; frame < 8; ++frame) {
+    const Estimate estimate = step(frame, of_others);
+    EXPECT_GT(estimate.hidden.hand, 0.4) << frame;
+    EXPECT_LT(estimate.hidden.hand_missed, 0.2) << frame;
+  }
+  EXPECT_GT(step(8, own).hidden.hand_missed, 0.4);
+}
+
 /// The memory of an open hand is good: a thing that it takes up contradicts the pictures, not the memory.
 TEST_F(OcclusionOnOwnRobot, AThingThatIsTakenUpCostsNoKnowledge) {
   follow(0, 40);

@@ -25,6 +25,16 @@ TEST(BinaryMask, IsWhatIsInBothInEitherOrInTheFirstAlone) {
   EXPECT_EQ(alone, columns(0, 59));
 }
 
+TEST(BinaryMask, ShowsThePixelThatAPlaceIsNearestToAndNothingOutside) {
+  const BinaryMask mask = columns(0, 66);
+  EXPECT_TRUE(mask.shows(66.4, 0.6));
+  EXPECT_FALSE(mask.shows(66.6, 0.0));
+  EXPECT_TRUE(mask.shows(-0.4, 0.0));
+  EXPECT_FALSE(mask.shows(-0.6, 0.0));
+  EXPECT_FALSE(mask.shows(3.0, 1.6));
+  EXPECT_FALSE(BinaryMask().shows(0.0, 0.0));
+}
+
 TEST(BinaryMask, CountsNoPixelBeyondTheRow) {
   BinaryMask all(70, 2);
   all.fill(true);

@@ -93,7 +93,7 @@ const char* to_string(FrameVerdict verdict);
 /// something else or lie where a held thing is known to be. They are left out of the evidence.
 struct HiddenShare {
   double hand = 0.0;         ///< of hand and fingers, all cameras; 0 where none of them is in view
-  double hand_missed = 0.0;  ///< ... of what no held thing is known to cover
+  double hand_missed = 0.0;  ///< ... of what no held thing is known to cover; 0 where given masks show robot there
   double robot = 0.0;        ///< of all that is drawn of the robot
   bool holds = false;        ///< something is known to be held: it has moved with the hand over several postures
   /// "35 % of the hand is hidden, it holds something"; empty: nothing worth a word.

@@ -40,7 +40,8 @@ class Estimator {
   Estimate step(const Observation& observation);
 
   /// Likelihood 1 - d (equation 4) of joint offsets, one hypothesis per column, all else nominal.
-  /// Zero where the hand is not in view. Leaves the estimate as it is.
+  /// Zero where the hand is not in view. Leaves the estimate as it is; the observation is the one
+  /// seen last.
   [[nodiscard]] Eigen::VectorXd likelihood(const Observation& observation, const Eigen::MatrixXd& offsets_rad);
 
   /// A camera's exposure of the observation seen last; where it saw nothing, another's.
@@ -53,10 +54,9 @@ class Estimator {
   /// The same with an earlier estimate of this estimator.
   [[nodiscard]] BinaryMask predicted_silhouette(const Observation& observation, std::size_t camera,
                                                 const Estimate& estimate);
-  /// Where the model puts hand and fingertips in the exposure's camera; `corrected` and `estimate` as above.
+  /// Where the model puts the hand in the exposure's camera; `corrected` and `estimate` as above.
   [[nodiscard]] Pose hand_pose(const Exposure& exposure, bool corrected);
   [[nodiscard]] Pose hand_pose(const Exposure& exposure, const Estimate& estimate);
-  [[nodiscard]] std::vector<Eigen::Vector3d> fingertips(const Exposure& exposure, bool corrected);
   /// Covariance of the last estimate's hand base in a camera, m^2; Estimate::hand_sd_m is the root of its trace.
   [[nodiscard]] Eigen::Matrix3d hand_covariance_m2(const Exposure& exposure);
   [[nodiscard]] std::string engine_description() const;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -23,6 +24,12 @@ class BinaryMask {
   [[nodiscard]] std::size_t bytes() const { return words_.size() * sizeof(std::uint64_t); }
 
   [[nodiscard]] bool at(int u, int v) const { return (row(v)[u >> 6] >> (u & 63)) & 1u; }
+  /// Of the pixel nearest to a place in the picture; outside: false.
+  [[nodiscard]] bool shows(double u, double v) const {
+    const long column = std::lround(u), row = std::lround(v);
+    return column >= 0 && row >= 0 && column < width_ && row < height_ &&
+           at(static_cast<int>(column), static_cast<int>(row));
+  }
   void set(int u, int v, bool value = true) {
     const std::uint64_t bit = std::uint64_t{1} << (u & 63);
     auto& word = row(v)[u >> 6];
@@ -70,5 +77,15 @@ class BinaryMask {
   int words_per_row_ = 0;
   std::vector<std::uint64_t> words_;
 };
+
+/// Takes pixels out of those that count; an empty `valid` is all of them, empty `pixels` are none.
+inline void leave_out(const BinaryMask& pixels, BinaryMask& valid) {
+  if (pixels.empty()) return;
+  if (valid.empty()) {
+    valid = BinaryMask(pixels.width(), pixels.height());
+    valid.fill(true);
+  }
+  valid -= pixels;
+}
 
 }  // namespace bodyschema

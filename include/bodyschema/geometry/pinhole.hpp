@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 
 namespace bodyschema {
 
@@ -30,5 +31,13 @@ struct PinholeIntrinsics {
   }
   friend bool operator==(const PinholeIntrinsics&, const PinholeIntrinsics&) = default;
 };
+
+/// The length in a picture that one pixel of a 320x240 picture has: settings in px are multiplied by it.
+inline double picture_unit(int width, int height) {
+  return std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0));
+}
+inline double picture_unit(const PinholeIntrinsics& camera) {
+  return picture_unit(camera.width, camera.height);
+}
 
 }  // namespace bodyschema

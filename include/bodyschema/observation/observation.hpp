@@ -23,11 +23,12 @@ struct JointSample {
 struct CameraObservation {
   Microseconds utime = 0;  ///< exposure time of this picture
   JointSample joints;      ///< encoders interpolated to `utime`
-  Image image;             ///< the picture as received (gray or RGB), kept for overlays
+  Image image;             ///< as received (gray or RGB); straightened once its mask has been made
   Image
       given_mask{};  ///< what others say of each pixel (kMaskRobot and its like), as the lens bends it; empty: nothing
   BinaryMask mask;   ///< the robot's silhouette, filled in by vision
   BinaryMask valid;  ///< pixels that count; empty: all
+  bool mask_is_given = false;  ///< `mask` is others' (given_mask), who know nothing of where the robot is predicted
   /// Share of each pixel covered by the robot, 0 to 255, one per pixel in row order: the mask
   /// before thresholding, from which outlines are found to a fraction of a pixel. Empty: none.
   std::vector<std::uint8_t> coverage;
