@@ -21,7 +21,7 @@ double believed_outline_sd_px(LogFit& fit, const State& state, const std::vector
   for (std::size_t p = 0; p < pictures.size(); p += step) {
     fit.measurement().expect(pictures[p].joints.q, at.corrections[p], pictures[p].camera, coordinates, search,
                              expected);
-    const double unit = picture_unit(fit.log().rig().cameras[pictures[p].camera].intrinsics);
+    const double unit = fit.log().unit_px(p);
     for (Eigen::Index k = 0; k < state.size(); ++k) {
       Eigen::VectorXd direction = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(coordinates.size()));
       for (const auto& move : directions[p][static_cast<std::size_t>(k)]) {

@@ -42,7 +42,7 @@ BeyondModel beyond_model(const PictureLog& log, std::span<const Corrections> cor
   std::vector<double> seen(links, 0.0), held(links, 0.0);
   for (std::size_t p = 0; p < pictures.size(); ++p) {
     const auto& picture = pictures[p];
-    const double unit = picture_unit(log.rig().cameras[picture.camera].intrinsics);
+    const double unit = log.unit_px(p);
     const auto px = [unit](double of_small) { return std::max(1, static_cast<int>(of_small * unit + 0.5)); };
     const BinaryMask model = preview.draw(picture.joints.q, corrections[p], picture.camera);
     BinaryMask known = picture.mask, predicted = model;
@@ -87,30 +87,7 @@ std::optional<std::size_t> link_that_holds(std::span<const double> held, std::sp
 }
 
 void leave_out(PictureLog& log, const BeyondModel& beyond) {
-  PictureLog left(log.robot(), log.setup(), log.rig());
-  const auto pictures = log.pictures();
-  for (std::size_t p = 0; p < pictures.size(); ++p) {
-    Observation o;
-    o.utime = pictures[p].joints.utime;
-    o.cameras.resize(log.rig().cameras.size());
-    auto& seen = o.cameras[pictures[p].camera].emplace();
-    seen.utime = o.utime;
-    seen.joints = pictures[p].joints;
-    seen.mask = pictures[p].mask;
-    seen.valid = pictures[p].valid;
-    seen.coverage = pictures[p].coverage;
-    if (!beyond.where[p].empty()) {
-      if (seen.valid.empty()) {
-        seen.valid = BinaryMask(seen.mask.width(), seen.mask.height());
-        seen.valid.fill(true);
-      }
-      seen.valid -= beyond.where[p];
-    }
-    left.add(o);
-  }
-  left.set_encoders({log.encoders().begin(), log.encoders().end()});
-  left.finish();
-  log = std::move(left);
+  for (std::size_t p = 0; p < log.pictures().size(); ++p) log.leave_out(p, beyond.where[p]);
 }
 
 }  // namespace bodyschema

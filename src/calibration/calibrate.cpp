@@ -657,7 +657,7 @@ class Calibrator {
     for (std::size_t posture = 0; posture < batch.postures(); ++posture) {
       std::vector<std::size_t> own;
       for (std::size_t p = 0; p < pictures.size(); ++p) {
-        if (batch.posture_of()[p] == posture) own.push_back(p);
+        if (batch.posture_by_picture()[p] == posture) own.push_back(p);
       }
       if (own.empty()) continue;
       const double off_px = median_outline_distance_px(fit, batch.state().model(), own);
@@ -729,7 +729,7 @@ class Calibrator {
     for (std::size_t section = 0; section < sections; ++section) {
       std::vector<std::size_t> kept, left_out;
       for (std::size_t p = 0; p < log_->pictures().size(); ++p) {
-        (batch.posture_of()[p] * sections / postures == section ? left_out : kept).push_back(p);
+        (batch.posture_by_picture()[p] * sections / postures == section ? left_out : kept).push_back(p);
       }
       if (kept.empty() || left_out.empty()) continue;
       BatchFit part = about_the_same(fit, batch);

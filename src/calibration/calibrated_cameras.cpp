@@ -23,13 +23,8 @@ Pose camera_place(const PictureLog& log, const State& state, const Eigen::Vector
   State moved = state;
   moved.set(x);
   const auto q = log.setup().default_joints(*log.robot());
-  std::vector<std::string> cameras;
-  for (const auto& c : log.rig().cameras) cameras.push_back(c.link);
-  CorrectedKinematics kinematics(log.robot(), {carrier_of(log.rig(), camera)}, cameras);
-  Instant at;
-  at.camera = camera;
-  at.encoder = at.q = q;
-  at.qdot = at.qddot = Eigen::VectorXd::Zero(q.size());
+  CorrectedKinematics kinematics(log.robot(), {carrier_of(log.rig(), camera)}, log.rig().links());
+  const Instant at = Instant::at_rest(q, camera);
   Corrections all = log.roles().no_corrections(), own = all;
   moved.model().corrections(at, all);
   own.camera = all.camera;
@@ -39,9 +34,8 @@ Pose camera_place(const PictureLog& log, const State& state, const Eigen::Vector
 }
 
 /// How a place moves, m and rad a unit of each parameter of the state that places cameras.
-/// @param any  set where there is one
 template <class PlaceOf>
-Eigen::MatrixXd place_jacobian(const State& state, const PlaceOf& place, bool& any) {
+Eigen::MatrixXd place_jacobian(const State& state, const PlaceOf& place) {
   constexpr double kStep = 1e-5;
   const Eigen::VectorXd x = state.x();
   const Pose X = place(x);
@@ -49,7 +43,6 @@ Eigen::MatrixXd place_jacobian(const State& state, const PlaceOf& place, bool& a
   for (Eigen::Index k = 0; k < state.size(); ++k) {
     const auto& effect = state.model()[state.parameters()[static_cast<std::size_t>(k)].ref.effect].name();
     if (!places_cameras(effect)) continue;
-    any = true;
     Eigen::VectorXd changed = x;
     changed[k] += kStep;
     const Pose moved = place(changed);
@@ -58,6 +51,12 @@ Eigen::MatrixXd place_jacobian(const State& state, const PlaceOf& place, bool& a
     J.col(k).tail<3>() = turn.angle() * turn.axis() / kStep;
   }
   return J;
+}
+
+/// Whether any parameter moves the place at all: what is configured as exact has none that does.
+bool is_moved(const Eigen::MatrixXd& place_jacobian) {
+  constexpr double kRounding = 1e-6;
+  return place_jacobian.size() > 0 && place_jacobian.cwiseAbs().maxCoeff() > kRounding;
 }
 
 /// @param C  covariance of a camera's place and of its rotation vector, both in the axes of what carries it
@@ -75,11 +74,10 @@ CalibratedCamera::Beside beside_first(const PictureLog& log, const BatchFit& bat
   const auto place = [&](const Eigen::VectorXd& x) {
     return camera_place(log, state, x, 0).inverse(Eigen::Isometry) * camera_place(log, state, x, camera);
   };
-  bool any = false;
-  const Eigen::MatrixXd J = place_jacobian(state, place, any);
+  const Eigen::MatrixXd J = place_jacobian(state, place);
   const Pose X = place(state.x());
   const auto [sd_m, sd_rad] = along_axes(J * batch.estimate().covariance * J.transpose(), X);
-  return {log.rig().cameras.front().name, X, sd_m, sd_rad};
+  return {log.rig().cameras.front().name, X, sd_m, sd_rad, is_moved(J)};
 }
 
 }  // namespace
@@ -104,7 +102,8 @@ std::vector<CalibratedCamera> calibrated_cameras(const PictureLog& log, const Ba
     found.X_link_optical = place(x);
     found.intrinsics = corrected.cameras[c].intrinsics;
     found.distortion = corrected.cameras[c].distortion;
-    const Eigen::MatrixXd J = place_jacobian(state, place, found.estimated);
+    const Eigen::MatrixXd J = place_jacobian(state, place);
+    found.estimated = is_moved(J);
     const Eigen::MatrixXd C = J * batch.estimate().covariance * J.transpose();
     found.sd_m = std::sqrt(std::max(0.0, C.topLeftCorner<3, 3>().trace()));
     found.sd_rad = std::sqrt(std::max(0.0, C.bottomRightCorner<3, 3>().trace()));

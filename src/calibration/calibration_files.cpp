@@ -7,27 +7,19 @@
 #include <nlohmann/json.hpp>
 
 #include "bodyschema/core/write_file.hpp"
+#include "bodyschema/core/yaml_name.hpp"
 #include "bodyschema/effects/effect_kind.hpp"
 #include "bodyschema/pipeline/export_correction.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
 #include "bodyschema/pipeline/silhouette_preview.hpp"
 #include "bodyschema/pipeline/ros_files.hpp"
+#include "bodyschema/pipeline/pose_json.hpp"
 #include "bodyschema/report/report.hpp"
 
 namespace bodyschema {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json matrix_json(const Pose& X) {
-  Json rows = Json::array();
-  for (int r = 0; r < 4; ++r) {
-    Json row = Json::array();
-    for (int c = 0; c < 4; ++c) row.push_back(X.matrix()(r, c));
-    rows.push_back(std::move(row));
-  }
-  return rows;
-}
 
 Json parameter_json(const CalibratedParameter& p) {
   Json json = {{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"stddev", p.sd}};
@@ -53,8 +45,7 @@ Json to_json(const Calibration& c, const std::string& root) {
   for (const auto& camera : c.cameras) {
     auto& entry = json["cameras"][camera.name];
     entry["link"] = camera.link;
-    entry[camera.link == root ? "X_base_optical" : "X_" + camera.link + "_optical"] =
-        matrix_json(camera.X_link_optical);
+    entry[camera.link == root ? "X_base_optical" : "X_" + camera.link + "_optical"] = pose_json(camera.X_link_optical);
     entry["estimated"] = camera.estimated;
     entry["sd_mm"] = 1e3 * camera.sd_m;
     entry["sd_deg"] = degrees(camera.sd_rad);
@@ -68,7 +59,7 @@ Json to_json(const Calibration& c, const std::string& root) {
   for (const auto& view : c.views) {
     json["views"].push_back({{"utime", view.utime},
                              {"camera", c.cameras[view.camera].name},
-                             {"X_camera_hand", matrix_json(view.X_camera_hand)}});
+                             {"X_camera_hand", pose_json(view.X_camera_hand)}});
   }
   json["outline_px"] = {{"before", c.outline_px.before}, {"after", c.outline_px.after}};
   if (c.outline_px.heldout) {
@@ -160,12 +151,12 @@ std::string offsets_yaml(const Calibration& c, const Correction& correction) {
       text += fmt::format("# {} is left out: {}\n", joint.name, joint.untold_why);
       continue;
     }
-    offsets += fmt::format("  {}: {:.4f}\n", joint.name, degrees(joint.offset_rad));
-    sds += fmt::format("  {}: {:.4f}\n", joint.name, degrees(joint.sd_rad));
+    offsets += fmt::format("  {}: {:.4f}\n", yaml_name(joint.name), degrees(joint.offset_rad));
+    sds += fmt::format("  {}: {:.4f}\n", yaml_name(joint.name), degrees(joint.sd_rad));
   }
   std::string head;
   for (const auto& [joint, offset] : correction.known_offsets_rad) {
-    head += fmt::format("  {}: {:.4f}\n", joint, degrees(offset));
+    head += fmt::format("  {}: {:.4f}\n", yaml_name(joint), degrees(offset));
   }
   if (!head.empty())
     head = "# Of the head's joints; arm and head hold together: apply both or neither.\nhead_offset_deg:\n" + head;
@@ -186,13 +177,13 @@ std::string cameras_yaml(const Calibration& c) {
     const Eigen::Vector3d deg = degrees(1.0) * (beside ? beside->axes_sd_rad : camera.axes_sd_rad).cwiseMax(kLeast_rad);
     // The other way to place a camera is taken out of what this is included behind.
     text += beside ? fmt::format("  {}:\n    link: ~\n    X_link_optical: ~\n    beside: {}\n    X_beside_optical:\n",
-                                 camera.name, beside->camera)
+                                 yaml_name(camera.name), yaml_name(beside->camera))
                    : fmt::format("  {}:\n    beside: ~\n    X_beside_optical: ~\n    link: {}\n    X_link_optical:\n",
-                                 camera.name, camera.link);
+                                 yaml_name(camera.name), yaml_name(camera.link));
     for (int r = 0; r < 4; ++r) {
       text += fmt::format("      - [{:.9f}, {:.9f}, {:.9f}, {:.9f}]\n", X(r, 0), X(r, 1), X(r, 2), X(r, 3));
     }
-    if (camera.estimated) {
+    if (beside ? beside->estimated : camera.estimated) {
       text += fmt::format(
           "    pose: roughly                  # along and about each of its axes\n"
           "    pose_sd_deg: [{:.4f}, {:.4f}, {:.4f}]\n    pose_sd_mm: [{:.3f}, {:.3f}, {:.3f}]\n",
@@ -304,7 +295,7 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
   rows = {{"before", fmt::format("{:.2f}", c.outline_px.before)}, {"after", fmt::format("{:.2f}", c.outline_px.after)}};
   if (c.outline_px.heldout)
     rows.push_back({"postures left out of the fit",
-                    fmt::format("{:.2f}, worst fifth {:.2f}", *c.outline_px.heldout, *c.outline_px.heldout_worst)});
+                    fmt::format("{:.2f}, worst part {:.2f}", *c.outline_px.heldout, *c.outline_px.heldout_worst)});
   page.table({"outline to outline, median", "px"}, rows);
   page.paragraph(
       fmt::format("{} pictures of {} distinct postures. One point of an outline errs by {:.2f} px, {:.0f} neighbours "
@@ -330,13 +321,11 @@ void write_page(const Calibration& c, const BatchFit& batch, PictureLog& log, co
     for (std::size_t k = 0; k < observation.cameras.size(); ++k) {
       const auto& seen = observation.cameras[k];
       if (!seen || seen->image.empty()) continue;
-      const auto picture = std::find_if(log.pictures().begin(), log.pictures().end(), [&](const Picture& p) {
-        return p.camera == k && p.joints.utime == seen->utime;
-      });
-      if (picture == log.pictures().end()) continue;
-      const auto& found = batch.at().corrections[static_cast<std::size_t>(picture - log.pictures().begin())];
+      const auto picture = log.find(k, seen->utime);
+      if (!picture) continue;
+      const auto& q = log.pictures()[*picture].joints.q;
       views.push_back(
-          {&seen->image, preview.draw(picture->joints.q, nothing, k), preview.draw(picture->joints.q, found, k), {}});
+          {&seen->image, preview.draw(q, nothing, k), preview.draw(q, batch.at().corrections[*picture], k), {}});
       views.back().px_per_m = preview.hand_px_per_m();
     }
     if (views.empty()) continue;
@@ -361,7 +350,7 @@ void write_calibration(const Calibration& calibration, const BatchFit& batch, Pi
   json["log"] = options.log.filename().string();
   json["configuration_hash"] = configuration.hash();
   json["model_hash"] = pipeline.model_hash();
-  replace_file(options.out / "calibration.json", json.dump(2) + '\n');
+  replace_file(options.out / "calibration.json", json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
   write_page(calibration, batch, log, kept, options);
   Correction correction = correction_of(calibration);
   add_geometry(calibration, batch, log, pipeline, options.all_parameters, correction);
@@ -398,7 +387,7 @@ std::string to_table(const Calibration& c) {
   for (const auto& note : notes_of(c)) text += "\nnote: " + note;
   text += fmt::format("\n\noutlines, median distance: {:.2f} px before, {:.2f} px after{}\n", c.outline_px.before,
                       c.outline_px.after,
-                      c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out (worst fifth {:.2f})",
+                      c.outline_px.heldout ? fmt::format(", {:.2f} px on postures left out (worst part {:.2f})",
                                                          *c.outline_px.heldout, *c.outline_px.heldout_worst)
                                            : "");
   if (!c.next_posture_rad.empty()) {

@@ -35,14 +35,19 @@ struct Objection {
 std::optional<Objection> objection_of_outlines(const BatchFit& batch, const Doubts& doubts, double unit_px,
                                                const Calibration& result) {
   const auto& found = doubts.found;
-  const double rms = batch.noise().front().sd_px();
-  if (found.share < limits::kLeastFound || found.seen < limits::kLeastSeen || rms > limits::kNear_px) {
+  if (found.share < limits::kLeastFound || found.seen < limits::kLeastSeen) {
     return Objection{
         CalibrationState::kNotConverged,
         fmt::format("Not converged: {:.0f} % of the predicted outline lies near an edge of the robot in the "
                     "pictures, expected at least {:.0f} %; check masks, joint angles (order, sign, unit), robot and "
                     "cameras' intrinsics.",
                     100.0 * found.share * found.seen, 100.0 * limits::kLeastFound)};
+  }
+  if (const double rms = batch.noise().front().sd_px(); rms > limits::kNear_px) {
+    return Objection{CalibrationState::kNotConverged,
+                     fmt::format("Not converged: outlines that are found lie {:.1f} px off, expected at most {:.1f}; "
+                                 "check masks, joint angles (order, sign, unit), robot and cameras' intrinsics.",
+                                 rms * unit_px, limits::kNear_px * unit_px)};
   }
   // That nothing fits is said of many robots; this says why.
   if (!doubts.implausible.empty()) {
@@ -183,7 +188,7 @@ FoundOutlines found_outlines(LogFit& fit, const BatchFit& batch, std::span<const
       Outline own;
       for (const auto p : pictures) {
         const auto& picture = log.pictures()[p];
-        auto search = batch.searches()[picture.camera];
+        auto search = batch.search();
         search.part_weight.assign(links.size(), 0.0);
         search.part_weight[part] = 1.0;
         fit.measurement().linearise(log.edges(p), picture.joints.q, batch.at().corrections[p], picture.camera, {},

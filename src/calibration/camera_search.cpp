@@ -7,6 +7,7 @@
 #include <optional>
 #include <random>
 
+#include "bodyschema/camera/picture_reduction.hpp"
 #include "bodyschema/filter/hammoude.hpp"
 #include "bodyschema/outline/robot_projection.hpp"
 #include "bodyschema/search/simplified_mesh.hpp"
@@ -36,11 +37,6 @@ BinaryMask shrunk(const BinaryMask& mask, int factor) {
     }
   }
   return small;
-}
-
-PinholeIntrinsics shrunk(const PinholeIntrinsics& k, int factor) {
-  const double f = factor;
-  return {k.width / factor, k.height / factor, k.fx / f, k.fy / f, (k.cx + 0.5) / f - 0.5, (k.cy + 0.5) / f - 0.5};
 }
 
 /// Where a mask's middle lies, and how much of it there is.
@@ -172,7 +168,7 @@ class CameraSearch {
     const auto& rig = log_.rig();
     const auto& k = rig.cameras[camera].intrinsics;
     const int factor = std::max(1, k.width / kWidth_px);
-    const PinholeIntrinsics small = shrunk(k, factor);
+    const PinholeIntrinsics small = reduced(k, factor);
     std::vector<std::string> links;
     const auto shown = log_.parts_shown();
     for (std::size_t b = 0; b < shown.size(); ++b) {

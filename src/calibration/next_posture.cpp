@@ -1,9 +1,7 @@
 #include "next_posture.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 #include <random>
 #include <vector>
 
@@ -64,7 +62,7 @@ std::optional<NextPosture> next_posture(LogFit& fit, const BatchFit& batch, cons
       at.encoder = trial.q;
       at.q = trial.q - state.model().offsets();
       state.model().corrections(at, corrections);
-      measurement.expect(trial.q, corrections, c, active, batch.searches()[c], evidence);
+      measurement.expect(trial.q, corrections, c, active, batch.search(), evidence);
       const auto& hand = measurement.projection().hand();
       const auto& k = log.rig().cameras[c].intrinsics;
       const Eigen::Vector2d pixel = k.project(hand.translation());

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "bodyschema/camera/stereo_rig.hpp"
+#include "bodyschema/core/order_statistics.hpp"
 #include "bodyschema/outline/outline_measurement.hpp"
 #include "bodyschema/pipeline/silhouette_preview.hpp"
 #include "bodyschema/vision/mask_operations.hpp"
@@ -42,9 +43,7 @@ VisionSetup with_auto(VisionSetup vision) {
 std::vector<std::size_t> recordings_of(const std::vector<Observation>& kept) {
   std::vector<double> apart;
   for (std::size_t i = 1; i < kept.size(); ++i) apart.push_back(seconds(kept[i].utime - kept[i - 1].utime));
-  auto sorted = apart;
-  std::sort(sorted.begin(), sorted.end());
-  const double pause_s = sorted.empty() ? kPause_s : std::max(kPause_s, kPauseShare * sorted[sorted.size() / 2]);
+  const double pause_s = std::max(kPause_s, kPauseShare * median(apart));
   std::vector<std::size_t> list(kept.size(), 0);
   std::size_t begin = 0;
   for (std::size_t i = 1; i < kept.size(); ++i) {
@@ -118,13 +117,13 @@ PictureLog RawPictures::about(std::span<const Corrections> corrections, double r
       std::vector<BinaryMask> robots;
       for (std::size_t i = 0; i < kept_.size(); ++i) {
         if (recording_[i] != r || !seen[i].cameras[c]) continue;
-        const auto p = picture_of(c, seen[i].cameras[c]->utime);
-        if (p == log_.pictures().size()) {
+        const auto p = log_.find(c, seen[i].cameras[c]->utime);
+        if (!p) {
           seen[i].cameras[c].reset();
           continue;
         }
         frames.push_back(kept_[i].cameras[c]->image);
-        predicted[i] = preview.draw(log_.pictures()[p].joints.q, corrections[p], c);
+        predicted[i] = preview.draw(log_.pictures()[*p].joints.q, corrections[*p], c);
         robots.push_back(predicted[i]);
         morphology.dilate(robots.back(), static_cast<int>(reach));
         colours.add(frames.back(), predicted[i], reach, robots.back());
@@ -137,13 +136,6 @@ PictureLog RawPictures::about(std::span<const Corrections> corrections, double r
     }
   }
   return replace(seen, false);
-}
-
-std::size_t RawPictures::picture_of(std::size_t camera, Microseconds utime) const {
-  const auto pictures = log_.pictures();
-  const auto found = std::find_if(pictures.begin(), pictures.end(),
-                                  [&](const Picture& p) { return p.camera == camera && p.joints.utime == utime; });
-  return static_cast<std::size_t>(found - pictures.begin());
 }
 
 PictureLog RawPictures::replace(const std::vector<Observation>& seen, bool learned) {

@@ -35,7 +35,6 @@ class RawPictures {
 
  private:
   PictureLog replace(const std::vector<Observation>& seen, bool learned);
-  [[nodiscard]] std::size_t picture_of(std::size_t camera, Microseconds utime) const;
 
   PictureLog& log_;
   VisionSetup vision_;

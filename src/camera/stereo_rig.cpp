@@ -203,6 +203,12 @@ std::vector<PinholeIntrinsics> StereoRig::intrinsics() const {
   return all;
 }
 
+std::vector<std::string> StereoRig::links() const {
+  std::vector<std::string> all;
+  for (const auto& camera : cameras) all.push_back(camera.link);
+  return all;
+}
+
 std::shared_ptr<const RobotModel> load_robot(const RobotSetup& setup, const StereoRig& rig) {
   // The URDF first: its links are what a wrong name is compared with.
   RobotModelOptions links_alone = setup.model;

@@ -1,4 +1,3 @@
-#include <spdlog/fmt/fmt.h>
 
 #include "experiments.hpp"
 #include "reach_figures.hpp"

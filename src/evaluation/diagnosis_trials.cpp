@@ -1,6 +1,5 @@
 #include "diagnosis_trials.hpp"
 
-#include <spdlog/fmt/fmt.h>
 #include <time.h>
 
 #include <algorithm>

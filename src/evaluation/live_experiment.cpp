@@ -12,7 +12,6 @@
 #include <cstring>
 #include <fstream>
 #include <optional>
-#include <thread>
 
 #include "bodyschema/bus/bus_options.hpp"
 #include "bodyschema/bus/lcm_link.hpp"

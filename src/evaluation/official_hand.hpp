@@ -17,7 +17,7 @@ struct HandGraft {
 };
 
 /// Writes the URDF of the robot that `graft` describes. The second robot's hand keeps its joint
-/// names and its mesh names; relative mesh names of the first robot become absolute ones.
+/// names; relative mesh names stay as they are, so that robot.mesh_search_roots must hold both robots' folders.
 /// Throws FileError for files that cannot be read or written, DataError for links that are missing.
 void write_grafted_urdf(const HandGraft& graft, const std::filesystem::path& out);
 

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
-#include <thread>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/progress_bar.hpp"
@@ -55,7 +54,7 @@ constexpr const char* kHumanoid = "g1";
 constexpr double kRough_deg = 5.0, kRough_m = 0.05;
 
 struct PoseDifference {
-  double mm = 0.0, deg = 0.0, turn_deg = 0.0;
+  double mm = 0.0, deg = 0.0;
 };
 
 /// Between two poses of a camera in the base, the turn about the first joint's axis that brings them closest taken out:
@@ -67,7 +66,7 @@ PoseDifference difference(const Pose& found, const Pose& published, const std::s
   std::vector<Pose> X_0(1), X_1(1);
   Eigen::VectorXd q = Eigen::VectorXd::Zero(robot->joint_count());
   kinematics.compute(q, X_0);
-  PoseDifference best{1e9, 1e9, 0.0};
+  PoseDifference best{1e9, 1e9};
   double least = 1e18;
   for (double turn_deg = -40.0; turn_deg <= 40.0; turn_deg += 0.01) {
     q[joint] = radians(turn_deg);
@@ -78,7 +77,7 @@ PoseDifference difference(const Pose& found, const Pose& published, const std::s
     const double cost = std::pow(mm / 15.0, 2) + std::pow(deg / 0.7, 2);
     if (cost >= least) continue;
     least = cost;
-    best = {mm, deg, turn_deg};
+    best = {mm, deg};
   }
   return best;
 }

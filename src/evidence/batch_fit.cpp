@@ -56,7 +56,7 @@ void BatchFit::group_postures() {
   Eigen::VectorXd q;
   double begin_s = 0.0;
   for (std::size_t p = 0; p < pictures.size(); ++p) {
-    const Eigen::VectorXd own = bodyschema::posture_of(pictures[p].joints.q, fit_.log().roles());
+    const Eigen::VectorXd own = posture_of(pictures[p].joints.q, fit_.log().roles());
     const double time_s = seconds(pictures[p].joints.utime);
     const bool stays = q.size() > 0 && (own - q).cwiseAbs().maxCoeff() < settings_.memory.same_posture_rad;
     if (q.size() == 0 || (!stays && time_s - begin_s >= settings_.memory.block_s)) {
@@ -69,10 +69,8 @@ void BatchFit::group_postures() {
   if (q.size() > 0) ++postures_;
 }
 
-std::vector<OutlineSearch> BatchFit::searches() const {
-  std::vector<OutlineSearch> list;
-  for (const auto& noise : noise_) list.push_back({kFinest_px, settings_.spacing_px, noise.robust_px()});
-  return list;
+OutlineSearch BatchFit::search() const {
+  return {kFinest_px, settings_.spacing_px, widest_robust_px(noise_)};
 }
 
 void BatchFit::widen(const Eigen::VectorXd& factor) {
@@ -96,7 +94,7 @@ void BatchFit::move_to(const Eigen::VectorXd& x) {
   for (std::size_t p = 0; p < at_.evidence.size(); ++p) {
     if (at_.evidence[p].weight > 0.0) pictures.push_back(p);
   }
-  at_ = fit_.linearise(state_.model(), at_.coordinates, searches().front(), pictures);
+  at_ = fit_.linearise(state_.model(), at_.coordinates, search(), pictures);
 }
 
 void BatchFit::run(double from_px, const std::vector<std::size_t>& pictures) {
@@ -109,10 +107,8 @@ void BatchFit::run(double from_px, const std::vector<std::size_t>& pictures) {
   fit_.fit(state_, settings, pictures);
   measure(pictures);
   // With the noise as it is: how far beliefs and pictures pull, and which outlines are somebody else's.
-  double robust_px = 0.0;
-  for (const auto& noise : noise_) robust_px = std::max(robust_px, noise.robust_px());
   settings.from_px = 0.0;
-  settings.robust_px = robust_px;
+  settings.robust_px = widest_robust_px(noise_);
   settings.variance_px2 = mean_variance_px2(noise_);
   fit_.fit(state_, settings, pictures);
   measure(pictures);
@@ -136,15 +132,14 @@ void BatchFit::fuse(const std::vector<std::size_t>& pictures) {
   coordinates.erase(std::unique(coordinates.begin(), coordinates.end()), coordinates.end());
   const auto n = state_.size(), m = static_cast<Eigen::Index>(beside.size());
   const auto all = fit_.log().pictures();
-  double robust_px = 0.0;
-  for (const auto& noise : noise_) robust_px = std::max(robust_px, noise.robust_px());
   const Eigen::VectorXd start = state_.x();
   std::vector<std::vector<OutlinePoint>> points(all.size());
   const auto keep = [&](std::size_t p, std::span<const OutlinePoint> seen) {
     points[p].assign(seen.begin(), seen.end());
   };
   for (int round = 0; round < kRounds; ++round) {
-    at_ = fit_.linearise(state_.model(), coordinates, {kFinest_px, settings_.spacing_px, robust_px}, pictures, keep);
+    for (auto& of_picture : points) of_picture.clear();
+    at_ = fit_.linearise(state_.model(), coordinates, search(), pictures, keep);
     misfit_ = fit_.misfit(at_, at_.sampled());
     const auto own = fit_.directions(at_, state_.model(), refs), other = fit_.directions(at_, beside_.effects, beside);
     std::vector<Eigen::Index> position(static_cast<std::size_t>(fit_.coordinates().size()), -1);
@@ -163,8 +158,7 @@ void BatchFit::fuse(const std::vector<std::size_t>& pictures) {
         const auto& evidence = at_.evidence[p];
         if (evidence.weight <= 0.0) continue;
         total += 1.0;
-        const auto& camera = fit_.log().rig().cameras[all[p].camera];
-        const double unit = picture_unit(camera.intrinsics);
+        const double unit = fit_.log().unit_px(p);
         // The pictures of a posture count as one of each camera.
         const double precision = 1.0 / (unit * unit * noise_[all[p].camera].variance_px2() * seen[all[p].camera]);
         Eigen::MatrixXd J = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(coordinates.size()), n + m);
@@ -178,8 +172,7 @@ void BatchFit::fuse(const std::vector<std::size_t>& pictures) {
       }
       if (total > 0.0) {
         posture.b += posture.A.leftCols(n) * x;
-        memory_.add(seconds(all[first].joints.utime), bodyschema::posture_of(all[first].joints.q, fit_.log().roles()),
-                    posture, x);
+        memory_.add(seconds(all[first].joints.utime), posture_of(all[first].joints.q, fit_.log().roles()), posture, x);
       }
       first = last;
     }

@@ -308,7 +308,7 @@ std::vector<OutlineNoise> LogFit::noise(const ErrorModel& model, const OutlineSe
             [&](std::size_t p, std::span<const OutlinePoint> seen) { points[p].assign(seen.begin(), seen.end()); });
   std::vector<OutlineNoise> noise(log_.rig().cameras.size(), OutlineNoise(prior));
   for (std::size_t p = 0; p < points.size(); ++p) {
-    if (!points[p].empty()) noise[log_.pictures()[p].camera].add(points[p], unit_of(p));
+    if (!points[p].empty()) noise[log_.pictures()[p].camera].add(points[p], log_.unit_px(p));
   }
   return noise;
 }
@@ -328,16 +328,12 @@ std::vector<std::uint32_t> LogFit::moved_by(const ErrorModel& model, const std::
   return {moved.begin(), moved.end()};
 }
 
-double LogFit::unit_of(std::size_t picture) const {
-  return picture_unit(log_.rig().cameras[log_.pictures()[picture].camera].intrinsics);
-}
-
 double LogFit::mean_cost(const LinearLog& at, double usual_points, double OutlineEvidence::*cost) const {
   double sum = 0.0, points = 0.0, worst = 0.0;
   for (std::size_t p = 0; p < at.evidence.size(); ++p) {
     const auto& evidence = at.evidence[p];
     if (evidence.sampled <= 0.0) continue;
-    const double own = evidence.*cost / std::pow(unit_of(p), 2);
+    const double own = evidence.*cost / std::pow(log_.unit_px(p), 2);
     sum += own;
     points += evidence.sampled;
     worst = std::max(worst, own / evidence.sampled);

@@ -18,7 +18,7 @@ double median_outline_distance_px(LogFit& fit, const ErrorModel& model, std::spa
                                 });
   std::vector<double> all;
   for (std::size_t p = 0; p < own.size(); ++p) {
-    const double unit = picture_unit(log.rig().cameras[log.pictures()[p].camera].intrinsics);
+    const double unit = log.unit_px(p);
     own[p].resize(static_cast<std::size_t>(at.evidence[p].sampled), kReach_px * unit);
     all.insert(all.end(), own[p].begin(), own[p].end());
   }

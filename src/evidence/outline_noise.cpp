@@ -51,8 +51,8 @@ void OutlineNoise::add(std::span<const OutlinePoint> points, double unit_px, dou
       const double square = d.squaredNorm();
       if (square >= reach * reach || a.normal.dot(b.normal) < kSameSide) continue;
       const double distance = std::sqrt(square) / unit_px;
-      std::size_t bin = 0;
-      while (distance >= kBin_px[bin]) ++bin;
+      const auto bin =
+          static_cast<std::size_t>(std::upper_bound(kBin_px.begin(), kBin_px.end() - 1, distance) - kBin_px.begin());
       product_[bin] += a.weight * a.residual_px * b.weight * b.residual_px / (unit_px * unit_px);
       pairs_[bin] += 1.0;
     }
@@ -103,6 +103,12 @@ double mean_variance_px2(std::span<const OutlineNoise> cameras) {
   double sum = 0.0;
   for (const auto& noise : cameras) sum += noise.variance_px2() / static_cast<double>(cameras.size());
   return sum;
+}
+
+double widest_robust_px(std::span<const OutlineNoise> cameras) {
+  double robust_px = 0.0;
+  for (const auto& noise : cameras) robust_px = std::max(robust_px, noise.robust_px());
+  return robust_px;
 }
 
 }  // namespace bodyschema

@@ -21,6 +21,10 @@ bool PictureLog::repeats_the_last(const std::vector<Picture>& pictures) const {
 }
 
 void PictureLog::add(const Observation& observation) {
+  if (observation.encoders_begin_anew) {  // of another clock: what came before and is later by it would stand between
+    std::erase_if(pictures_, [&](const Picture& picture) { return picture.joints.utime > observation.utime; });
+    std::erase_if(encoders_, [&](const JointSample& sample) { return sample.utime > observation.utime; });
+  }
   for (const auto& sample : observation.encoders) {
     if (!encoders_.empty() && sample.utime <= encoders_.back().utime) {
       if (sample.utime == encoders_.back().utime) encoders_.back() = sample;
@@ -44,6 +48,13 @@ void PictureLog::add(const Observation& observation) {
                          [](Microseconds utime, const Picture& other) { return utime < other.joints.utime; });
     pictures_.insert(at, std::move(picture));
   }
+}
+
+std::optional<std::size_t> PictureLog::find(std::size_t camera, Microseconds utime) const {
+  const auto found = std::find_if(pictures_.begin(), pictures_.end(),
+                                  [&](const Picture& p) { return p.camera == camera && p.joints.utime == utime; });
+  if (found == pictures_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - pictures_.begin());
 }
 
 void PictureLog::forget_before(Microseconds utime) {
@@ -82,7 +93,7 @@ std::vector<bool> PictureLog::parts_shown() const {
   std::vector<bool> shown(links.size(), !learned_background_);
   if (!learned_background_) return shown;
   std::vector<std::string> frames = links;
-  for (const auto& camera : rig_.cameras) frames.push_back(camera.link);
+  for (const auto& link : rig_.links()) frames.push_back(link);
   ForwardKinematics kinematics(robot_, frames);
   std::vector<Pose> X_WF(frames.size());
   std::vector<std::vector<Pose>> first(rig_.cameras.size());

@@ -54,17 +54,7 @@ double damping(double r, double scale) {
   return scale * scale / (r * r + scale * scale);
 }
 
-bool is_covered(const BinaryMask* covered, const Eigen::Vector2d& pixel) {
-  if (covered == nullptr || covered->empty()) return false;
-  const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
-  return u >= 0 && v >= 0 && u < covered->width() && v < covered->height() && covered->at(u, v);
-}
-
 }  // namespace
-
-double picture_unit(const PinholeIntrinsics& k) {
-  return std::sqrt(static_cast<double>(k.width) * static_cast<double>(k.height) / (320.0 * 240.0));
-}
 
 void OutlineEvidence::clear(Eigen::Index coordinates) {
   A.setZero(coordinates, coordinates);
@@ -176,7 +166,7 @@ void OutlineMeasurement::compare(const ObservedEdges* edges, const Corrections& 
       point.p_C = moved;
     }
     point.pixel += shape.dilation_px / k.reduction * point.normal;
-    const bool covered = is_covered(search.covered, point.pixel);
+    const bool covered = search.covered != nullptr && search.covered->shows(point.pixel.x(), point.pixel.y());
     const auto distance =
         edges != nullptr ? edges->find(point.pixel, point.normal, reach_px) : std::optional<double>(0.0);
     const double r = distance.value_or(0.0);

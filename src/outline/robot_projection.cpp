@@ -10,19 +10,13 @@ std::vector<std::string> placed_links(const RobotSetup& setup) {
   return links;
 }
 
-std::vector<std::string> camera_links(const StereoRig& rig) {
-  std::vector<std::string> links;
-  for (const auto& camera : rig.cameras) links.push_back(camera.link);
-  return links;
-}
-
 }  // namespace
 
 RobotProjection::RobotProjection(std::shared_ptr<const RobotModel> robot, const RobotSetup& setup, const StereoRig& rig,
                                  const JointRoles& roles)
     : intrinsics_(rig.intrinsics()), segment_of_part_(setup.model.rendered_links.size(), 0),
       core_of_part_(segment_of_part_.size(), kNone), part_count_(setup.model.rendered_links.size()),
-      kinematics_(std::move(robot), placed_links(setup), camera_links(rig)),
+      kinematics_(std::move(robot), placed_links(setup), rig.links()),
       X_CB_(part_count_ + 1 + setup.fingertip_links.size(), Pose::Identity()), shapes_(roles.segments.size()) {
   for (std::size_t s = 0; s < roles.segments.size(); ++s) {
     const auto& segment = roles.segments[s];

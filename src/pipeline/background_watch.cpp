@@ -5,7 +5,6 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <bit>
 
 #include "bodyschema/vision/mask_operations.hpp"
 
@@ -40,15 +39,13 @@ void BackgroundWatch::learned(std::size_t camera, const Eigen::VectorXd& q) {
 
 double BackgroundWatch::turned(std::size_t camera, const Eigen::VectorXd& q) {
   learned(camera, q);
-  const Eigen::Matrix3d R = X_WC_learned_[camera].linear().transpose() * pose(camera, q).linear();
-  const double angle = Eigen::AngleAxisd(R).angle();
+  const double angle = rotation_distance(X_WC_learned_[camera].linear(), pose(camera, q).linear());
   return angle > kTurn_rad ? angle : 0.0;
 }
 
 bool BackgroundWatch::moved_since_last(std::size_t camera, const Eigen::VectorXd& q) {
   const Pose X_WC = pose(camera, q);
-  const Eigen::Matrix3d R = X_WC_stood_[camera].linear().transpose() * X_WC.linear();
-  const bool moved = stood_[camera] && Eigen::AngleAxisd(R).angle() >= kStands_rad;
+  const bool moved = stood_[camera] && rotation_distance(X_WC_stood_[camera].linear(), X_WC.linear()) >= kStands_rad;
   if (moved || !stood_[camera]) X_WC_stood_[camera] = X_WC;
   stood_[camera] = true;
   return moved;
@@ -61,14 +58,11 @@ bool BackgroundWatch::count(double turned_rad, const BinaryMask& mask, const Bin
   BinaryMask near(robot);
   if (near.empty()) near = BinaryMask(mask.width(), mask.height());
   MaskMorphology().dilate(near, mask.width() / kArmReach);
-  std::size_t far = 0, changed = 0;
-  for (int v = 0; v < mask.height(); ++v) {
-    for (int w = 0; w < mask.words_per_row(); ++w) {
-      const std::uint64_t judged = ~near.row(v)[w] & (valid.empty() ? ~std::uint64_t{0} : valid.row(v)[w]);
-      far += static_cast<std::size_t>(std::popcount(judged));
-      changed += static_cast<std::size_t>(std::popcount(judged & mask.row(v)[w]));
-    }
-  }
+  BinaryMask judged = valid;
+  leave_out(near, judged);
+  const std::size_t far = judged.count();
+  judged &= mask;
+  const std::size_t changed = judged.count();
   if (static_cast<double>(changed) <= kChangedShare * static_cast<double>(far)) return false;
   ++total_.changed;
   total_.turned_rad = std::max(total_.turned_rad, turned_rad);

@@ -3,22 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bodyschema/pipeline/pose_json.hpp"
+
 namespace bodyschema {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json rows_of(const Pose& X) {
-  Json rows = Json::array();
-  for (int r = 0; r < 4; ++r) rows.push_back({X(r, 0), X(r, 1), X(r, 2), X(r, 3)});
-  return rows;
-}
-
 Json camera_json(const CameraModel& camera, const CameraModel& first) {
   const PinholeIntrinsics& k = camera.intrinsics;
   const CameraMount& mount = camera.mount;
   Json json = {{mount.relative ? "beside" : "link", mount.relative ? first.name : mount.parent},
-               {mount.relative ? "X_beside_optical" : "X_link_optical", rows_of(mount.X_PC)}};
+               {mount.relative ? "X_beside_optical" : "X_link_optical", pose_json(mount.X_PC)}};
   json.update({{"image_type", camera.number()}, {"width", k.width}, {"height", k.height}, {"fx", k.fx}});
   json.update({{"fy", k.fy}, {"cx", k.cx}, {"cy", k.cy}, {"distortion", camera.distortion}});
   return json;

@@ -3,21 +3,12 @@
 #include <cmath>
 
 #include "bodyschema/pipeline/estimate_line.hpp"
+#include "bodyschema/pipeline/pose_json.hpp"
 
 namespace bodyschema {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json matrix_json(const Pose& X) {
-  Json rows = Json::array();
-  for (int r = 0; r < 4; ++r) {
-    Json row = Json::array();
-    for (int c = 0; c < 4; ++c) row.push_back(X.matrix()(r, c));
-    rows.push_back(std::move(row));
-  }
-  return rows;
-}
 
 Json finding_json(const Finding& f) {
   Json json = {{"effect", f.effect}};
@@ -63,7 +54,7 @@ nlohmann::ordered_json estimate_json(const Estimate& e, const StereoRig& rig) {
     json["effects"].push_back(std::move(entry));
   }
   for (std::size_t c = 0; c < e.X_CP.size(); ++c) {
-    json["hand_pose_" + rig.cameras[c].name + "_camera"] = matrix_json(e.X_CP[c]);
+    json["hand_pose_" + rig.cameras[c].name + "_camera"] = pose_json(e.X_CP[c]);
   }
   json["likelihood"] = e.best_likelihood;
   json["effective_sample_size"] = e.effective_sample_size;

@@ -13,6 +13,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/write_file.hpp"
+#include "bodyschema/core/yaml_name.hpp"
 #include "bodyschema/estimator/estimate.hpp"
 #include "bodyschema/geometry/pose.hpp"
 #include "bodyschema/imports/camera_pose_file.hpp"
@@ -161,7 +162,7 @@ void check_same_cameras(const std::filesystem::path& summary, const nlohmann::or
 
 std::string joints_yaml(const std::vector<std::pair<std::string, double>>& angles_rad) {
   std::string text;
-  for (const auto& [joint, angle] : angles_rad) text += fmt::format("  {}: {:.4f}\n", joint, degrees(angle));
+  for (const auto& [joint, angle] : angles_rad) text += fmt::format("  {}: {:.4f}\n", yaml_name(joint), degrees(angle));
   return text;
 }
 
@@ -175,12 +176,12 @@ std::string mount_yaml(const CameraModel& camera, const CameraModel& first) {
   const CameraMount& mount = camera.mount;
   std::string text;
   if (mount.relative) {
-    text = fmt::format("    beside: {}\n    X_beside_optical: {}\n", first.name, pose_yaml(mount.X_PC));
+    text = fmt::format("    beside: {}\n    X_beside_optical: {}\n", yaml_name(first.name), pose_yaml(mount.X_PC));
   } else if (camera.link == mount.parent) {
-    text = fmt::format("    link: {}\n", camera.link);
+    text = fmt::format("    link: {}\n", yaml_name(camera.link));
     if (mount.knowledge == PlaceKnowledge::kExact) return text;
   } else {
-    text = fmt::format("    link: {}\n    X_link_optical: {}\n", mount.parent, pose_yaml(mount.X_PC));
+    text = fmt::format("    link: {}\n    X_link_optical: {}\n", yaml_name(mount.parent), pose_yaml(mount.X_PC));
   }
   constexpr std::array<const char*, 4> kKnowledge = {"exact", "known", "roughly", "unknown"};
   text += fmt::format("    pose: {}\n", kKnowledge[static_cast<std::size_t>(mount.knowledge)]);
@@ -202,8 +203,8 @@ std::string cameras_yaml(const StereoRig& rig) {
     text += fmt::format(
         "  {}:\n{}    image_type: {}\n    width: {}\n    height: {}\n    fx: {:.4f}\n    fy: {:.4f}\n"
         "    cx: {:.4f}\n    cy: {:.4f}\n    distortion: [{:.6g}, {:.6g}, {:.6g}, {:.6g}, {:.6g}]\n",
-        camera.name, mount_yaml(camera, rig.cameras.front()), camera.number(), k.width, k.height, k.fx, k.fy, k.cx,
-        k.cy, d[0], d[1], d[2], d[3], d[4]);
+        yaml_name(camera.name), mount_yaml(camera, rig.cameras.front()), camera.number(), k.width, k.height, k.fx, k.fy,
+        k.cx, k.cy, d[0], d[1], d[2], d[3], d[4]);
   }
   return text;
 }

@@ -7,13 +7,6 @@
 namespace bodyschema {
 namespace {
 
-Instant at_rest(Eigen::Index joints, std::size_t camera) {
-  Instant at;
-  at.camera = camera;
-  at.encoder = at.q = at.qdot = at.qddot = Eigen::VectorXd::Zero(joints);
-  return at;
-}
-
 /// Where an adjustment puts the joint, in terms of the URDF: along its axis as written there; a shift
 /// and a rotation vector in its parent's frame.
 JointPlacement placed(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup, const StereoRig& rig,
@@ -71,9 +64,7 @@ JointPlacement shifted_base(const std::shared_ptr<const RobotModel>& robot, cons
 /// A camera's corrected frame in its own of the URDF; nothing where it stays.
 std::optional<Pose> camera_motion(const std::shared_ptr<const RobotModel>& robot, const RobotSetup& setup,
                                   const StereoRig& rig, std::size_t camera, const Corrections& change) {
-  std::vector<std::string> links;
-  for (const auto& c : rig.cameras) links.push_back(c.link);
-  CorrectedKinematics kinematics(robot, {setup.hand_link}, links);
+  CorrectedKinematics kinematics(robot, {setup.hand_link}, rig.links());
   const auto q = setup.default_joints(*robot);
   Corrections cameras_alone(robot->joint_count(), change.shapes.size());
   std::vector<Pose> X_CP(1);
@@ -103,7 +94,7 @@ StereoRig corrected_rig(const ErrorModel& model, const std::shared_ptr<const Rob
   std::vector<Pose> moved(rig.cameras.size(), Pose::Identity());
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     Corrections change = model.roles().no_corrections();
-    model.corrections(at_rest(robot->joint_count(), c), change);
+    model.corrections(Instant::at_rest(Eigen::VectorXd::Zero(robot->joint_count()), c), change);
     const auto motion = camera_motion(robot, setup, rig, c, change);
     if (motion) moved[c] = *motion;
     if (is_link_of_urdf(rig.cameras[c])) continue;
@@ -131,14 +122,15 @@ std::vector<AppliedEffect> add_effects(const ErrorModel& model, const std::share
     } else if (kind.home == EffectHome::kUrdf) {
       entry.applied = "corrected.urdf";
       for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-        effect.apply(at_rest(joints, c), cameras[c]);
+        effect.apply(Instant::at_rest(Eigen::VectorXd::Zero(joints), c), cameras[c]);
         Corrections own = model.roles().no_corrections();
-        effect.apply(at_rest(joints, c), own);
+        effect.apply(Instant::at_rest(Eigen::VectorXd::Zero(joints), c), own);
         if (!is_link_of_urdf(rig.cameras[c]) && camera_motion(robot, setup, rig, c, own))
           entry.applied = "cameras.yaml";
       }
       Corrections change = model.roles().no_corrections();
-      effect.apply(at_rest(joints, 0), change);  // what is no camera's changes for all of them alike
+      effect.apply(Instant::at_rest(Eigen::VectorXd::Zero(joints), 0),
+                   change);  // what is no camera's changes for all of them alike
       if (moves_rig(change.camera) && model.roles().neck.size() < model.roles().head.size()) {
         entry.remark = "for eyes that stand at their default angles";
       }

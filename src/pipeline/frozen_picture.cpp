@@ -29,12 +29,11 @@ std::uint64_t digest_of(const Image& image) {
 
 PictureChange FrozenPicture::look(const Image& image, const Eigen::VectorXd& q) {
   const std::uint64_t digest = digest_of(image);
-  change_.repeated = !first_ && digest == digest_ && q.size() == q_.size();
+  change_.repeated = digest == digest_ && q.size() == q_.size();
   if (change_.repeated) {
     change_.moved_rad = std::max(change_.moved_rad, (q - q_).cwiseAbs().maxCoeff());
     return change_;
   }
-  first_ = false;
   digest_ = digest;
   q_ = q;
   change_.moved_rad = 0.0;

@@ -7,6 +7,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/write_file.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
+#include "bodyschema/vision/mask_operations.hpp"
 
 namespace bodyschema {
 namespace {
@@ -50,19 +51,11 @@ cv::Rect shown_part(const OverlayView& view) {
 
 /// What both outlines lie in; empty where there are none.
 cv::Rect arm_in(const OverlayView& view) {
-  int left = view.image->width, top = view.image->height, right = -1, bottom = -1;
+  cv::Rect arm;
   for (const BinaryMask* mask : {&view.nominal, &view.corrected}) {
-    for (int v = 0; v < mask->height(); ++v) {
-      for (int u = 0; u < mask->width(); ++u) {
-        if (!mask->at(u, v)) continue;
-        left = std::min(left, u);
-        right = std::max(right, u);
-        top = std::min(top, v);
-        bottom = std::max(bottom, v);
-      }
-    }
+    if (const PixelBox box = bounding_box(*mask); !box.empty()) arm |= {box.u0, box.v0, box.width(), box.height()};
   }
-  return right < 0 ? cv::Rect() : cv::Rect(left, top, right - left + 1, bottom - top + 1);
+  return arm;
 }
 
 /// Text and lines of a page, in sizes of a phone's pixels.
@@ -184,6 +177,11 @@ Image draw_overlay(const std::vector<OverlayView>& views, const std::string& cap
     picture = picture(cv::Rect(shown.tl() * enlargement, shown.size() * enlargement)).clone();
     if (!caption.empty()) draw_scale_bar(picture, pen, view.px_per_m * enlargement);
     pictures.push_back(picture);
+  }
+  int rows = 0;
+  for (const auto& picture : pictures) rows = std::max(rows, picture.rows);
+  for (auto& picture : pictures) {  // cameras may differ in size
+    cv::copyMakeBorder(picture, picture, 0, rows - picture.rows, 0, 0, cv::BORDER_CONSTANT);
   }
   cv::Mat page;
   cv::hconcat(pictures, page);

@@ -70,12 +70,6 @@ ErrorModel effects_beside(const std::optional<ErrorModel>& model, const std::sha
   return rest;
 }
 
-std::vector<std::string> links_of(const StereoRig& rig) {
-  std::vector<std::string> links;
-  for (const auto& camera : rig.cameras) links.push_back(camera.link);
-  return links;
-}
-
 VisionSetup by(std::optional<SegmentationMethod> method, VisionSetup vision) {
   if (method) vision.method = *method;
   return vision;
@@ -91,7 +85,7 @@ Pipeline::Pipeline(const Configuration& configuration, std::optional<Segmentatio
       error_model_(load_error_model(setup_, robot_, sent_)),
       rig_(corrected(as_read(sent_, reading, vision_, options_.mode), error_model_)),
       beliefs_(Beliefs::from(configuration, JointRoles::of(robot_, setup_, rig_), rig_, options_)),
-      readouts_s_(readouts_of(configuration.section("cameras"), rig_)), background_watch_(robot_, links_of(rig_)),
+      readouts_s_(readouts_of(configuration.section("cameras"), rig_)), background_watch_(robot_, rig_.links()),
       background_turned_rad_(rig_.cameras.size(), 0.0),
       estimator_(robot_, setup_, rig_, beliefs_, options_,
                  effects_beside(error_model_, robot_, setup_, rig_, readouts_s_)),
@@ -315,6 +309,7 @@ void Pipeline::find_masks(Observation& observation) {
     changes_[c] = look.change;
     if (look.straightened) seen.image = std::move(*look.straightened);
     seen.mask = std::move(look.mask);
+    seen.mask_is_given = vision_.method == SegmentationMethod::kGiven;
     seen.valid = std::move(look.valid);
     seen.coverage = std::move(look.coverage);
     learning_ = learning_ || look.learning;

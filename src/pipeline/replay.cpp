@@ -249,7 +249,7 @@ class Replay {
     last_ = *converged_;
   }
 
-  /// Error of the estimate each frame had at its time, last frames only, see finish().
+  /// Error of the estimate each frame had at its time; of which frames it is reported, finish() says.
   void online_error(const Estimate& estimate) {
     std::array<std::optional<std::pair<HandError, HandError>>, 2> both;
     for (std::size_t c = 0; c < pipeline_.rig().cameras.size(); ++c) {

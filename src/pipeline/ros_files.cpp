@@ -11,6 +11,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/write_file.hpp"
+#include "bodyschema/core/yaml_name.hpp"
 #include "bodyschema/robot/urdf_origin.hpp"
 
 namespace bodyschema {
@@ -39,15 +40,6 @@ std::vector<std::pair<std::string, Origin>> origins_of(const std::filesystem::pa
     all.emplace_back(joint->Attribute("name"), Origin{triple("xyz"), triple("rpy")});
   }
   return all;
-}
-
-/// In quotes where a name has other characters than YAML takes as they are.
-std::string quoted(const std::string& name) {
-  const bool plain = !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
-  });
-  const bool word = plain && !(name[0] >= '0' && name[0] <= '9');
-  return word ? name : nlohmann::json(name).dump();
 }
 
 /// In an XML attribute.
@@ -111,8 +103,8 @@ std::string calibration_yaml(const std::filesystem::path& urdf, const std::files
     text += fmt::format(
         "  {}:\n    x: {:.12g}\n    y: {:.12g}\n    z: {:.12g}\n    roll: {:.12g}\n    pitch: {:.12g}\n"
         "    yaw: {:.12g}\n    offset: {:.9g}\n",
-        quoted(joint), origin.xyz.x(), origin.xyz.y(), origin.xyz.z(), origin.rpy.x(), origin.rpy.y(), origin.rpy.z(),
-        offset == offsets.end() ? 0.0 : offset->second);
+        yaml_name(joint), origin.xyz.x(), origin.xyz.y(), origin.xyz.z(), origin.rpy.x(), origin.rpy.y(),
+        origin.rpy.z(), offset == offsets.end() ? 0.0 : offset->second);
     if (const auto sd = sds.find(joint); sd != sds.end()) text += fmt::format("    offset_sd: {:.6g}\n", sd->second);
   }
   return any ? text : text + "  {}\n";
@@ -130,8 +122,8 @@ std::string camera_info_yaml(const RosCamera& camera, const Correction& correcti
              "rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
              "projection_matrix:\n  rows: 3\n  cols: 4\n  data: [{:.9g}, 0, {:.9g}, 0, 0, {:.9g}, {:.9g}, 0, 0, 0, 1, "
              "0]\n",
-             k.width, k.height, quoted(camera.name), k.fx, k.cx, k.fy, k.cy, d[0], d[1], d[2], d[3], d[4], k.fx, k.cx,
-             k.fy, k.cy);
+             k.width, k.height, yaml_name(camera.name), k.fx, k.cx, k.fy, k.cy, d[0], d[1], d[2], d[3], d[4], k.fx,
+             k.cx, k.fy, k.cy);
 }
 
 std::string static_transforms(const std::vector<RosCamera>& cameras, const Correction& correction) {

@@ -12,6 +12,7 @@
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/nearest_name.hpp"
 #include "bodyschema/core/write_file.hpp"
+#include "bodyschema/core/yaml_name.hpp"
 #include "bodyschema/imports/camera_pose_file.hpp"
 #include "bodyschema/imports/stills.hpp"
 #include "bodyschema/pipeline/pipeline.hpp"
@@ -36,6 +37,9 @@ constexpr double kBeside_sd_mm = 0.5, kTilted_sd_deg = 0.1, kFocal_sd_percent = 
 constexpr double kLag_sd_ms = 60.0;
 /// Of a camera's principal point, share of the width: by which calibrations of one camera differ.
 constexpr double kCentre_share = 0.005;
+/// px of a 320x240 picture: masks lie outside or inside all around by a share of what they resolve
+/// (config/estimator.yaml).
+constexpr double kBias_sd_px = 0.15;
 /// Of a lens of which nobody says anything: fields of view from 40 to 90 deg, sensors that are 2 % off the axis.
 constexpr double kGuessedFocal_sd_percent = 25.0;
 constexpr double kGuessedCentre_share = 0.02;
@@ -44,25 +48,9 @@ bool among(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-std::string yaml(const std::string& name) {
-  static constexpr const char* kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-";
-  if (!name.empty() && name.find_first_not_of(kPlain) == std::string::npos && name[0] != '-') return name;
-  std::string text = "\"";
-  for (const char c : name) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x20 || byte == 0x7f) {
-      text += fmt::format("\\x{:02x}", byte);
-    } else {
-      if (c == '"' || c == '\\') text += '\\';
-      text += c;
-    }
-  }
-  return text + "\"";
-}
-
 std::string list(const std::vector<std::string>& names) {
   std::vector<std::string> quoted;
-  for (const auto& name : names) quoted.push_back(yaml(name));
+  for (const auto& name : names) quoted.push_back(yaml_name(name));
   return fmt::format("[{}]", fmt::join(quoted, ", "));
 }
 
@@ -530,7 +518,7 @@ class Starter {
         "version: 1\n\nrobot:\n  urdf: {}\n"
         "  mesh_search_roots: {}             # folders in which package://... is looked for\n"
         "  # What the cameras see of the robot; leave out what is always hidden.\n",
-        yaml(o_.urdf.filename().string()), yaml(from_here(o_.urdf)), list(roots));
+        yaml_name(o_.urdf.filename().string()), yaml_name(from_here(o_.urdf)), list(roots));
     if (!base_.empty()) {
       text += fmt::format(
           "  # {} and the cameras do not move against each other: with vision.method learned_background or\n"
@@ -541,12 +529,12 @@ class Starter {
         "  rendered_links: {}\n  hand_link: {}\n"
         "  fingertip_links: []               # links at the fingertips, for errors there\n"
         "  estimated_joints: {}\n",
-        list(parts_.rendered), yaml(hand_), list(parts_.arm));
+        list(parts_.rendered), yaml_name(hand_), list(parts_.arm));
     if (!parts_.head.empty()) text += fmt::format("  head_joints: {}\n", list(parts_.head));
     const auto fix = [&](const char* unit, const std::vector<std::string>& joints) {
       if (joints.empty()) return;
       text += fmt::format("  # {0}; take out the joints that the robot publishes.\n  fixed_joints_{0}:\n", unit);
-      for (const auto& joint : joints) text += fmt::format("    {}: 0\n", yaml(joint));
+      for (const auto& joint : joints) text += fmt::format("    {}: 0\n", yaml_name(joint));
     };
     fix("deg", parts_.others);
     fix("m", parts_.others_m);
@@ -581,23 +569,23 @@ class Starter {
 
   [[nodiscard]] std::string camera_yaml(std::size_t c) const {
     const StarterCamera& camera = cameras_[c];
-    std::string text = fmt::format("  {}:\n", yaml(camera.name));
+    std::string text = fmt::format("  {}:\n", yaml_name(camera.name));
     if (camera.X_base) {
-      text += fmt::format("    link: {}\n    X_link_optical: {}\n{}", yaml(camera.link), pose_yaml(*camera.X_base),
+      text += fmt::format("    link: {}\n    X_link_optical: {}\n{}", yaml_name(camera.link), pose_yaml(*camera.X_base),
                           roughly());
     } else if (!camera.unknown()) {
-      text += fmt::format("    link: {}\n{}", yaml(camera.link), roughly());
+      text += fmt::format("    link: {}\n{}", yaml_name(camera.link), roughly());
     } else if (camera.X_first) {
       text += fmt::format(
           "    beside: {}                    # as their calibration says; x right, y down, z forward\n"
           "    X_beside_optical: {}\n    pose: roughly\n    pose_sd_deg: {}\n    pose_sd_mm: {}\n",
-          yaml(cameras_.front().name), pose_yaml(*camera.X_first), kPairSd_deg, kPairSd_mm);
+          yaml_name(cameras_.front().name), pose_yaml(*camera.X_first), kPairSd_deg, kPairSd_mm);
     } else {
       text += fmt::format(
           "    link: {}                    # what carries the camera; where on it, is to be found:\n"
           "    pose: unknown                   # or exact, known, or roughly: X_link_optical, pose_sd_deg, "
           "pose_sd_mm\n",
-          yaml(urdf_.root()));
+          yaml_name(urdf_.root()));
     }
     const auto& k = camera.k;
     text += fmt::format(
@@ -625,7 +613,7 @@ class Starter {
         masks_     ? "auto, without masks"
         : learned_ ? "auto, where the cameras move"
                    : "single_colour, learned_background",
-        yaml(o_.channel_prefix));
+        yaml_name(o_.channel_prefix));
     text += state_yaml();
     if (!in_degrees_ && strangers_.empty()) return text;
     text += "# Which column of a recording is which joint; docs/import_recordings.md.\nimport:\n";
@@ -633,8 +621,8 @@ class Starter {
     if (strangers_.empty()) return text;
     text += "  joints:\n";
     for (const auto& name : strangers_) {
-      text +=
-          fmt::format("    {}: \"-\"   # a joint of {}; \"-\": left out\n", yaml(name), o_.urdf.filename().string());
+      text += fmt::format("    {}: \"-\"   # a joint of {}; \"-\": left out\n", yaml_name(name),
+                          o_.urdf.filename().string());
     }
     return text;
   }
@@ -660,9 +648,16 @@ class Starter {
           fmt::format("    focal_length: {{sd_percent: {}}}       # a guess; take this out with your cameras' own\n",
                       kGuessedFocal_sd_percent);
     }
+    double width = 0.0, unit_px = 1.0;
+    for (const auto& camera : cameras_) {
+      width = std::max(width, static_cast<double>(camera.k.width));
+      unit_px = std::max(unit_px, picture_unit(camera.k));
+    }
+    if (unit_px > 1.0) {
+      text += fmt::format("    silhouette_bias: {{sd_px: {:.2f}}}   # as {} of a picture of 320x240\n",
+                          kBias_sd_px * unit_px, kBias_sd_px);
+    }
     if (focal_guessed() || stills_) {
-      double width = 0.0;
-      for (const auto& camera : cameras_) width = std::max(width, static_cast<double>(camera.k.width));
       const double sd_px = (focal_guessed() ? kGuessedCentre_share : kCentre_share) * width;
       text += fmt::format("    principal_point common: {{sd_px: {:.1f}}} # {}\n", sd_px,
                           focal_guessed() ? "a guess as well" : "of calibrations of one camera after the other");
@@ -687,7 +682,7 @@ class Starter {
         "  motion:\n"
         "    posture_deg: {{}}                 # of head and fingers; left out: robot.fixed_joints_deg, else 0\n"
         "    hand_radius_m: 0.1              # m; kept inside the pictures around the hand\n",
-        yaml(o_.channel_prefix));
+        yaml_name(o_.channel_prefix));
   }
 
   static void write_new(const fs::path& file, const std::string& text) {

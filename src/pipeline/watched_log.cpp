@@ -1,6 +1,7 @@
 #include "bodyschema/pipeline/watched_log.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <optional>
 
 #include "bodyschema/bus/log.hpp"
@@ -22,8 +23,8 @@ class Raster {
  public:
   explicit Raster(double rate_hz) : period_(microseconds(1.0 / rate_hz)) {}
   bool takes(Microseconds utime) {
-    if (due_ >= 0 && utime < due_) return false;
-    due_ = due_ < 0 || utime > due_ + period_ ? utime + period_ : due_ + period_;
+    if (due_ >= 0 && utime < due_ && due_ - utime <= period_) return false;
+    due_ = due_ < 0 || std::abs(utime - due_) > period_ ? utime + period_ : due_ + period_;  // or a clock stepped back
     return true;
   }
 
@@ -98,7 +99,7 @@ class Watcher {
         pictures_to_see_ += static_cast<std::size_t>(
             std::count_if(o.cameras.begin(), o.cameras.end(), [](const auto& camera) { return camera.has_value(); }));
       }
-      if (last >= 0 && o.utime - last < kLearnEvery) return true;
+      if (last >= 0 && std::abs(o.utime - last) < kLearnEvery) return true;
       last = o.utime;
       pipeline_.learn_from(o);
       return true;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "bodyschema/geometry/pinhole.hpp"
+#include "bodyschema/vision/mask_operations.hpp"
 #include "pack_bits.hpp"
 
 namespace bodyschema {
@@ -76,7 +78,7 @@ std::size_t RobotLooks::cell(const std::uint8_t* p, int channels) {
 }
 
 void ColourEvidence::look_at(const BinaryMask& predicted, double reach_px, bool whole) {
-  unit_ = std::sqrt(static_cast<double>(predicted.width()) * predicted.height() / (320.0 * 240.0));
+  unit_ = picture_unit(predicted.width(), predicted.height());
   reach_px_ = reach_px;
   rough_ = reach_px > kRough_px * unit_;
   predicted_ = predicted;
@@ -90,14 +92,7 @@ void ColourEvidence::look_at(const BinaryMask& predicted, double reach_px, bool 
     band_.fill(false);
     return;
   }
-  for (int v = box_.v0; v <= box_.v1; ++v) {
-    for (int w = box_.u0 >> 6; w <= box_.u1 >> 6; ++w) {
-      std::uint64_t bits = ~std::uint64_t{0};
-      if (w == box_.u0 >> 6) bits <<= box_.u0 & 63;
-      if (w == box_.u1 >> 6) bits &= ~std::uint64_t{0} >> (63 - (box_.u1 & 63));
-      in_box_.row(v)[w] = bits;
-    }
-  }
+  for (int v = box_.v0; v <= box_.v1; ++v) set_run(in_box_, v, box_.u0, box_.u1 + 1, true);
   first_u_ = box_.u0 & ~63;
   stride_ = static_cast<std::size_t>((box_.u1 | 63) + 1 - first_u_) + 1;
   tile_px_ = std::max(8, static_cast<int>(kTile_px * unit_));

@@ -20,8 +20,7 @@ class LocalAverage {
   /// @param beside_px  nearer than this to the robot pixels are mixtures
   /// @param radius  half side of the squares that are averaged, px
   /// @param local  in: noise_sd; out: mean and precision of wanted pixels of the box. A varied background is as
-  /// uncertain
-  ///   as it is varied.
+  ///   uncertain as it is varied.
   void around(const Image& image, const BinaryMask& robot, const BinaryMask& wanted, const PixelBox& box, int beside_px,
               int radius, BackgroundModel& local);
 

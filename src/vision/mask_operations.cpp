@@ -209,9 +209,7 @@ void ComponentFilter::label(const BinaryMask& mask, bool value, bool eight_conne
   }
 }
 
-namespace {
-
-void assign(BinaryMask& mask, int v, int begin, int end, bool value) {
+void set_run(BinaryMask& mask, int v, int begin, int end, bool value) {
   auto* row = mask.row(v);
   for (int u = begin; u < end;) {
     const int stop = std::min((u | 63) + 1, end);
@@ -226,14 +224,12 @@ void assign(BinaryMask& mask, int v, int begin, int end, bool value) {
   }
 }
 
-}  // namespace
-
 void ComponentFilter::remove_small(BinaryMask& mask, int min_px) {
   if (min_px <= 1) return;
   label(mask, true, true);
   for (std::size_t i = 0; i < runs_.size(); ++i) {
     const auto& piece = runs_[static_cast<std::size_t>(root(static_cast<int>(i)))];
-    if (piece.area < min_px) assign(mask, runs_[i].v, runs_[i].begin, runs_[i].end, false);
+    if (piece.area < min_px) set_run(mask, runs_[i].v, runs_[i].begin, runs_[i].end, false);
   }
 }
 
@@ -252,7 +248,7 @@ void ComponentFilter::fill_small_holes(BinaryMask& mask, int max_px) {
   for (std::size_t i = 0; i < runs_.size(); ++i) {
     const auto& piece = runs_[static_cast<std::size_t>(root(static_cast<int>(i)))];
     if (!piece.on_border && piece.area <= max_px) {
-      assign(mask, runs_[i].v, runs_[i].begin, runs_[i].end, true);
+      set_run(mask, runs_[i].v, runs_[i].begin, runs_[i].end, true);
     }
   }
 }

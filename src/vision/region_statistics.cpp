@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "bodyschema/vision/robot_looks.hpp"
 #include "learned_background.hpp"
 
 namespace bodyschema {
@@ -42,18 +43,17 @@ float noise_of(const Image& image) {
   return std::max(noise_from_differences(histogram) / 6.0f, kLeastNoiseSd);
 }
 
-std::size_t RegionStatistics::bin(const Image& image, std::size_t pixel) {
-  constexpr int kShift = 8 - kBits;
-  const auto* p = image.data.data() + pixel * static_cast<std::size_t>(image.channels);
-  // Gray pictures use their levels in full in one channel's place.
-  if (image.channels == 1) return p[0];
-  return (static_cast<std::size_t>(p[0] >> kShift) << (2 * kBits)) |
-         (static_cast<std::size_t>(p[1] >> kShift) << kBits) | static_cast<std::size_t>(p[2] >> kShift);
+namespace {
+
+std::size_t cell_of(const Image& image, std::size_t pixel) {
+  return RobotLooks::cell(image.data.data() + pixel * static_cast<std::size_t>(image.channels), image.channels);
 }
+
+}  // namespace
 
 float RegionStatistics::collect(const Image& image, const BinaryMask& where, const PixelBox& box,
                                 Histogram& histogram) {
-  histogram.assign(kBins, 0.0f);
+  histogram.assign(RobotLooks::kCells, 0.0f);
   float count = 0.0f;
   for (int v = box.v0; v <= box.v1; ++v) {
     const auto* row = where.row(v);
@@ -61,7 +61,7 @@ float RegionStatistics::collect(const Image& image, const BinaryMask& where, con
     for (int w = box.u0 >> 6; w <= box.u1 >> 6; ++w) {
       for (std::uint64_t word = row[w]; word != 0; word &= word - 1) {
         const auto u = static_cast<std::size_t>(64 * w + std::countr_zero(word));
-        histogram[bin(image, begin + u)] += 1.0f;
+        histogram[cell_of(image, begin + u)] += 1.0f;
         count += 1.0f;
       }
     }
@@ -71,8 +71,8 @@ float RegionStatistics::collect(const Image& image, const BinaryMask& where, con
 
 void RegionStatistics::measure_depth(const BinaryMask& predicted, int reach) {
   const auto width = static_cast<std::size_t>(predicted.width());
-  const auto far = static_cast<std::int8_t>(reach + 1);
-  depth_.assign(width * static_cast<std::size_t>(predicted.height()), static_cast<std::int8_t>(-far));
+  const auto far = static_cast<std::int16_t>(reach + 1);
+  depth_.assign(width * static_cast<std::size_t>(predicted.height()), static_cast<std::int16_t>(-far));
   const auto add = [&](const BinaryMask& mask) {
     for (int v = box_.v0; v <= box_.v1; ++v) {
       const auto* row = mask.row(v);
@@ -102,16 +102,16 @@ void RegionStatistics::measure_depth(const BinaryMask& predicted, int reach) {
 void RegionStatistics::decide(const Image& image, int reach, BinaryMask& robot) {
   float robot_count = 0.0f;
   float background_count = 0.0f;
-  for (std::size_t i = 0; i < kBins; ++i) {
+  for (std::size_t i = 0; i < RobotLooks::kCells; ++i) {
     robot_count += robot_histogram_[i];
     background_count += background_histogram_[i];
   }
-  evidence_.resize(kBins);
+  evidence_.resize(RobotLooks::kCells);
   const float robot_scale = 1.0f / (robot_count + 1.0f);
   const float background_scale = 1.0f / (background_count + 1.0f);
   // A colour that neither side has shown says nothing.
   constexpr float kFloor = 1e-4f;
-  for (std::size_t i = 0; i < kBins; ++i) {
+  for (std::size_t i = 0; i < RobotLooks::kCells; ++i) {
     const float odds =
         (robot_histogram_[i] * robot_scale + kFloor) / (background_histogram_[i] * background_scale + kFloor);
     evidence_[i] = std::clamp(std::log(odds), -kMostLogOdds, kMostLogOdds);
@@ -125,7 +125,7 @@ void RegionStatistics::decide(const Image& image, int reach, BinaryMask& robot) 
   robot.fill(false);
   const auto sum_row = [&](int v) {
     const auto begin = static_cast<std::size_t>(v) * width + static_cast<std::size_t>(box_.u0);
-    for (std::size_t u = 0; u < columns; ++u) odds_[u + 1] = evidence_[bin(image, begin + u)];
+    for (std::size_t u = 0; u < columns; ++u) odds_[u + 1] = evidence_[cell_of(image, begin + u)];
     odds_[0] = odds_[1];
     odds_[columns + 1] = odds_[columns];
     float* out = row_sums_.data() + static_cast<std::size_t>(v % 3) * columns;
@@ -173,17 +173,9 @@ void RegionStatistics::separate(const Image& image, const BinaryMask& predicted,
   morphology_.dilate(outside_, std::max(reach / 2, 2));
   const auto invert = [&](BinaryMask& mask) {
     work_ = mask;
-    mask.fill(true);
+    mask.fill(false);
+    for (int v = box_.v0; v <= box_.v1; ++v) set_run(mask, v, box_.u0, box_.u1 + 1, true);
     mask -= work_;
-    for (int v = 0; v < mask.height(); ++v) {
-      auto* row = mask.row(v);
-      for (int w = 0; w < mask.words_per_row(); ++w) {
-        std::uint64_t keep = v < box_.v0 || v > box_.v1 ? 0 : ~std::uint64_t{0};
-        if (64 * w < box_.u0) keep &= box_.u0 - 64 * w >= 64 ? 0 : ~std::uint64_t{0} << (box_.u0 - 64 * w);
-        if (64 * w + 63 > box_.u1) keep &= box_.u1 < 64 * w ? 0 : ~std::uint64_t{0} >> (64 * w + 63 - box_.u1);
-        row[w] &= keep;
-      }
-    }
   };
   invert(outside_);
 
@@ -191,7 +183,7 @@ void RegionStatistics::separate(const Image& image, const BinaryMask& predicted,
     const float robot_count = collect(image, inside_, box_, robot_histogram_);
     collect(image, outside_, box_, background_histogram_);
     if (!remembered_.empty()) {
-      for (std::size_t i = 0; i < kBins; ++i) robot_histogram_[i] += remembered_[i] * robot_count;
+      for (std::size_t i = 0; i < RobotLooks::kCells; ++i) robot_histogram_[i] += remembered_[i] * robot_count;
     }
     decide(image, reach, robot);
     if (round > 0) break;
@@ -211,7 +203,7 @@ void RegionStatistics::separate(const Image& image, const BinaryMask& predicted,
       remembered_ = robot_histogram_;
       for (auto& value : remembered_) value /= count;
     } else {
-      for (std::size_t i = 0; i < kBins; ++i) {
+      for (std::size_t i = 0; i < RobotLooks::kCells; ++i) {
         remembered_[i] = kHistogramMemory * remembered_[i] + (1.0f - kHistogramMemory) * robot_histogram_[i] / count;
       }
     }

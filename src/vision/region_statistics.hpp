@@ -27,11 +27,8 @@ class RegionStatistics {
                 BackgroundModel& local);
 
  private:
-  static constexpr int kBits = 4;  // per channel
-  static constexpr std::size_t kBins = std::size_t{1} << (3 * kBits);
   using Histogram = std::vector<float>;
 
-  [[nodiscard]] static std::size_t bin(const Image& image, std::size_t pixel);
   static float collect(const Image& image, const BinaryMask& where, const PixelBox& box, Histogram& histogram);
   void measure_depth(const BinaryMask& predicted, int reach);
   void decide(const Image& image, int reach, BinaryMask& robot);
@@ -40,8 +37,8 @@ class RegionStatistics {
   MaskMorphology morphology_;
   BinaryMask inside_, outside_, work_;
   Histogram robot_histogram_, remembered_, background_histogram_;
-  std::vector<float> evidence_;     ///< log odds by colour
-  std::vector<std::int8_t> depth_;  ///< steps inside (positive) or outside the prediction
+  std::vector<float> evidence_;      ///< log odds by colour
+  std::vector<std::int16_t> depth_;  ///< steps inside (positive) or outside the prediction
   std::vector<float> row_sums_, odds_;
   LocalAverage average_;
 };

@@ -4,7 +4,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <optional>
 
 #include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/core/error.hpp"
@@ -49,20 +48,6 @@ float noise_against(const Image& frame, const BackgroundModel& background) {
     }
   }
   return noise_from_differences(histogram);
-}
-
-/// The length that one pixel of a 320x240 picture has.
-double unit_of(int width, int height) {
-  return std::sqrt(static_cast<double>(width) * height / (320.0 * 240.0));
-}
-
-/// Lengths and areas of the configuration are those of a 320x240 picture: in larger ones they grow with it.
-VisionSetup in_pixels_of(VisionSetup setup, int width, int height) {
-  const double unit = std::max(1.0, unit_of(width, height)), area = unit * unit;
-  setup.search_px = static_cast<int>(std::lround(setup.search_px * unit));
-  setup.min_component_px = static_cast<int>(std::min(setup.min_component_px * area, 1e9));
-  setup.max_hole_px = static_cast<int>(std::min(setup.max_hole_px * area, 1e9));
-  return setup;
 }
 
 // Of `auto`. Lengths are those of a 320x240 picture.
@@ -134,7 +119,7 @@ BackgroundModel load_background(const VisionSetup& setup, const std::string& cam
 
 struct Segmenter::Impl {
   Impl(const VisionSetup& s, std::string name, int w, int h)
-      : configured(s), setup(in_pixels_of(s, w, h)), camera(std::move(name)), width(w), height(h),
+      : configured(s), setup(s.in_pixels_of(w, h)), camera(std::move(name)), width(w), height(h),
         single_colour(s, w, h), learned(s, w, h), detected(w, h), sure(w, h), uncertain(w, h), robot(w, h),
         hits((static_cast<std::size_t>(w) + 63) / 64 * 64, 0) {}
 
@@ -157,7 +142,7 @@ struct Segmenter::Impl {
   void soften(BinaryMask& mask, std::vector<std::uint8_t>& coverage) const;
   void mark_valid(const BackgroundModel& model, BinaryMask& valid, const PixelBox& box);
   [[nodiscard]] int light_grid() const {
-    return std::max(kLightGrid, static_cast<int>(std::lround(kLightGrid * unit_of(width, height))));
+    return std::max(kLightGrid, static_cast<int>(std::lround(kLightGrid * picture_unit(width, height))));
   }
   [[nodiscard]] PixelBox everything() const { return {0, 0, width - 1, height - 1}; }
   /// The whole picture against a background that is known.
@@ -702,7 +687,7 @@ bool Segmenter::Impl::background_holds(const Image& image) {
 void Segmenter::Impl::measure_edge_noise(const Image& image) {
   const BackgroundModel& model = learned.model();
   const auto n = static_cast<std::size_t>(channels);
-  const auto unit = static_cast<float>(unit_of(width, height));
+  const auto unit = static_cast<float>(picture_unit(width, height));
   ratios.clear();
   const int every = evidence.sample_step();
   evidence.for_each_outside(kBesideFrom_px * unit, kBesideTo_px * unit, [&](int u, int v) {
@@ -765,7 +750,7 @@ void Segmenter::Impl::find_background(const Image& image, bool holds) {
       wanted.row(v)[w] &= ~known.row(v)[w];
     }
   }
-  const double unit = unit_of(width, height);
+  const double unit = picture_unit(width, height);
   const int beside_px = bleeds ? kBled_px : kMixed_px;
   for (const double radius_px : {kAverage_px, 2.0 * kAverage_px}) {
     const int reach_px = static_cast<int>(radius_px * unit) + beside_px - kMixed_px;
@@ -775,7 +760,7 @@ void Segmenter::Impl::find_background(const Image& image, bool holds) {
 
 void Segmenter::Impl::segment_auto(const Image& image, BinaryMask& mask, BinaryMask& valid,
                                    std::vector<std::uint8_t>& coverage, const PredictedRobot& predicted) {
-  const double unit = unit_of(width, height);
+  const double unit = picture_unit(width, height);
   const double reach_px = predicted.reach_px > 0.0 ? predicted.reach_px : setup.search_px;
   if (beside.width() != width || beside.height() != height) {
     beside = BinaryMask(width, height);
@@ -847,7 +832,7 @@ void Segmenter::Impl::adapt_auto(const Image& image, const BinaryMask& mask, con
   morphology.dilate(robot, 3);
   robot |= beside;
   // A prediction that nothing has confirmed yet may be far from the arm, whose ghost would stay in the background.
-  if (!predicted.trusted) morphology.dilate(robot, static_cast<int>(kFarOff_px * unit_of(width, height)));
+  if (!predicted.trusted) morphology.dilate(robot, static_cast<int>(kFarOff_px * picture_unit(width, height)));
   constexpr int kEager = 20;
   learned.update(seen, &robot, learned.frames_seen() < kEager);
   if (predicted.silhouette != nullptr && predicted.trusted) {

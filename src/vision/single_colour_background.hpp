@@ -17,9 +17,7 @@ class SingleColourBackground {
   SingleColourBackground(const VisionSetup& setup, int width, int height);
   /// Blocks near the present surface pull it along; the first frame finds the surface.
   void update(const Image& frame);
-  [[nodiscard]] bool ready() const { return ready_; }
   [[nodiscard]] const BackgroundModel& model() const { return model_; }
-  [[nodiscard]] BackgroundModel& model() { return model_; }
 
  private:
   static constexpr int kBlock = 4;

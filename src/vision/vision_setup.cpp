@@ -1,6 +1,9 @@
 #include "bodyschema/vision/vision_setup.hpp"
 
-#include <vector>
+#include <algorithm>
+#include <cmath>
+
+#include "bodyschema/geometry/pinhole.hpp"
 
 namespace bodyschema {
 
@@ -49,6 +52,15 @@ VisionSetup VisionSetup::from(const Configuration& vision) {
   setup.search_px = static_cast<int>(vision.integer_or("search_px", setup.search_px, 2, 64));
   setup.min_piece_share = vision.number_or("min_piece_share", setup.min_piece_share, 0.0, 1.0);
   if (vision.has("looks_file") && !vision.text("looks_file").empty()) setup.looks_file = vision.path("looks_file");
+  return setup;
+}
+
+VisionSetup VisionSetup::in_pixels_of(int width, int height) const {
+  const double unit = std::max(1.0, picture_unit(width, height)), area = unit * unit;
+  VisionSetup setup = *this;
+  setup.search_px = static_cast<int>(std::lround(search_px * unit));
+  setup.min_component_px = static_cast<int>(std::min(min_component_px * area, 1e9));
+  setup.max_hole_px = static_cast<int>(std::min(max_hole_px * area, 1e9));
   return setup;
 }
 

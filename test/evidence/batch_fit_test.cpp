@@ -35,7 +35,7 @@ TEST_F(BatchFitOfOwnRobot, FindsTheOffsetsAndKnowsHowWell) {
   EXPECT_LT(batch.estimate().covariance.diagonal().cwiseSqrt().maxCoeff(), radians(0.5));
   EXPECT_EQ(batch.state().x(), batch.estimate().x);
   EXPECT_EQ(batch.postures(), static_cast<std::size_t>(kPostures));
-  EXPECT_EQ(batch.posture_of().size(), 2u * kPostures);
+  EXPECT_EQ(batch.posture_by_picture().size(), 2u * kPostures);
   EXPECT_LT(batch.noise()[0].sd_px(), 0.3) << "drawn masks are smooth";
   EXPECT_LT(batch.at().rms_px(), 0.2);
   EXPECT_FALSE(batch.memory().most_stale()) << "all postures are linearised about the result";

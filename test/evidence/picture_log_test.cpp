@@ -24,6 +24,32 @@ TEST_F(PictureLogOfOwnRobot, HoldsThePicturesInOrderOfTheirOwnTimes) {
   }
 }
 
+TEST_F(PictureLogOfOwnRobot, FindsPicturesAndLeavesPixelsOut) {
+  const auto log = log_of(seen_);
+  const auto& last = log->pictures()[3];
+  EXPECT_EQ(log->find(last.camera, last.joints.utime), 3u);
+  EXPECT_EQ(log->find(last.camera, last.joints.utime + 1), std::nullopt);
+  BinaryMask corner(last.mask.width(), last.mask.height());
+  corner.set(0, 0);
+  log->leave_out(3, corner);
+  EXPECT_EQ(last.valid.count(), static_cast<std::size_t>(last.mask.width() * last.mask.height() - 1));
+  EXPECT_TRUE(log->pictures()[2].valid.empty());
+}
+
+/// Of a clock that stepped back, what came before and would stand behind is left out.
+TEST_F(PictureLogOfOwnRobot, ForgetsWhatAnotherClockPutsLater) {
+  PictureLog log(robot_, setup_, rig_);
+  for (auto& observation : seen_) log.add(observation);
+  const auto begin = seen_[0].utime;
+  seen_[1].encoders_begin_anew = true;
+  seen_[1].utime = begin - 5'000'000;
+  seen_[1].encoders.clear();
+  for (auto& camera : seen_[1].cameras) camera->utime = camera->joints.utime = seen_[1].utime;
+  log.add(seen_[1]);
+  EXPECT_EQ(log.pictures().size(), 2u);
+  EXPECT_TRUE(log.encoders().empty());
+}
+
 /// A simulator at rest, a driver that publishes twice: the same outlines at the same readings say nothing new.
 TEST_F(PictureLogOfOwnRobot, LeavesOutWhatRepeatsTheLast) {
   PictureLog log(robot_, setup_, rig_);

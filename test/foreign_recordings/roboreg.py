@@ -8,7 +8,7 @@ They are in the history of github.com/lbr-stack/roboreg (Apache-2.0), each with 
   lbr_near  KUKA LBR Med7, ZED 2i, one camera, 960x540, seven postures
 
 usage: roboreg.py CLONE OUT --robots lbr=URDF xarm=URDF [--sets ...] [--seeds N] [--postures N] [--no-masks]
-                  [--reversed]
+                  [--reversed] [--replay]
 
 CLONE is a clone of that repository. LBR's URDF comes with this project's test data; the xArm's is made by xacro from
 github.com/xArm-Developer/xarm_ros (meshes xarm7/visual, its default kinematics).
@@ -90,6 +90,16 @@ def calibrate(program, urdf, recorded, angles, joints, folder, masks):
     return json.loads((folder / "out/calibration.json").read_text())
 
 
+def replay(program, folder, result):
+    """What the service's code says at the end of a calibrated log, as text."""
+    command = [program, "replay", folder / "log", "--config", folder / "out/estimator.yaml", "--out", folder / "replay"]
+    subprocess.run(command, capture_output=True, check=True)
+    last = json.loads((folder / "replay/estimates.jsonl").read_text().splitlines()[-1])
+    apart = [abs(last["offset_deg"][joint] - result["offset_deg"][joint]) for joint in result["told"]]
+    return (f"  replayed: {last['state']}, hand {last['hand_sd_mm']:.1f} mm (limit {last['hand_sd_limit_mm']:.1f}), told "
+            f"offsets {max(apart, default=math.nan):.2f} deg from these at most")
+
+
 def line_of(name, tag, result, hidden_deg):
     """What is printed of a result, and whether it is `good` and wrong."""
     first, *others = result["offset_deg"]
@@ -116,6 +126,7 @@ def main():
     parser.add_argument("--postures", type=int)
     parser.add_argument("--no-masks", action="store_true")
     parser.add_argument("--reversed", action="store_true")
+    parser.add_argument("--replay", action="store_true")
     parser.add_argument("--program", default=str(SOURCE / "build/release/bin/bodyschema"))
     arguments = parser.parse_args()
     robots = dict(robot.split("=", 1) for robot in arguments.robots)
@@ -147,7 +158,7 @@ def main():
             shown = sorted(source.sample(every, arguments.postures or len(every)))
             result = played(str(seed), {i: angles[i] + np.radians(hidden) for i in shown})
             line, wrong, errors = line_of(name, str(seed), result, dict(zip(joints, hidden)))
-            print(line, flush=True)
+            print(line + (replay(arguments.program, folder / str(seed), result) if arguments.replay else ""), flush=True)
             any_wrong |= wrong
             if result["state"] == "good":
                 found.append(errors)

@@ -33,6 +33,13 @@ TEST(Overlay, DrawsBothOutlinesSideBySide) {
   EXPECT_GT(green, 40);
 }
 
+TEST(Overlay, CamerasMayDifferInSize) {
+  Image low(40, 30, 1), high(30, 50, 1);
+  const Image page = draw_overlay({{&low, {}, {}}, {&high, {}, {}}}, "", 2);
+  EXPECT_EQ(page.width, 2 * (40 + 30));
+  EXPECT_EQ(page.height, 2 * 50);
+}
+
 TEST(Overlay, ShowsTheArmAlone) {
   Image gray(400, 300, 1);
   BinaryMask left(400, 300), right(400, 300);

@@ -398,6 +398,21 @@ TEST_F(StarterConfiguration, TwoCalibrationsAreTwoCameras) {
   EXPECT_TRUE(cameras[1].mount.X_PC.translation().isApprox(Eigen::Vector3d(0.12, 0, 0), 1e-6));
 }
 
+/// Masks lie outside or inside all around by a share of what they resolve.
+TEST_F(StarterConfiguration, LargerPicturesMayHaveLargerBiases) {
+  StarterOptions o;
+  o.urdf = kSource / "meshes/arm7/arm7.urdf";
+  o.out = folder_ / "mine";
+  put(folder_ / "large.yaml",
+      "{\"width\": 1280, \"height\": 960, \"distortion_model\": \"plumb_bob\", \"d\": [0, 0, 0, 0, 0],"
+      " \"k\": [900, 0, 640, 0, 900, 480, 0, 0, 1], \"r\": [1, 0, 0, 0, 1, 0, 0, 0, 1],"
+      " \"p\": [900, 0, 640, 0, 0, 900, 480, 0, 0, 0, 1, 0]}\n");
+  o.camera_infos = {folder_ / "large.yaml"};
+  EXPECT_TRUE(write_starter_configuration(o).usable);
+  const auto state = Configuration::load(o.out / "estimator.yaml").section("estimator").section("state");
+  EXPECT_NEAR(state.section("silhouette_bias").number("sd_px", 0.0, 10.0), 4.0 * 0.15, 0.005);
+}
+
 TEST_F(StarterConfiguration, FromStillsNothingElseIsAsked) {
   const SmallStills stills;
   for (const std::string camera : {"left", "right"}) {

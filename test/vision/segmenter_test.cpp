@@ -318,6 +318,23 @@ TEST(Segmenter, WhatMovedInTheBackgroundIsLearnedAnewOutsideThePrediction) {
   EXPECT_EQ(out.mask.count(), 0u);
 }
 
+/// A search of 64 px of a 320x240 picture is one of 148 px here.
+TEST(Segmenter, StatisticsLookFarInLargePictures) {
+  auto setup = setup_for(SegmentationMethod::kStatistics);
+  setup.search_px = 64;
+  std::mt19937 random(15);
+  Scene scene;
+  scene.width = 740;
+  scene.height = 555;
+  scene.supersampling = 1;
+  scene.shapes = {{370, 280, 370, 280, 90}};
+  Segmenter segmenter(setup, "left", scene.width, scene.height);
+  Output out;
+  const auto prediction = scene.true_mask();
+  segmenter.segment(scene.picture(random), out.mask, out.valid, out.coverage, &prediction);
+  EXPECT_GT(iou(out.mask, prediction), 0.95);
+}
+
 TEST(Segmenter, StatisticsFollowThePredictionOnAMovingBackground) {
   // Every frame shows another part of the clutter; the prediction is four pixels off.
   auto setup = setup_for(SegmentationMethod::kStatistics);

@@ -64,6 +64,7 @@ struct CalibratedCamera {
     std::string camera;
     Pose X_first_optical = Pose::Identity();
     Eigen::Vector3d axes_sd_m = Eigen::Vector3d::Zero(), axes_sd_rad = Eigen::Vector3d::Zero();  ///< as above
+    bool estimated = false;  ///< false: as configured, against that camera
   };
   std::optional<Beside> beside;
   bool estimated = false;  ///< false: as configured
@@ -83,7 +84,7 @@ struct CalibratedJoint {
   /// is left as it is. All else is right together with this.
   double offset_rad = 0.0, sd_rad = 0.0;
   bool told = false;       ///< known to 0.5 deg and a third of what was believed; counts in a good result
-  std::string untold_why;  ///< "cannot be told from camera_pose turn_y"; empty where it is told
+  std::string untold_why;  ///< "no picture tells it from camera_pose turn_y"; empty where it is told
   /// Told; or told too little, and further from where it is than the pictures leave open.
   bool applied = false;
   double seen_rad = 0.0, seen_sd_rad = 0.0;  ///< what the pictures make of it, whether it is applied or not

@@ -56,6 +56,8 @@ struct StereoRig {
   /// Reads the `cameras` section; config/icub_right/robot.yaml explains every key. Throws ConfigurationError.
   static StereoRig from(const Configuration& cameras);
   [[nodiscard]] std::vector<PinholeIntrinsics> intrinsics() const;
+  /// Of the robot, each camera's.
+  [[nodiscard]] std::vector<std::string> links() const;
 };
 
 /// RobotSetup::load with a frame for every camera that is no link of the URDF by itself. Throws as that does, and

@@ -53,10 +53,10 @@ class BatchFit {
   /// Mean cost of an outline point, px^2 of a 320x240 picture: comparable between fits of the same pictures.
   [[nodiscard]] double misfit() const { return misfit_; }
   /// Which posture each picture shows.
-  [[nodiscard]] const std::vector<std::size_t>& posture_of() const { return posture_of_; }
+  [[nodiscard]] const std::vector<std::size_t>& posture_by_picture() const { return posture_of_; }
   [[nodiscard]] std::size_t postures() const { return postures_; }
-  /// How the search for outlines was when the fit ended, per camera.
-  [[nodiscard]] std::vector<OutlineSearch> searches() const;
+  /// How the search for outlines was when the fit ended.
+  [[nodiscard]] OutlineSearch search() const;
 
  private:
   void group_postures();

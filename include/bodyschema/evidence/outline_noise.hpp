@@ -59,5 +59,7 @@ class OutlineNoise {
 
 /// Mean over the cameras of what their evidence is to be divided by.
 double mean_variance_px2(std::span<const OutlineNoise> cameras);
+/// The robust scale of the camera whose outlines are noisiest, for a search that all cameras share.
+double widest_robust_px(std::span<const OutlineNoise> cameras);
 
 }  // namespace bodyschema

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -52,6 +53,16 @@ class PictureLog {
   void finish();
 
   [[nodiscard]] std::span<const Picture> pictures() const { return pictures_; }
+  /// Position of a camera's picture of that time.
+  [[nodiscard]] std::optional<std::size_t> find(std::size_t camera, Microseconds utime) const;
+  /// picture_unit of the camera that took a picture.
+  [[nodiscard]] double unit_px(std::size_t picture) const {
+    return picture_unit(rig_.cameras[pictures_[picture].camera].intrinsics);
+  }
+  /// These pixels of a picture do not count any more.
+  void leave_out(std::size_t picture, const BinaryMask& pixels) {
+    bodyschema::leave_out(pixels, pictures_[picture].valid);
+  }
   [[nodiscard]] std::span<const JointSample> encoders() const { return encoders_; }
   [[nodiscard]] ObservedEdges edges(std::size_t picture) const;
   /// What effects may look at in a picture; `offsets` as InstantBuilder::build.

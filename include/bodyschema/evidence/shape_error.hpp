@@ -52,8 +52,8 @@ class ShapeError {
 };
 
 /// What outlines that are wrong alike in all postures do to a memory's estimate: as if one average posture alone were
-/// known, for the others err with it. No more than what was believed
-/// before any, as wide as that was found to be. To be added to what the memory knows.
+/// known, for the others err with it. No more than what was believed before any, as wide as that was found to be. To be
+/// added to what the memory knows.
 /// @param variance_share  ShapeError's variance over that of the residuals which the memory was taught with
 Eigen::MatrixXd shape_covariance(const PostureMemory& memory, double variance_share);
 

@@ -32,9 +32,6 @@ struct OutlineSearch {
   const BinaryMask* covered = nullptr;
 };
 
-/// The length in a camera's pictures that one pixel of a 320x240 picture has: settings in px are multiplied by it.
-double picture_unit(const PinholeIntrinsics& k);
-
 /// One point of a predicted outline with its counterpart in the picture.
 struct OutlinePoint {
   std::size_t part = 0;

@@ -26,7 +26,6 @@ class FrozenPicture {
   PictureChange look(const Image& image, const Eigen::VectorXd& q);
 
  private:
-  bool first_ = true;
   std::uint64_t digest_ = 0;
   Eigen::VectorXd q_;
   PictureChange change_;

@@ -23,8 +23,9 @@ struct WatchOptions {
 /// A log with the robot's outlines found in its pictures: what calibration and diagnosis work on.
 struct WatchedLog {
   PictureLog pictures;
-  std::vector<Observation> kept;                   ///< pictures and masks of some of them, in order of time
-  std::map<std::string, double> offsets_at_start;  ///< by joint, rad: where the estimator was when it had converged
+  std::vector<Observation> kept;  ///< pictures and masks of some of them, in order of time
+  std::map<std::string, double>
+      offsets_at_start;  ///< by joint, rad: where the estimator was at the last frame it looked at
   BusStatistics bus;
   std::vector<std::string> missing_joints;  ///< of which no reading came
   std::size_t pictures_seen = 0, pictures_with_robot = 0;
@@ -44,8 +45,7 @@ Eigen::VectorXd at_start(const WatchedLog& log, const State& state);
 /// Reads a log's pictures and encoders and finds the masks as configured. A background that is to be learned is learned
 /// from the whole log first.
 /// @param estimate_first  lets the estimator look at the beginning of the log, for a start and for exchanged eyes;
-/// masks
-///   that need estimates (`statistics`) have it look at all of it
+///   masks that need estimates (`statistics`) have it look at all of it
 /// Throws Error.
 WatchedLog watch_log(Pipeline& pipeline, const WatchOptions& options, bool estimate_first);
 

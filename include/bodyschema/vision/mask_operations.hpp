@@ -38,6 +38,9 @@ class MaskMorphology {
   std::vector<std::uint64_t> rows_;
 };
 
+/// Sets pixels [begin, end) of a row.
+void set_run(BinaryMask& mask, int v, int begin, int end, bool value);
+
 /// Drops small connected pieces and fills small holes. Allocates nothing once warm. One per thread.
 class ComponentFilter {
  public:

@@ -26,7 +26,8 @@ enum class EdgeKind {
   kHard,     ///< a pixel is either robot or background: simulators that draw without antialiasing
 };
 
-/// Settings of the section `vision`, shared by all cameras. Intensities are in levels, 0 to 255.
+/// Settings of the section `vision`, shared by all cameras. Intensities are in levels, 0 to 255; lengths and areas in
+/// pixels of a 320x240 picture.
 struct VisionSetup {
   SegmentationMethod method = SegmentationMethod::kLearnedBackground;
   EdgeKind edges = EdgeKind::kBlurred;
@@ -62,7 +63,7 @@ struct VisionSetup {
   /// learned_background: a pixel's background must be seen in at least this many frames.
   int min_sightings = 3;
 
-  /// statistics: how far from the predicted outline the robot is searched for, px.
+  /// statistics and auto: how far from the predicted outline the robot is searched for, px.
   int search_px = 12;
 
   /// auto: where a service keeps the robot's colours for its next start; empty: nowhere.
@@ -72,6 +73,8 @@ struct VisionSetup {
   /// background.
   double min_piece_share = 0.05;
 
+  /// The same with lengths and areas in pixels of pictures of this size, where these are larger than 320x240.
+  [[nodiscard]] VisionSetup in_pixels_of(int width, int height) const;
   /// Reads and checks the section; throws ConfigurationError.
   static VisionSetup from(const Configuration& vision);
   friend bool operator==(const VisionSetup&, const VisionSetup&) = default;
