@@ -120,15 +120,23 @@ std::optional<Objection> objection_of_postures(const BatchFit& batch, const Doub
                                  *outlines.heldout, outlines.after)};
   }
   const Eigen::VectorXd innovation = batch.memory().belief_innovation();
+  std::size_t scattered = 0;  // most, against what was believed
+  const auto spread = [&](std::size_t k) {
+    return result.joints[k].seen_sd_rad / batch.state().prior_sd()[static_cast<Eigen::Index>(k)];
+  };
+  for (std::size_t k = 1; k < result.joints.size(); ++k) {
+    if (spread(k) > spread(scattered)) scattered = k;
+  }
+  if (!result.joints.empty() && spread(scattered) > limits::kScattered) {
+    const auto& joint = result.joints[scattered];
+    return Objection{CalibrationState::kModelMisfit,
+                     fmt::format("Model misfit: parts of the log put {} {:.0f} deg and more apart, further than is "
+                                 "believed possible; is its sign, or where it is zero, another than the URDF's?",
+                                 joint.name, degrees(joint.seen_sd_rad))};
+  }
   for (std::size_t k = 0; k < result.joints.size(); ++k) {
     const auto& joint = result.joints[k];
     const auto at = static_cast<Eigen::Index>(k);
-    if (joint.seen_sd_rad > limits::kScattered * batch.state().prior_sd()[at]) {
-      return Objection{CalibrationState::kModelMisfit,
-                       fmt::format("Model misfit: parts of the log put {} {:.0f} deg and more apart, further than is "
-                                   "believed possible; is its sign, or where it is zero, another than the URDF's?",
-                                   joint.name, degrees(joint.seen_sd_rad))};
-    }
     if (joint.told || !joint.applied || std::abs(innovation[at]) <= limits::kFarUntold_sd) continue;
     return Objection{CalibrationState::kModelMisfit,
                      fmt::format("Model misfit: the pictures ask for {:.0f} deg in {} and hardly tell it; is its sign, "

@@ -557,10 +557,11 @@ TEST_F(Calibrated, ALensThatNobodyKnowsIsFoundOrTheResultIsNotGood) {
   ASSERT_FALSE(found.cameras.empty());
   EXPECT_NEAR(found.cameras.front().intrinsics.fx, 534.6, 4.0);  // of the set's own calibration
   EXPECT_THAT(text_of(options.out / "report.html"), AllOf(HasSubstr(">300<"), Not(HasSubstr(">3e+02<"))));
-  const auto sure =
-      calibrate(Configuration::load(options.configuration, {"estimator.state.focal_length={sd_percent: 0.2}",
-                                                            "estimator.state.principal_point common={sd_px: 4.8}"}),
-                options);
+  std::vector<std::string> beliefs = {"estimator.state.focal_length={sd_percent: 0.2}",
+                                      "estimator.state.principal_point common={sd_px: 4.8}"};
+  EXPECT_NE(calibrate(Configuration::load(options.configuration, beliefs), options).state, CalibrationState::kGood);
+  beliefs.push_back("estimator.state.silhouette_bias={sd_px: 0.15}");
+  const auto sure = calibrate(Configuration::load(options.configuration, beliefs), options);
   EXPECT_EQ(sure.state, CalibrationState::kModelMisfit) << sure.sentence;
   EXPECT_THAT(sure.sentence, HasSubstr("no robot is so wrong as the pictures ask for"));
 }

@@ -92,8 +92,8 @@ def check_versions(here, robot, mapping):
     for name, folder in (("v21", old), ("v30", new)):
         said = here.run("import", "lerobot", folder, "--config", robot, "--mapping", mapping, "--raw",
                         "--out", here.scratch / ("logs_" + name))
-        assert "3 logs written; 1 episodes left out, episode 2: no data/" in said or \
-               "3 logs written; 1 episodes left out, episode 2: not in meta/episodes" in said, said
+        assert "3 logs written; 1 episode left out, episode 2: no data/" in said or \
+               "3 logs written; 1 episode left out, episode 2: not in meta/episodes" in said, said
         assert "20 joint messages of 7 joints, 20 pictures of camera top" in said, said
     for number in (0, 1, 3):
         logs = [here.scratch / f"logs_{name}" / f"episode_{number:06d}.lcmlog" for name in ("v21", "v30")]
@@ -128,7 +128,7 @@ def check_bad(here, robot, mapping):
     video = cut / "videos/chunk-000/observation.images.side/episode_000001.mp4"
     video.write_bytes(video.read_bytes()[:200])
     said = imported(cut, "--episodes", "0-1")
-    assert "1 log written; 1 episodes left out, episode 1: " in said, said
+    assert "1 log written; 1 episode left out, episode 1: " in said, said
     rows = cut / "data/chunk-000/episode_000000.parquet"
     rows.write_bytes(rows.read_bytes()[:300])
     said = imported(cut, "--episodes", "0", status=2)
