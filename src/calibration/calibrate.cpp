@@ -459,7 +459,7 @@ class Calibrator {
       if (cause.implausible && doubts_.implausible.empty()) doubts_.implausible = cause.sentence;
       CalibratedEffect effect{cause.cause.name, cause.cause.joint, cause.cause.source, cause.sentence, {}};
       for (const auto& p : cause.parameters) {
-        effect.parameters.push_back({p.parameter, p.unit, p.estimate, 0.25 * (p.ci95[1] - p.ci95[0]), 0.0});
+        effect.parameters.push_back({p.parameter, p.unit, p.estimate, p.sd, 0.0});
       }
       const bool named = report.verdict == "named" || report.verdict == "class";
       if (named && effect_kind_of(cause) != nullptr && effect_kind_of(cause)->timing == EffectTiming::kAlways) {

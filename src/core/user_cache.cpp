@@ -10,9 +10,7 @@
 #include "bodyschema/core/write_file.hpp"
 
 namespace bodyschema {
-namespace {
-
-std::filesystem::path cache_folder() {
+std::filesystem::path user_cache_folder() {
   // Relative paths are invalid there (XDG Base Directory Specification).
   if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache == '/') {
     return std::filesystem::path(cache) / "bodyschema";
@@ -23,10 +21,8 @@ std::filesystem::path cache_folder() {
   return {};
 }
 
-}  // namespace
-
 std::optional<std::string> read_cache(const std::filesystem::path& name) {
-  const auto folder = cache_folder();
+  const auto folder = user_cache_folder();
   if (folder.empty()) return std::nullopt;
   std::ifstream file(folder / name, std::ios::binary);
   if (!file) return std::nullopt;
@@ -35,7 +31,7 @@ std::optional<std::string> read_cache(const std::filesystem::path& name) {
 }
 
 void write_cache(const std::filesystem::path& name, std::string_view bytes) {
-  const auto folder = cache_folder();
+  const auto folder = user_cache_folder();
   if (folder.empty()) return;
   try {
     const auto file = folder / name;

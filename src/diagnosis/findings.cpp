@@ -615,13 +615,10 @@ void Findings::exclude(const LogAbout& log, const BlockRegression& all, const st
     for (std::size_t k = 0; k < fitted.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
       if (candidate.scores.independent[i] < limits::kRounding) continue;
-      const double half = quantile(log) * std::sqrt(covariance(i, i)), unit = fitted[k]->si_per_unit;
-      told.parameters.push_back({fitted[k]->name,
-                                 fitted[k]->unit,
-                                 estimate[i] / unit,
-                                 {(estimate[i] - half) / unit, (estimate[i] + half) / unit}});
+      const auto p = parameter_of(log, *fitted[k], estimate[i], std::sqrt(covariance(i, i)));
+      told.parameters.push_back(p);
       report_.exclusion_limits.push_back(
-          {candidate.cause, fitted[k]->name, fitted[k]->unit, (std::abs(estimate[i]) + half) / unit});
+          {candidate.cause, p.parameter, p.unit, std::max(std::abs(p.ci95[0]), std::abs(p.ci95[1]))});
     }
     report_.estimates.push_back(std::move(told));
   }

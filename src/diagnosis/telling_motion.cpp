@@ -110,7 +110,7 @@ class MotionWriter {
     const Eigen::Vector3d hand = projection.hand().translation();
     const auto& k = log_.rig().cameras[camera].intrinsics;
     if (hand.z() <= 0.0) return Eigen::Vector2d::Constant(-1e9);
-    return {k.fx * hand.x() / hand.z() + k.cx, k.fy * hand.y() / hand.z() + k.cy};
+    return k.project(hand);
   }
 
   bool sees_hand(const Eigen::VectorXd& q) {

@@ -71,7 +71,8 @@ bool in_picture(const CameraModel& camera, const Pose& X_CP) {
   const Eigen::Vector3d p = X_CP.translation();
   if (p.z() <= 0.0) return false;
   const auto& k = camera.intrinsics;
-  const double u = k.fx * p.x() / p.z() + k.cx, v = k.fy * p.y() / p.z() + k.cy;
+  const Eigen::Vector2d pixel = k.project(p);
+  const double u = pixel.x(), v = pixel.y();
   return u >= 0.0 && v >= 0.0 && u < k.width && v < k.height;
 }
 

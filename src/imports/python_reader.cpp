@@ -16,6 +16,7 @@
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/installation.hpp"
+#include "bodyschema/core/user_cache.hpp"
 #include "bodyschema/core/write_file.hpp"
 
 extern char** environ;
@@ -35,14 +36,9 @@ std::string variable(const char* name) {
 }
 
 fs::path cache_folder() {
-  if (const std::string cache = variable("XDG_CACHE_HOME"); !cache.empty() && fs::path(cache).is_absolute()) {
-    return fs::path(cache) / "bodyschema" / "python";
-  }
-  const std::string home = variable("HOME");
-  if (home.empty()) {
-    throw DeviceError("no folder for Python's packages: neither XDG_CACHE_HOME nor HOME is set");
-  }
-  return fs::path(home) / ".cache" / "bodyschema" / "python";
+  const auto cache = user_cache_folder();
+  if (cache.empty()) throw DeviceError("no folder for Python's packages: neither XDG_CACHE_HOME nor HOME is set");
+  return cache / "python";
 }
 
 std::string content_of(const fs::path& file) {

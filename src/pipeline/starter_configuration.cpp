@@ -37,8 +37,8 @@ constexpr double kBeside_sd_mm = 0.5, kTilted_sd_deg = 0.1, kFocal_sd_percent = 
 constexpr double kLag_sd_ms = 60.0;
 /// Of a camera's principal point, share of the width: by which calibrations of one camera differ.
 constexpr double kCentre_share = 0.005;
-/// px of a 320x240 picture: masks lie outside or inside all around by a share of what they resolve
-/// (config/estimator.yaml).
+/// px of a 320x240 picture (config/estimator.yaml): a network resolves no more of a larger picture, and the masks that
+/// it gives lie outside or inside all around by as much of it. What masks are made of pixels err by as much as in any.
 constexpr double kBias_sd_px = 0.15;
 /// Of a lens of which nobody says anything: fields of view from 40 to 90 deg, sensors that are 2 % off the axis.
 constexpr double kGuessedFocal_sd_percent = 25.0;
@@ -653,7 +653,7 @@ class Starter {
       width = std::max(width, static_cast<double>(camera.k.width));
       unit_px = std::max(unit_px, picture_unit(camera.k));
     }
-    if (unit_px > 1.0) {
+    if (masks_ && unit_px > 1.0) {
       text += fmt::format("    silhouette_bias: {{sd_px: {:.2f}}}   # as {} of a picture of 320x240\n",
                           kBias_sd_px * unit_px, kBias_sd_px);
     }
