@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "bodyschema/outline/outline_measurement.hpp"
 #include "bodyschema/pipeline/silhouette_preview.hpp"
 #include "bodyschema/vision/mask_operations.hpp"
 

@@ -11,9 +11,9 @@
 #include "bodyschema/effects/effect_kind.hpp"
 #include "bodyschema/pipeline/export_correction.hpp"
 #include "bodyschema/pipeline/overlay.hpp"
-#include "bodyschema/pipeline/silhouette_preview.hpp"
-#include "bodyschema/pipeline/ros_files.hpp"
 #include "bodyschema/pipeline/pose_json.hpp"
+#include "bodyschema/pipeline/ros_files.hpp"
+#include "bodyschema/pipeline/silhouette_preview.hpp"
 #include "bodyschema/report/report.hpp"
 
 namespace bodyschema {

@@ -5,7 +5,7 @@
 
 #include "bodyschema/camera/stereo_rig.hpp"
 #include "bodyschema/core/order_statistics.hpp"
-#include "bodyschema/outline/outline_measurement.hpp"
+#include "bodyschema/geometry/pinhole.hpp"
 #include "bodyschema/pipeline/silhouette_preview.hpp"
 #include "bodyschema/vision/mask_operations.hpp"
 

@@ -10,6 +10,7 @@
 #include "bodyschema/core/write_file.hpp"
 
 namespace bodyschema {
+
 std::filesystem::path user_cache_folder() {
   // Relative paths are invalid there (XDG Base Directory Specification).
   if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache == '/') {

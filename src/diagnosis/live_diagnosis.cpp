@@ -202,7 +202,8 @@ class Window {
     auto measured = fit_.predict(best_ ? *best_ : state_.model(), joints_, fresh);
     bring_near(measured, fresh, x);
     measured.coordinates = all_;
-    const OutlineSearch search{diagnosis::limits::kSearch_px, diagnosis_.spacing_px, widest_robust_px(noise_)};
+    const OutlineSearch search{diagnosis::limits::kSearch_px, diagnosis_.spacing_px,
+                               std::max(OutlineSearch{}.robust_px, widest_robust_px(noise_))};
     fit_.measure(measured, search, fresh, [&](std::size_t p, std::span<const OutlinePoint> points) {
       const auto camera = log_.pictures()[p].camera;
       noise_[camera].add(points, log_.unit_px(p), kNoisePictures);

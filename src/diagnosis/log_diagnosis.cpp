@@ -111,7 +111,7 @@ class LogDiagnosis {
                     diagnosis::why_too_short(length, diagnosis::untestable(roles, motion), roles, needed));
   }
 
-  /// Where the estimator was when it had converged.
+  /// Where the estimator was at the last frame it looked at (WatchedLog::offsets_at_start).
   [[nodiscard]] std::vector<Eigen::VectorXd> starts() const {
     if (watched_.offsets_at_start.empty()) return {};
     return {at_start(watched_, State(watched_.pictures.roles(), pipeline_.beliefs().state))};

@@ -1,6 +1,7 @@
 #include "log_exposures.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "bodyschema/bus/log.hpp"
 #include "bodyschema/observation/joint_motion.hpp"
@@ -17,8 +18,12 @@ LogExposures LogExposures::read(const std::filesystem::path& log, ObservationStr
   const auto drain = [&] {
     while (const auto arrived = stream.next()) {
       const auto& observation = arrived->observation;
-      if (!result.pictures.empty() && observation.utime < due) continue;
-      due = result.pictures.empty() || observation.utime > due + period ? observation.utime + period : due + period;
+      if (observation.encoders_begin_anew) {  // as PictureLog::add
+        std::erase_if(result.pictures, [&](const JointSample& s) { return s.utime >= observation.utime; });
+      }
+      if (!result.pictures.empty() && observation.utime < due && due - observation.utime <= period) continue;
+      due = result.pictures.empty() || std::abs(observation.utime - due) > period ? observation.utime + period
+                                                                                  : due + period;
       seen.resize(observation.cameras.size());
       for (std::size_t c = 0; c < seen.size(); ++c) {
         if (!observation.cameras[c]) continue;

@@ -1,5 +1,4 @@
 #include "kinds.hpp"
-#include "words.hpp"
 
 namespace bodyschema::effects {
 

@@ -1,7 +1,6 @@
 #include <algorithm>
 
 #include "kinds.hpp"
-#include "words.hpp"
 
 namespace bodyschema::effects {
 

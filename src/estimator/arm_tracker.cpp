@@ -288,7 +288,8 @@ void ArmTracker::spread_particles(const FrameOutcome& outcome) {
   particles_.spread(known_.x, sd_rad);
 }
 
-/// Pictures that came between say nothing of what was searched for, or all there is to say: it would begin anew.
+/// Pictures that came between say nothing of what was searched for, or all there is to say: the search would begin
+/// anew, and so does what had been in doubt.
 void ArmTracker::put_off_searches() {
   round_.reset();
   lost_.reset();

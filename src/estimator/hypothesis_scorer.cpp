@@ -10,6 +10,7 @@
 #include "stage_timer.hpp"
 
 namespace bodyschema {
+
 HypothesisScorer::HypothesisScorer(FrameModel& model, const SilhouetteModel& silhouettes,
                                    const SilhouetteModel* outlines, std::vector<PinholeIntrinsics> cameras,
                                    const SilhouetteOptions& options, std::size_t slots)

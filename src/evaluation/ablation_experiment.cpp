@@ -1,4 +1,3 @@
-
 #include "experiments.hpp"
 #include "reach_figures.hpp"
 #include "trial_runner.hpp"

@@ -136,6 +136,7 @@ std::pair<double, double> scatter(const std::vector<Pose>& poses, const Eigen::V
 
 std::map<std::int64_t, BoardCorners> read_checkerboard(const std::filesystem::path& csv) {
   const CsvTable table = CsvTable::read(csv);
+  if (table.bad.count > 0) throw FileError(table.bad.first);
   std::map<std::int64_t, BoardCorners> boards;
   for (const auto& row : table.rows) {
     const auto& value = row.values;

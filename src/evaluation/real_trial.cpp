@@ -3,9 +3,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <fstream>
+#include <cmath>
 #include <random>
-#include <sstream>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/write_file.hpp"
@@ -51,9 +50,13 @@ JointTable JointTable::read(const fs::path& set) {
 
 JointTable JointTable::read_file(const fs::path& file) {
   const CsvTable csv = CsvTable::read(file);
+  if (csv.bad.count > 0) throw FileError(csv.bad.first);
   JointTable table{csv.names, {}};
   for (const auto& row : csv.rows) {
     if (!row.words.empty()) throw csv.not_a_number(row, row.words.begin()->first);
+    if (std::any_of(row.values.begin(), row.values.end(), [](double v) { return std::isnan(v); })) {
+      throw FileError(csv.where(row) + ": a field is empty");
+    }
     table.rows.push_back(row.values);
   }
   return table;

@@ -21,9 +21,12 @@ bool PictureLog::repeats_the_last(const std::vector<Picture>& pictures) const {
 }
 
 void PictureLog::add(const Observation& observation) {
-  if (observation.encoders_begin_anew) {  // of another clock: what came before and is later by it would stand between
-    std::erase_if(pictures_, [&](const Picture& picture) { return picture.joints.utime > observation.utime; });
-    std::erase_if(encoders_, [&](const JointSample& sample) { return sample.utime > observation.utime; });
+  if (observation.encoders_begin_anew) {
+    // The clock stepped back: what was stamped before and lies after the new beginning would stand among what follows.
+    auto begin = observation.utime;
+    if (!observation.encoders.empty()) begin = std::min(begin, observation.encoders.front().utime);
+    std::erase_if(pictures_, [&](const Picture& picture) { return picture.joints.utime >= begin; });
+    std::erase_if(encoders_, [&](const JointSample& sample) { return sample.utime >= begin; });
   }
   for (const auto& sample : observation.encoders) {
     if (!encoders_.empty() && sample.utime <= encoders_.back().utime) {

@@ -37,7 +37,9 @@ std::string variable(const char* name) {
 
 fs::path cache_folder() {
   const auto cache = user_cache_folder();
-  if (cache.empty()) throw DeviceError("no folder for Python's packages: neither XDG_CACHE_HOME nor HOME is set");
+  if (cache.empty()) {
+    throw DeviceError("no folder for Python's packages: neither XDG_CACHE_HOME nor HOME is set to an absolute path");
+  }
   return cache / "python";
 }
 

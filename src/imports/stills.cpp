@@ -10,8 +10,8 @@
 #include <set>
 
 #include "bodyschema/core/nearest_name.hpp"
-#include "camera_check.hpp"
 #include "bodyschema/imports/csv_table.hpp"
+#include "camera_check.hpp"
 #include "picture_file.hpp"
 #include "row_slopes.hpp"
 

@@ -14,7 +14,7 @@
 #include "bodyschema/core/logging.hpp"
 #include "bodyschema/imports/joint_mapping.hpp"
 #include "bodyschema/imports/yarp_import.hpp"
-#include "bodyschema/outline/outline_measurement.hpp"
+#include "bodyschema/geometry/pinhole.hpp"
 #include "model_hash.hpp"
 
 namespace bodyschema {

@@ -299,7 +299,7 @@ class Replay {
     table += "weakest direction: " + last_.weakest.text + '\n';
     if (truth_) table += truth_table(summary);
     table += closing_lines(summary);
-    write_file(options_.out / "summary.json", summary.dump(2) + '\n');
+    write_file(options_.out / "summary.json", summary.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
     return table;
   }
 

@@ -4,10 +4,7 @@
 #include <tinyxml2.h>
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
-#include <optional>
 
 #include "bodyschema/core/error.hpp"
 #include "bodyschema/core/write_file.hpp"

@@ -37,8 +37,8 @@ constexpr double kBeside_sd_mm = 0.5, kTilted_sd_deg = 0.1, kFocal_sd_percent = 
 constexpr double kLag_sd_ms = 60.0;
 /// Of a camera's principal point, share of the width: by which calibrations of one camera differ.
 constexpr double kCentre_share = 0.005;
-/// px of a 320x240 picture (config/estimator.yaml): a network resolves no more of a larger picture, and the masks that
-/// it gives lie outside or inside all around by as much of it. What masks are made of pixels err by as much as in any.
+/// px. Masks made from the pixels themselves err by as many in pictures of any size (config/estimator.yaml). A network
+/// resolves no more of a larger picture, so its masks lie outside or inside all around by so many of a 320x240 picture.
 constexpr double kBias_sd_px = 0.15;
 /// Of a lens of which nobody says anything: fields of view from 40 to 90 deg, sensors that are 2 % off the axis.
 constexpr double kGuessedFocal_sd_percent = 25.0;

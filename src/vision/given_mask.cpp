@@ -38,7 +38,7 @@ void GivenMask::read(const Image& given, const Undistorter* lens, BinaryMask& ma
   components_.remove_small(mask, static_cast<int>(std::ceil(least_px)));
   specks -= mask;
   valid -= specks;
-  components_.fill_small_holes(mask, setup_.in_pixels_of(given.width, given.height).max_hole_px);
+  components_.fill_small_holes(mask, setup_.max_hole_px);
   coverage = std::move(robot.data);
   i = 0;
   for (int v = 0; v < given.height; ++v) {

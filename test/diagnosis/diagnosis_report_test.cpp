@@ -135,5 +135,12 @@ TEST(DiagnosisReport, IsWrittenBesideItsModel) {
   EXPECT_THROW(DiagnosisReport::prepare(folder), Error);
 }
 
+/// A log's name comes of the file system, which knows no encoding.
+TEST(DiagnosisReport, NamesMayBeNoUtf8) {
+  DiagnosisReport r = report();
+  r.next_steps.push_back("bodyschema replay m\xfcnchen.lcmlog");
+  EXPECT_NO_THROW((void)Json::parse(r.to_json()));
+}
+
 }  // namespace
 }  // namespace bodyschema

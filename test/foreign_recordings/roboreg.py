@@ -17,8 +17,9 @@ Offsets of 4 deg standard deviation are added to the recorded angles, none with 
 the three commands but URDF and folder. Printed for each: state, joints told, errors of these but the first against the
 encoders as they are (rms, and the worst in published standard deviations and 0.1 deg), and the outlines' distance in
 the masks on postures left out. `--postures` draws so many with each seed. `--reversed` turns the sign of one joint's
-angles after the other instead, which should not be `good`. Exit status 1 where a result is `good` and wrong: a told
-joint off by more than 5 standard deviations, or by more than 3 and 0.5 deg. Needs git and numpy.
+angles after the other instead, which should not be `good`. `--replay` plays each calibrated log through the service's
+code, with the cameras that were found, and prints how that ends. Exit status 1 where a result is `good` and wrong: a
+told joint off by more than 5 standard deviations, or by more than 3 and 0.5 deg. Needs git and numpy.
 """
 import argparse
 import csv

@@ -442,6 +442,9 @@ TEST_F(Stills, AFewBadRowsAreCounted) {
 
 /// Rows without a number belong to pictures in order: one that is damaged takes its own picture away, no other's.
 TEST_F(Stills, ADamagedRowLeavesTheOthersTheirPictures) {
+  for (const std::string camera : {"left", "right"}) {
+    stills_.picture("images/" + camera + "/01.png", cv::Mat(6, 8, CV_8UC3, cv::Scalar(1, 2, 9)));
+  }
   std::string csv = "joint1,joint2,joint3,joint4,joint5,joint6,joint7\n";
   for (int i = 0; i < 40; ++i) {
     csv += i == 0 ? "0,0,0\n" : "0." + std::to_string(i) + ",0,0,0,0,0,0\n";
@@ -458,7 +461,8 @@ TEST_F(Stills, ADamagedRowLeavesTheOthersTheirPictures) {
   EXPECT_EQ(summary.left_out.at("rows").count, 1u);
   const auto seen = observations(target());
   ASSERT_EQ(seen.size(), 39u);
-  EXPECT_NEAR(seen[0].cameras[0]->joints.q(0), 0.1, 1e-6) << "of picture 1, not of picture 0";
+  EXPECT_NEAR(seen[0].cameras[0]->joints.q(0), 0.1, 1e-6);
+  EXPECT_EQ(seen[0].cameras[0]->image.data[0], 9) << "picture 1, not picture 0";
 }
 
 TEST_F(Stills, WhatWasThereStaysWhereAnImportFails) {

@@ -25,6 +25,15 @@ TEST(Report, EscapesEveryText) {
   EXPECT_THAT(html, HasSubstr("&lt;b&gt;title"));
 }
 
+/// Names of robots, files and joints are somebody else's.
+TEST(Report, AChartsTitleMayBeNoUtf8) {
+  Report report("charts");
+  Chart chart;
+  chart.title = "m\xfcnchen";
+  chart.series = {{"a", {0.0, 1.0}, {1.0, 2.0}}};
+  EXPECT_NO_THROW(report.chart(chart));
+}
+
 TEST(Report, FiguresKnownLastStandFirst) {
   Report report("figures");
   report.heading("charts");

@@ -47,23 +47,6 @@ TEST(GivenMask, IsTakenAsItIs) {
   EXPECT_EQ(seen.covered(19, 10), 0);
 }
 
-/// max_hole_px is of a 320x240 picture, and an area.
-TEST(GivenMask, LargerPicturesHaveLargerHoles) {
-  const auto with_hole = [](int width, int height) {
-    Image picture(width, height, 1);
-    fill(picture, 100, 40, 260, 200, kMaskRobot);
-    fill(picture, 150, 100, 154, 105, kMaskBackground);
-    BinaryMask mask, valid;
-    std::vector<std::uint8_t> coverage;
-    VisionSetup setup;
-    setup.max_hole_px = 6;
-    GivenMask(setup).read(picture, nullptr, mask, valid, coverage);
-    return mask.at(152, 102);
-  };
-  EXPECT_FALSE(with_hole(320, 240));
-  EXPECT_TRUE(with_hole(640, 480)) << "20 px there are 5 of a 320x240 picture";
-}
-
 TEST(GivenMask, WhatIsNotKnownDoesNotCount) {
   Image picture = with_arm();
   fill(picture, 50, 0, 70, kHeight, kMaskUnknown);

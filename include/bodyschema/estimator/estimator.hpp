@@ -40,8 +40,7 @@ class Estimator {
   Estimate step(const Observation& observation);
 
   /// Likelihood 1 - d (equation 4) of joint offsets, one hypothesis per column, all else nominal.
-  /// Zero where the hand is not in view. Leaves the estimate as it is; the observation is the one
-  /// seen last.
+  /// Zero where the hand is not in view. Leaves the estimate as it is; exposure() is of this observation afterwards.
   [[nodiscard]] Eigen::VectorXd likelihood(const Observation& observation, const Eigen::MatrixXd& offsets_rad);
 
   /// A camera's exposure of the observation seen last; where it saw nothing, another's.

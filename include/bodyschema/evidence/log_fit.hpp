@@ -117,8 +117,6 @@ class LogFit {
  private:
   [[nodiscard]] double mean_cost(const LinearLog& at, double usual_points, double OutlineEvidence::*cost) const;
 
-  /// px of the picture in one of a 320x240 picture.
-
   PictureLog& log_;
   std::vector<std::unique_ptr<OutlineMeasurement>> workers_;
   std::vector<double> part_weight_;

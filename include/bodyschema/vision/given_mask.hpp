@@ -13,7 +13,8 @@ namespace bodyschema {
 class Undistorter;
 
 /// Masks that others found (`vision.method: given`), in the form in which Segmenter gives its own: what is not known
-/// is not valid, and neither are specks, which segmentation networks leave; small holes are filled. One thread.
+/// is not valid, and neither are specks, which segmentation networks leave; holes of VisionSetup::max_hole_px pixels
+/// are filled, of any picture: larger ones are gaps between links. One thread.
 class GivenMask {
  public:
   explicit GivenMask(const VisionSetup& setup) : setup_(setup) {}

@@ -47,7 +47,8 @@ struct VisionSetup {
 
   /// Connected pieces of robot with fewer pixels than this are dropped.
   int min_component_px = 40;
-  /// Enclosed pieces of background with at most this many pixels are filled.
+  /// Enclosed pieces of background with at most this many pixels are filled; in given masks so many of the picture
+  /// itself.
   int max_hole_px = 6;
 
   /// single_colour: the colour, RGB; absent: the dominant colour of the first frame.
