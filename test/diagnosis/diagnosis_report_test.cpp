@@ -139,7 +139,7 @@ TEST(DiagnosisReport, IsWrittenBesideItsModel) {
 TEST(DiagnosisReport, NamesMayBeNoUtf8) {
   DiagnosisReport r = report();
   r.next_steps.push_back("bodyschema replay m\xfcnchen.lcmlog");
-  EXPECT_NO_THROW((void)Json::parse(r.to_json()));
+  EXPECT_TRUE(Json::accept(r.to_json()));
 }
 
 }  // namespace
